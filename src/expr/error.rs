@@ -1,0 +1,56 @@
+use std::fmt;
+use std::ops::Range;
+
+/// What is wrong with a formula, and where. Its [`Display`](fmt::Display) shows the formula with a
+/// caret below the offending place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FormulaError {
+    /// The whole formula as written.
+    pub formula: String,
+    /// Byte range of the offending place within `formula`.
+    pub span: Range<usize>,
+    /// What is wrong and, where one is near, the name that was probably meant.
+    pub message: String,
+}
+
+impl FormulaError {
+    pub(super) fn new(formula: &str, span: Range<usize>, message: impl Into<String>) -> Self {
+        Self {
+            formula: formula.to_owned(),
+            span,
+            message: message.into(),
+        }
+    }
+}
+
+impl std::error::Error for FormulaError {}
+
+impl fmt::Display for FormulaError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let before = self.formula[..self.span.start].chars().count();
+        let under = self.formula[self.span.clone()].chars().count().max(1);
+        writeln!(f, "{}", self.message)?;
+        writeln!(f, "    {}", self.formula.replace(['\n', '\t'], " "))?;
+        write!(f, "    {}{}", " ".repeat(before), "^".repeat(under))
+    }
+}
+
+/// The candidate nearest to `name`, if one is near enough to be a slip of the hand.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    candidates
+        .into_iter()
+        .map(|c| {
+            (
+                strsim::damerau_levenshtein(&name.to_lowercase(), &c.to_lowercase()),
+                c,
+            )
+        })
+        .filter(|(distance, c)| *distance <= 1 + c.len().max(name.len()) / 4)
+        .min()
+        .map(|(_, c)| c)
+}
+
+/// `; did you mean ...?` or nothing.
+pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(name, candidates).map_or_else(String::new, |c| format!("; did you mean `{c}`?"))
+}

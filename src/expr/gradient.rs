@@ -1,0 +1,167 @@
+use super::graph::{Graph, Node};
+use super::op::{Binary, Op, Unary};
+
+impl Graph {
+    /// Reverse mode: the gradient of `sum_k seeds[k] * outputs[k]` with respect to each of `wrt`,
+    /// as further nodes of this graph. Every reader of programs is thereby a reader of gradients.
+    ///
+    /// `sign`, comparisons and the condition of `where` count as constant.
+    pub fn gradient(&mut self, outputs: &[Node], seeds: &[Node], wrt: &[Node]) -> Vec<Node> {
+        let mut adjoints: Vec<Option<Node>> = vec![None; self.ops.len()];
+        for (output, seed) in outputs.iter().zip(seeds) {
+            self.accumulate(&mut adjoints, *output, *seed);
+        }
+        for index in (0..adjoints.len()).rev() {
+            if let Some(adjoint) = adjoints[index] {
+                let node = Node(u32::try_from(index).expect("nodes are numbered in 32 bits"));
+                self.spread(&mut adjoints, node, adjoint);
+            }
+        }
+        let zero = self.constant(0.0);
+        wrt.iter()
+            .map(|node| {
+                adjoints
+                    .get(node.index())
+                    .copied()
+                    .flatten()
+                    .unwrap_or(zero)
+            })
+            .collect()
+    }
+
+    /// The matrix of derivatives `[output][wrt]`.
+    pub fn jacobian(&mut self, outputs: &[Node], wrt: &[Node]) -> Vec<Vec<Node>> {
+        let one = self.constant(1.0);
+        outputs
+            .iter()
+            .map(|output| self.gradient(&[*output], &[one], wrt))
+            .collect()
+    }
+
+    fn accumulate(&mut self, adjoints: &mut [Option<Node>], node: Node, part: Node) {
+        if self.constant_value(part) == Some(0.0) {
+            return;
+        }
+        adjoints[node.index()] = Some(match adjoints[node.index()] {
+            Some(sum) => self.add(sum, part),
+            None => part,
+        });
+    }
+
+    /// Pass the adjoint of `node` on to its operands.
+    fn spread(&mut self, adjoints: &mut [Option<Node>], node: Node, adjoint: Node) {
+        match self.ops[node.index()] {
+            Op::Const(_) | Op::Input(_) => {}
+            Op::Unary(op, a) => {
+                if let Some(slope) = self.unary_slope(op, a, node) {
+                    let part = self.mul(adjoint, slope);
+                    self.accumulate(adjoints, a, part);
+                }
+            }
+            Op::Binary(op, a, b) => {
+                for (operand, part) in self.binary_parts(op, a, b, node, adjoint) {
+                    self.accumulate(adjoints, operand, part);
+                }
+            }
+            Op::Where(condition, a, b) => {
+                let zero = self.constant(0.0);
+                let to_a = self.select(condition, adjoint, zero);
+                let to_b = self.select(condition, zero, adjoint);
+                self.accumulate(adjoints, a, to_a);
+                self.accumulate(adjoints, b, to_b);
+            }
+        }
+    }
+
+    /// d node / d a, where `node` is `op(a)`.
+    fn unary_slope(&mut self, op: Unary, a: Node, node: Node) -> Option<Node> {
+        let one = self.constant(1.0);
+        Some(match op {
+            Unary::Neg => self.constant(-1.0),
+            Unary::Sin => self.unary(Unary::Cos, a),
+            Unary::Cos => {
+                let sine = self.unary(Unary::Sin, a);
+                self.neg(sine)
+            }
+            Unary::Tan => {
+                let square = self.mul(node, node);
+                self.add(one, square)
+            }
+            Unary::Exp => node,
+            Unary::Log => self.div(one, a),
+            Unary::Sqrt => {
+                let half = self.constant(0.5);
+                self.div(half, node)
+            }
+            Unary::Abs => self.unary(Unary::Sign, a),
+            Unary::Sign => return None,
+            Unary::Tanh => {
+                let square = self.mul(node, node);
+                self.sub(one, square)
+            }
+        })
+    }
+
+    fn binary_parts(
+        &mut self,
+        op: Binary,
+        a: Node,
+        b: Node,
+        node: Node,
+        adjoint: Node,
+    ) -> Vec<(Node, Node)> {
+        match op {
+            Binary::Add => vec![(a, adjoint), (b, adjoint)],
+            Binary::Sub => vec![(a, adjoint), (b, self.neg(adjoint))],
+            Binary::Mul => vec![(a, self.mul(adjoint, b)), (b, self.mul(adjoint, a))],
+            Binary::Div => {
+                let to_a = self.div(adjoint, b);
+                let product = self.mul(to_a, node);
+                vec![(a, to_a), (b, self.neg(product))]
+            }
+            Binary::Pow => self.power_parts(a, b, node, adjoint),
+            Binary::Atan2 => {
+                let (yy, xx) = (self.mul(a, a), self.mul(b, b));
+                let square = self.add(yy, xx);
+                let scaled = self.div(adjoint, square);
+                let to_x = self.mul(scaled, a);
+                vec![(a, self.mul(scaled, b)), (b, self.neg(to_x))]
+            }
+            Binary::Min => self.choice_parts(a, b, a, b, adjoint),
+            Binary::Max => self.choice_parts(b, a, a, b, adjoint),
+            Binary::Less => Vec::new(),
+        }
+    }
+
+    /// d(a^b) = b a^(b-1) da + a^b log(a) db; the second part only where the power is not a constant.
+    fn power_parts(&mut self, a: Node, b: Node, node: Node, adjoint: Node) -> Vec<(Node, Node)> {
+        let one = self.constant(1.0);
+        let less = self.sub(b, one);
+        let lower = self.binary(Binary::Pow, a, less);
+        let slope = self.mul(b, lower);
+        let mut parts = vec![(a, self.mul(adjoint, slope))];
+        if self.constant_value(b).is_none() {
+            let log = self.unary(Unary::Log, a);
+            let slope = self.mul(node, log);
+            parts.push((b, self.mul(adjoint, slope)));
+        }
+        parts
+    }
+
+    /// The adjoint goes to `a` where `low < high`, else to `b`.
+    fn choice_parts(
+        &mut self,
+        low: Node,
+        high: Node,
+        a: Node,
+        b: Node,
+        adjoint: Node,
+    ) -> Vec<(Node, Node)> {
+        let zero = self.constant(0.0);
+        let first = self.binary(Binary::Less, low, high);
+        vec![
+            (a, self.select(first, adjoint, zero)),
+            (b, self.select(first, zero, adjoint)),
+        ]
+    }
+}

@@ -1,0 +1,25 @@
+//! Equations as programs: a formula is text, is parsed once, and becomes a [`Program`],
+//! a flat list of about two dozen scalar operations. Everything else reads that list:
+//! the evaluator ([`Tape`]), the derivative ([`Graph::gradient`]), the replay on Burn tensors
+//! ([`Program::replay`]) and the printers ([`Program::text`], [`Program::latex`]).
+//!
+//! This module knows no file, no optimiser and no command line.
+
+mod error;
+mod eval;
+mod gradient;
+mod graph;
+mod op;
+mod parse;
+mod print;
+mod program;
+mod replay;
+mod scope;
+
+pub use error::FormulaError;
+pub use eval::{Real, Tape};
+pub use graph::{Graph, Node};
+pub use op::{Binary, Op, Unary};
+pub use parse::{Formula, parse};
+pub use program::Program;
+pub use scope::{Scope, SignForm};

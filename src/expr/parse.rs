@@ -1,0 +1,330 @@
+use std::ops::Range;
+
+use super::FormulaError;
+use super::op::{Binary, FUNCTIONS, Function};
+
+/// A parsed formula: names are not resolved yet, so that one formula can serve many joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Formula {
+    pub(super) text: String,
+    pub(super) root: Term,
+}
+
+/// A part of a formula and the bytes that it was written in.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Term {
+    pub(super) kind: Kind,
+    pub(super) span: Range<usize>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Kind {
+    Number(f64),
+    Name(String),
+    Negate(Box<Term>),
+    Infix(Infix, Box<Term>, Box<Term>),
+    Call(Function, Vec<Term>),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Infix {
+    Plain(Binary),
+    Greater,
+    AtMost,
+    AtLeast,
+}
+
+impl Formula {
+    /// The formula as it was written.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Every name that the formula mentions, in order, with repetitions.
+    pub fn names(&self) -> Vec<&str> {
+        let mut names = Vec::new();
+        self.root.visit(&mut |term| {
+            if let Kind::Name(name) = &term.kind {
+                names.push(name.as_str());
+            }
+        });
+        names
+    }
+}
+
+impl Term {
+    fn visit<'a>(&'a self, f: &mut impl FnMut(&'a Term)) {
+        f(self);
+        match &self.kind {
+            Kind::Number(_) | Kind::Name(_) => {}
+            Kind::Negate(a) => a.visit(f),
+            Kind::Infix(_, a, b) => {
+                a.visit(f);
+                b.visit(f);
+            }
+            Kind::Call(_, arguments) => arguments.iter().for_each(|a| a.visit(f)),
+        }
+    }
+}
+
+/// Parse a formula such as `C_g * sin(q1) - max(0, b*qd1)^2`.
+///
+/// Operators by rising precedence: `< > <= >=`, `+ -`, `* /`, unary `-`, `^` (to the right).
+///
+/// # Errors
+/// A [`FormulaError`] that points at the first place that cannot be understood.
+pub fn parse(text: &str) -> Result<Formula, FormulaError> {
+    let mut parser = Parser { text, at: 0 };
+    let root = parser.infix(0)?;
+    parser.skip_space();
+    if parser.at < text.len() {
+        let found = parser.next_char_text();
+        return Err(parser.error_here(format!("expected an operator, found `{found}`")));
+    }
+    Ok(Formula {
+        text: text.to_owned(),
+        root,
+    })
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+}
+
+/// Infix operators, longest spelling first: (spelling, operator, binding power to the left, to the right).
+const INFIX: &[(&str, Infix, u8, u8)] = &[
+    ("<=", Infix::AtMost, 1, 2),
+    (">=", Infix::AtLeast, 1, 2),
+    ("<", Infix::Plain(Binary::Less), 1, 2),
+    (">", Infix::Greater, 1, 2),
+    ("+", Infix::Plain(Binary::Add), 3, 4),
+    ("-", Infix::Plain(Binary::Sub), 3, 4),
+    ("*", Infix::Plain(Binary::Mul), 5, 6),
+    ("/", Infix::Plain(Binary::Div), 5, 6),
+    ("^", Infix::Plain(Binary::Pow), 10, 9),
+];
+const PREFIX_POWER: u8 = 7;
+
+impl<'a> Parser<'a> {
+    /// Precedence climbing: reads everything that binds at least as strongly as `power`.
+    fn infix(&mut self, power: u8) -> Result<Term, FormulaError> {
+        let mut left = self.prefix()?;
+        while let Some(&(spelling, infix, to_left, to_right)) = self.peek_infix() {
+            if to_left < power {
+                break;
+            }
+            if self.rest().starts_with("**") {
+                return Err(self.error_here("powers are written `^`".into()));
+            }
+            self.at += spelling.len();
+            let right = self.infix(to_right)?;
+            let span = left.span.start..right.span.end;
+            left = Term {
+                kind: Kind::Infix(infix, Box::new(left), Box::new(right)),
+                span,
+            };
+        }
+        Ok(left)
+    }
+
+    fn prefix(&mut self) -> Result<Term, FormulaError> {
+        self.skip_space();
+        let start = self.at;
+        if self.eat('-') {
+            let inner = self.infix(PREFIX_POWER)?;
+            let span = start..inner.span.end;
+            return Ok(Term {
+                kind: Kind::Negate(Box::new(inner)),
+                span,
+            });
+        }
+        if self.eat('+') {
+            return self.infix(PREFIX_POWER);
+        }
+        self.atom()
+    }
+
+    fn atom(&mut self) -> Result<Term, FormulaError> {
+        match self.rest().chars().next() {
+            Some('(') => self.parenthesis(),
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.name_or_call(),
+            Some(c) => {
+                Err(self.error_here(format!("expected a number, a name or `(`, found `{c}`")))
+            }
+            None if self.text.trim().is_empty() => {
+                Err(self.error_here("the formula is empty".into()))
+            }
+            None => Err(self.error_here("the formula ends where a value is expected".into())),
+        }
+    }
+
+    fn parenthesis(&mut self) -> Result<Term, FormulaError> {
+        let open = self.at;
+        self.at += 1;
+        let inner = self.infix(0)?;
+        self.skip_space();
+        if !self.eat(')') {
+            return Err(self.error_at(open..open + 1, "this `(` is never closed".into()));
+        }
+        Ok(Term {
+            span: open..self.at,
+            ..inner
+        })
+    }
+
+    fn number(&mut self) -> Result<Term, FormulaError> {
+        let start = self.at;
+        self.eat_digits();
+        if self.eat('.') {
+            self.eat_digits();
+        }
+        if self.rest().starts_with(['e', 'E']) {
+            self.at += 1;
+            if self.rest().starts_with(['+', '-']) {
+                self.at += 1;
+            }
+            self.eat_digits();
+        }
+        let span = start..self.at;
+        let written = &self.text[span.clone()];
+        match written.parse() {
+            Ok(value) => Ok(Term {
+                kind: Kind::Number(value),
+                span,
+            }),
+            Err(_) => Err(self.error_at(span, format!("`{written}` is not a number"))),
+        }
+    }
+
+    fn name_or_call(&mut self) -> Result<Term, FormulaError> {
+        let start = self.at;
+        let is_name = |c: char| c.is_alphanumeric() || c == '_';
+        self.at += self
+            .rest()
+            .find(|c| !is_name(c))
+            .unwrap_or(self.rest().len());
+        let name = &self.text[start..self.at];
+        self.skip_space();
+        if self.rest().starts_with('(') {
+            return self.call(name, start);
+        }
+        Ok(Term {
+            kind: Kind::Name(name.to_owned()),
+            span: start..start + name.len(),
+        })
+    }
+
+    fn call(&mut self, name: &str, start: usize) -> Result<Term, FormulaError> {
+        let name_span = start..start + name.len();
+        let Some(function) = Function::find(name) else {
+            let near = super::error::suggestion(name, FUNCTIONS.iter().map(|(n, _)| *n));
+            return Err(self.error_at(name_span, format!("unknown function `{name}`{near}")));
+        };
+        let arguments = self.arguments()?;
+        let wanted = function.arguments();
+        if arguments.len() != wanted.len() {
+            let usage = wanted.join(", ");
+            let found = arguments.len();
+            return Err(self.error_at(
+                start..self.at,
+                format!(
+                    "`{name}({usage})` takes {} arguments, found {found}",
+                    wanted.len()
+                ),
+            ));
+        }
+        Ok(Term {
+            kind: Kind::Call(function, arguments),
+            span: start..self.at,
+        })
+    }
+
+    fn arguments(&mut self) -> Result<Vec<Term>, FormulaError> {
+        let open = self.at;
+        self.at += 1;
+        let mut arguments = vec![self.infix(0)?];
+        loop {
+            self.skip_space();
+            if self.eat(')') {
+                return Ok(arguments);
+            }
+            if !self.eat(',') {
+                return Err(self.error_at(open..open + 1, "this `(` is never closed".into()));
+            }
+            arguments.push(self.infix(0)?);
+        }
+    }
+
+    fn peek_infix(&mut self) -> Option<&'static (&'static str, Infix, u8, u8)> {
+        self.skip_space();
+        INFIX.iter().find(|entry| self.rest().starts_with(entry.0))
+    }
+
+    fn rest(&self) -> &'a str {
+        &self.text[self.at..]
+    }
+
+    fn skip_space(&mut self) {
+        self.at = self.text.len() - self.rest().trim_start().len();
+    }
+
+    fn eat(&mut self, c: char) -> bool {
+        let found = self.rest().starts_with(c);
+        if found {
+            self.at += c.len_utf8();
+        }
+        found
+    }
+
+    fn eat_digits(&mut self) {
+        let rest = self.rest();
+        self.at += rest
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(rest.len());
+    }
+
+    fn next_char_text(&self) -> String {
+        self.rest().chars().take(1).collect()
+    }
+
+    fn error_here(&self, message: String) -> FormulaError {
+        let width = self.rest().chars().next().map_or(0, char::len_utf8);
+        self.error_at(self.at..self.at + width, message)
+    }
+
+    fn error_at(&self, span: Range<usize>, message: String) -> FormulaError {
+        FormulaError::new(self.text, span, message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    fn message(text: &str) -> String {
+        parse(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn errors_point_at_the_place() {
+        assert_eq!(
+            message("C_g * sinn(q1)"),
+            "unknown function `sinn`; did you mean `sin`?\n    C_g * sinn(q1)\n          ^^^^"
+        );
+        assert_eq!(
+            message("2 * (a + b"),
+            "this `(` is never closed\n    2 * (a + b\n        ^"
+        );
+        assert_eq!(
+            message("clamp(x, 1)"),
+            "`clamp(x, low, high)` takes 3 arguments, found 2\n    clamp(x, 1)\n    ^^^^^^^^^^^"
+        );
+        assert!(message("a +").starts_with("the formula ends where a value is expected"));
+        assert!(message("  ").starts_with("the formula is empty"));
+        assert!(message("a b").starts_with("expected an operator, found `b`"));
+        assert!(message("a ** 2").starts_with("powers are written `^`"));
+        assert!(message("1.2.3 + a").starts_with("expected an operator, found `.`"));
+    }
+}

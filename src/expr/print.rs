@@ -1,0 +1,400 @@
+use super::op::{Binary, Op, Unary};
+use super::{Node, Program};
+
+/// How one language writes what a program can do. Strings come with the strength with which they
+/// bind, so that parentheses stand only where they must.
+trait Notation {
+    fn number(&self, value: f64) -> String;
+    fn name(&self, name: &str) -> String;
+    fn call(&self, function: &str, arguments: &[String]) -> String;
+    fn parenthesis(&self, inner: &str) -> String;
+    fn product(&self, a: &str, b: &str) -> String;
+    fn quotient(&self, a: Part, b: Part) -> Part;
+    fn power(&self, a: Part, b: Part) -> Part;
+    fn absolute(&self, a: &str) -> String;
+    fn root(&self, a: &str) -> String;
+    /// `a` where `condition` holds, else `b`.
+    fn choice(&self, condition: &str, a: &str, b: &str) -> String;
+    fn less(&self) -> &'static str;
+}
+
+/// A printed expression and the strength of its weakest operator.
+#[derive(Clone)]
+struct Part {
+    text: String,
+    strength: u8,
+}
+
+const COMPARE: u8 = 1;
+const SUM: u8 = 3;
+const PRODUCT: u8 = 5;
+const SIGN: u8 = 7;
+const POWER: u8 = 9;
+const ATOM: u8 = 11;
+
+impl Program {
+    /// The equations as formulas that the parser reads back: one line an intermediate that has a
+    /// name, then one line an output (`names` are theirs).
+    pub fn text(&self, names: &[&str]) -> String {
+        self.lines(&Text, names)
+            .map(|(l, r)| format!("{l} = {r}\n"))
+            .collect()
+    }
+
+    /// The formula of one output, with all intermediates written out.
+    pub fn formula(&self, output: usize) -> String {
+        let parts = self.parts(&Text, &[]);
+        parts[self.outputs[output].index()].text.clone()
+    }
+
+    /// The equations as lines of a LaTeX `align` environment.
+    pub fn latex(&self, names: &[&str]) -> String {
+        let lines: Vec<String> = self
+            .lines(&Latex, names)
+            .map(|(l, r)| format!("{l} &= {r}"))
+            .collect();
+        lines.join(" \\\\\n")
+    }
+
+    fn lines(
+        &self,
+        notation: &dyn Notation,
+        names: &[&str],
+    ) -> impl Iterator<Item = (String, String)> {
+        let parts = self.parts(notation, &self.labels);
+        let unlabelled = self.definitions(notation, &parts);
+        let outputs: Vec<_> = self
+            .outputs
+            .iter()
+            .zip(names)
+            .map(|(node, name)| (notation.name(name), parts[node.index()].text.clone()))
+            .collect();
+        unlabelled.into_iter().chain(outputs)
+    }
+
+    /// The right-hand side of each named intermediate, in terms of earlier ones.
+    fn definitions(&self, notation: &dyn Notation, parts: &[Part]) -> Vec<(String, String)> {
+        let mut labels: Vec<_> = self
+            .labels
+            .iter()
+            .filter(|(n, _)| self.is_step(*n))
+            .collect();
+        labels.sort_by_key(|(node, _)| *node);
+        labels.dedup_by_key(|(node, _)| *node);
+        labels
+            .iter()
+            .map(|(node, name)| {
+                let whole = self.part(notation, self.ops[node.index()], parts);
+                (notation.name(name), whole.text)
+            })
+            .collect()
+    }
+
+    fn is_step(&self, node: Node) -> bool {
+        !matches!(self.ops[node.index()], Op::Const(_) | Op::Input(_))
+    }
+
+    /// Each node printed, with labelled ones by their name.
+    fn parts(&self, notation: &dyn Notation, labels: &[(Node, String)]) -> Vec<Part> {
+        let mut parts: Vec<Part> = Vec::with_capacity(self.ops.len());
+        for (index, op) in self.ops.iter().enumerate() {
+            let label = labels
+                .iter()
+                .find(|(node, _)| node.index() == index && self.is_step(*node));
+            parts.push(match label {
+                Some((_, name)) => atom(notation.name(name)),
+                None => self.part(notation, *op, &parts),
+            });
+        }
+        parts
+    }
+
+    fn part(&self, notation: &dyn Notation, op: Op, parts: &[Part]) -> Part {
+        let at = |node: Node| parts[node.index()].clone();
+        match op {
+            Op::Const(value) if value < 0.0 => Part {
+                text: notation.number(value),
+                strength: SIGN,
+            },
+            Op::Const(value) => atom(notation.number(value)),
+            Op::Input(k) => atom(notation.name(&self.inputs[k as usize])),
+            Op::Unary(op, a) => unary(notation, op, at(a)),
+            Op::Binary(op, a, b) => binary(notation, op, at(a), at(b)),
+            Op::Where(c, a, b) => atom(notation.choice(&at(c).text, &at(a).text, &at(b).text)),
+        }
+    }
+}
+
+fn atom(text: String) -> Part {
+    Part {
+        text,
+        strength: ATOM,
+    }
+}
+
+/// The text, in parentheses if it binds weaker than `least`.
+fn guard(notation: &dyn Notation, part: &Part, least: u8) -> String {
+    if part.strength < least {
+        notation.parenthesis(&part.text)
+    } else {
+        part.text.clone()
+    }
+}
+
+fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
+    let name = match op {
+        Unary::Neg => {
+            return Part {
+                text: format!("-{}", guard(notation, &a, PRODUCT + 1)),
+                strength: SIGN,
+            };
+        }
+        Unary::Abs => return atom(notation.absolute(&a.text)),
+        Unary::Sqrt => return atom(notation.root(&a.text)),
+        Unary::Sin => "sin",
+        Unary::Cos => "cos",
+        Unary::Tan => "tan",
+        Unary::Exp => "exp",
+        Unary::Log => "log",
+        Unary::Sign => "sign",
+        Unary::Tanh => "tanh",
+    };
+    atom(notation.call(name, &[a.text]))
+}
+
+fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
+    let infix = |sign: &str, strength: u8| Part {
+        text: format!(
+            "{} {sign} {}",
+            guard(notation, &a, strength),
+            guard(notation, &b, strength + 1)
+        ),
+        strength,
+    };
+    match op {
+        Binary::Add => infix("+", SUM),
+        Binary::Sub => infix("-", SUM),
+        Binary::Less => infix(notation.less(), COMPARE),
+        Binary::Mul => Part {
+            text: notation.product(
+                &guard(notation, &a, PRODUCT),
+                &guard(notation, &b, PRODUCT + 1),
+            ),
+            strength: PRODUCT,
+        },
+        Binary::Div => notation.quotient(a, b),
+        Binary::Pow => notation.power(a, b),
+        Binary::Atan2 => atom(notation.call("atan2", &[a.text, b.text])),
+        Binary::Min => atom(notation.call("min", &[a.text, b.text])),
+        Binary::Max => atom(notation.call("max", &[a.text, b.text])),
+    }
+}
+
+/// The language of model files.
+struct Text;
+
+impl Notation for Text {
+    fn number(&self, value: f64) -> String {
+        format!("{value}")
+    }
+
+    fn name(&self, name: &str) -> String {
+        name.to_owned()
+    }
+
+    fn call(&self, function: &str, arguments: &[String]) -> String {
+        format!("{function}({})", arguments.join(", "))
+    }
+
+    fn parenthesis(&self, inner: &str) -> String {
+        format!("({inner})")
+    }
+
+    fn product(&self, a: &str, b: &str) -> String {
+        format!("{a} * {b}")
+    }
+
+    fn quotient(&self, a: Part, b: Part) -> Part {
+        Part {
+            text: format!(
+                "{} / {}",
+                guard(self, &a, PRODUCT),
+                guard(self, &b, PRODUCT + 1)
+            ),
+            strength: PRODUCT,
+        }
+    }
+
+    fn power(&self, a: Part, b: Part) -> Part {
+        Part {
+            text: format!("{}^{}", guard(self, &a, POWER + 1), guard(self, &b, POWER)),
+            strength: POWER,
+        }
+    }
+
+    fn absolute(&self, a: &str) -> String {
+        format!("abs({a})")
+    }
+
+    fn root(&self, a: &str) -> String {
+        format!("sqrt({a})")
+    }
+
+    fn choice(&self, condition: &str, a: &str, b: &str) -> String {
+        format!("where({condition}, {a}, {b})")
+    }
+
+    fn less(&self) -> &'static str {
+        "<"
+    }
+}
+
+struct Latex;
+
+const GREEK: &[&str] = &[
+    "alpha", "beta", "gamma", "delta", "epsilon", "theta", "kappa", "lambda", "mu", "nu", "omega",
+    "phi", "psi", "rho", "sigma", "tau",
+];
+
+impl Latex {
+    fn symbol(word: &str) -> String {
+        match word {
+            _ if GREEK.contains(&word) => format!("\\{word}"),
+            _ if word.chars().count() > 1 => format!("\\mathrm{{{word}}}"),
+            _ => word.to_owned(),
+        }
+    }
+
+    /// `qdd12` is the second derivative of `q` with index 12.
+    fn split(name: &str) -> (String, String) {
+        let (stem, subscript) = match name.split_once('_') {
+            Some((stem, subscript)) => (stem, subscript.replace('_', ",")),
+            None => {
+                let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+                (stem, name[stem.len()..].to_owned())
+            }
+        };
+        let symbol = match stem {
+            "qd" => "\\dot{q}".to_owned(),
+            "qdd" => "\\ddot{q}".to_owned(),
+            _ => Self::symbol(stem),
+        };
+        (symbol, subscript)
+    }
+}
+
+impl Notation for Latex {
+    fn number(&self, value: f64) -> String {
+        match format!("{value:e}").split_once('e') {
+            Some((mantissa, exponent)) if value != 0.0 && !(1e-4..1e6).contains(&value.abs()) => {
+                format!("{mantissa} \\cdot 10^{{{exponent}}}")
+            }
+            _ => format!("{value}"),
+        }
+    }
+
+    fn name(&self, name: &str) -> String {
+        let (symbol, subscript) = Self::split(name);
+        if subscript.is_empty() {
+            symbol
+        } else if subscript.chars().all(|c| c.is_ascii_digit() || c == ',') || subscript.len() == 1
+        {
+            format!("{symbol}_{{{subscript}}}")
+        } else {
+            format!("{symbol}_{{\\mathrm{{{subscript}}}}}")
+        }
+    }
+
+    fn call(&self, function: &str, arguments: &[String]) -> String {
+        let name = match function {
+            "atan2" | "sign" => format!("\\operatorname{{{function}}}"),
+            _ => format!("\\{function}"),
+        };
+        format!("{name}\\left({}\\right)", arguments.join(", "))
+    }
+
+    fn parenthesis(&self, inner: &str) -> String {
+        format!("\\left({inner}\\right)")
+    }
+
+    fn product(&self, a: &str, b: &str) -> String {
+        let between = if b.starts_with(|c: char| c.is_ascii_digit()) {
+            "\\cdot "
+        } else {
+            "\\,"
+        };
+        format!("{a} {between}{b}")
+    }
+
+    fn quotient(&self, a: Part, b: Part) -> Part {
+        Part {
+            text: format!("\\frac{{{}}}{{{}}}", a.text, b.text),
+            strength: PRODUCT,
+        }
+    }
+
+    fn power(&self, a: Part, b: Part) -> Part {
+        Part {
+            text: format!("{{{}}}^{{{}}}", guard(self, &a, POWER + 1), b.text),
+            strength: POWER,
+        }
+    }
+
+    fn absolute(&self, a: &str) -> String {
+        format!("\\left|{a}\\right|")
+    }
+
+    fn root(&self, a: &str) -> String {
+        format!("\\sqrt{{{a}}}")
+    }
+
+    fn choice(&self, condition: &str, a: &str, b: &str) -> String {
+        format!("\\begin{{cases}} {a} & {condition} \\\\ {b} & \\text{{otherwise}} \\end{{cases}}")
+    }
+
+    fn less(&self) -> &'static str {
+        "<"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::expr::{Graph, Program, Scope, SignForm, parse};
+
+    fn program(text: &str) -> Program {
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(SignForm::Exact);
+        for name in ["a", "b", "q1", "qd1", "F_c1", "C_g"] {
+            let node = graph.input(name);
+            scope.bind(name, node);
+        }
+        let node = scope.lower(&mut graph, &parse(text).unwrap()).unwrap();
+        graph.finish(&[node])
+    }
+
+    #[test]
+    fn formulas_print_as_they_are_written() {
+        for text in [
+            "-F_c1 * sign(qd1)",
+            "C_g * sin(q1) + a",
+            "a - (b - q1)",
+            "a / (b * q1)",
+            "(a + b)^1.5",
+            "-(a + b)",
+            "where(a < b, atan2(a, b), max(a, 0.25))",
+            "a^b^q1",
+            "a - b + q1",
+        ] {
+            assert_eq!(program(text).formula(0), text);
+        }
+    }
+
+    #[test]
+    fn latex_reads_as_in_a_textbook() {
+        assert_eq!(
+            program("-F_c1 * sign(qd1) + sin(q1)/sqrt(a)").latex(&["qdd1"]),
+            "\\ddot{q}_{1} &= -F_{\\mathrm{c1}} \\,\\operatorname{sign}\\left(\\dot{q}_{1}\\right) + \
+             \\frac{\\sin\\left(q_{1}\\right)}{\\sqrt{a}}"
+        );
+    }
+}

@@ -1,0 +1,79 @@
+use super::Node;
+use super::op::Op;
+
+/// A closed list of operations: inputs by name, then values each made from earlier ones, and the
+/// positions of the outputs. Made by [`Graph::finish`](super::Graph::finish); never changed afterwards.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Program {
+    pub(super) inputs: Vec<String>,
+    pub(super) ops: Vec<Op>,
+    pub(super) outputs: Vec<Node>,
+    pub(super) labels: Vec<(Node, String)>,
+}
+
+impl Program {
+    /// Names of the inputs, in the order in which values are given.
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// The operations, in an order in which they can be carried out.
+    pub fn ops(&self) -> &[Op] {
+        &self.ops
+    }
+
+    /// How many values the program makes for its caller.
+    pub fn output_count(&self) -> usize {
+        self.outputs.len()
+    }
+
+    /// Keep what the outputs need. All inputs stay, since callers count on their numbering; they come
+    /// first, then constants, then everything else, so that an evaluator can set the first two once.
+    pub(super) fn compact(
+        ops: Vec<Op>,
+        inputs: Vec<String>,
+        labels: Vec<(Node, String)>,
+        outputs: &[Node],
+    ) -> Self {
+        let needed = needed(&ops, outputs);
+        let rank = |op: &Op| match op {
+            Op::Input(_) => 0,
+            Op::Const(_) => 1,
+            _ => 2,
+        };
+        let mut order: Vec<usize> = (0..ops.len())
+            .filter(|&i| needed[i] || matches!(ops[i], Op::Input(_)))
+            .collect();
+        order.sort_by_key(|&i| rank(&ops[i]));
+        let mut renamed = vec![Node(u32::MAX); ops.len()];
+        for (new, &old) in (0u32..).zip(&order) {
+            renamed[old] = Node(new);
+        }
+        let rename = |node: Node| renamed[node.index()];
+        Self {
+            inputs,
+            ops: order.iter().map(|&i| ops[i].map(rename)).collect(),
+            outputs: outputs.iter().map(|&o| rename(o)).collect(),
+            labels: labels
+                .into_iter()
+                .filter(|(node, _)| needed[node.index()])
+                .map(|(node, name)| (rename(node), name))
+                .collect(),
+        }
+    }
+}
+
+fn needed(ops: &[Op], outputs: &[Node]) -> Vec<bool> {
+    let mut needed = vec![false; ops.len()];
+    for output in outputs {
+        needed[output.index()] = true;
+    }
+    for index in (0..ops.len()).rev() {
+        if needed[index] {
+            for operand in ops[index].operands() {
+                needed[operand.index()] = true;
+            }
+        }
+    }
+    needed
+}

@@ -1,0 +1,120 @@
+use burn::tensor::Tensor;
+
+use super::op::{Binary, Op, Unary};
+use super::{Node, Program};
+
+/// A value on the way through a replay: constants stay numbers until they meet a tensor.
+#[derive(Clone)]
+enum Value {
+    Number(f64),
+    Column(Tensor<1>),
+}
+
+impl Program {
+    /// Carry out the program on Burn tensors, one row of the batch in each entry, so that Burn
+    /// differentiates and places it. `inputs` are of shape `[batch]`, or `[1]` for what all rows
+    /// share; so are the outputs.
+    ///
+    /// # Panics
+    /// When `inputs` is empty or not as long as [`Program::inputs`].
+    pub fn replay(&self, inputs: &[Tensor<1>]) -> Vec<Tensor<1>> {
+        assert_eq!(inputs.len(), self.inputs.len(), "one tensor for each input");
+        let device = inputs[0].device();
+        let mut values: Vec<Value> = Vec::with_capacity(self.ops.len());
+        for op in &self.ops {
+            let at = |node: Node| values[node.index()].clone();
+            let value = match *op {
+                Op::Const(value) => Value::Number(value),
+                Op::Input(k) => Value::Column(inputs[k as usize].clone()),
+                Op::Unary(op, a) => Value::Column(unary(op, at(a).column(&device))),
+                Op::Binary(op, a, b) => Value::Column(binary(op, at(a), at(b), &device)),
+                Op::Where(c, a, b) => {
+                    let (c, a, b) = (
+                        at(c).column(&device),
+                        at(a).column(&device),
+                        at(b).column(&device),
+                    );
+                    Value::Column(select(c.greater_elem(0.0), a, b))
+                }
+            };
+            values.push(value);
+        }
+        self.outputs
+            .iter()
+            .map(|o| values[o.index()].clone().column(&device))
+            .collect()
+    }
+}
+
+impl Value {
+    fn column(self, device: &burn::tensor::Device) -> Tensor<1> {
+        match self {
+            Self::Column(tensor) => tensor,
+            #[allow(clippy::cast_possible_truncation)] // training runs in f32
+            Self::Number(value) => Tensor::from_floats([value as f32], device),
+        }
+    }
+}
+
+fn unary(op: Unary, a: Tensor<1>) -> Tensor<1> {
+    match op {
+        Unary::Neg => a.neg(),
+        Unary::Sin => a.sin(),
+        Unary::Cos => a.cos(),
+        Unary::Tan => a.tan(),
+        Unary::Exp => a.exp(),
+        Unary::Log => a.log(),
+        Unary::Sqrt => a.sqrt(),
+        Unary::Abs => a.abs(),
+        Unary::Sign => a.sign(),
+        Unary::Tanh => a.tanh(),
+    }
+}
+
+fn binary(op: Binary, a: Value, b: Value, device: &burn::tensor::Device) -> Tensor<1> {
+    match (op, a, b) {
+        (Binary::Add, Value::Column(a), Value::Number(b)) => a + b,
+        (Binary::Add, Value::Number(a), Value::Column(b)) => b + a,
+        (Binary::Sub, Value::Column(a), Value::Number(b)) => a - b,
+        (Binary::Mul, Value::Column(a), Value::Number(b)) => a * b,
+        (Binary::Mul, Value::Number(a), Value::Column(b)) => b * a,
+        (Binary::Div, Value::Column(a), Value::Number(b)) => a / b,
+        (Binary::Pow, Value::Column(a), Value::Number(b)) => a.powf_scalar(b),
+        (op, a, b) => columns(op, a.column(device), b.column(device)),
+    }
+}
+
+fn columns(op: Binary, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
+    match op {
+        Binary::Add => a + b,
+        Binary::Sub => a - b,
+        Binary::Mul => a * b,
+        Binary::Div => a / b,
+        Binary::Pow => a.powf(b),
+        Binary::Atan2 => a.atan2(b),
+        Binary::Min => {
+            let (a, b) = same_shape(a, b);
+            select(a.clone().lower(b.clone()), a, b)
+        }
+        Binary::Max => {
+            let (a, b) = same_shape(a, b);
+            select(a.clone().greater(b.clone()), a, b)
+        }
+        Binary::Less => {
+            let (a, b) = same_shape(a, b);
+            a.lower(b).float()
+        }
+    }
+}
+
+/// `a` where `condition` holds, else `b`.
+fn select(condition: Tensor<1, burn::tensor::Bool>, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
+    let rows = condition.dims()[0].max(a.dims()[0]).max(b.dims()[0]);
+    let [a, b] = [a, b].map(|t| t.expand([rows]));
+    b.mask_where(condition.expand([rows]), a)
+}
+
+fn same_shape(a: Tensor<1>, b: Tensor<1>) -> (Tensor<1>, Tensor<1>) {
+    let rows = a.dims()[0].max(b.dims()[0]);
+    (a.expand([rows]), b.expand([rows]))
+}

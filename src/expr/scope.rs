@@ -1,0 +1,135 @@
+use std::collections::HashMap;
+
+use super::FormulaError;
+use super::error::suggestion;
+use super::graph::{Graph, Node};
+use super::op::{Binary, Function, Unary};
+use super::parse::{Formula, Infix, Kind, Term};
+
+/// How `sign` is written into a program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SignForm {
+    /// -1, 0, 1: for printing, and for simulations that handle the jump.
+    Exact,
+    /// tanh(x / width): for fitting and training, where the jump has no useful derivative.
+    /// The width is in the unit of the argument.
+    Smooth { width: f64 },
+}
+
+/// The names that a formula may use, and what they stand for.
+#[derive(Debug, Clone)]
+pub struct Scope {
+    names: HashMap<String, Node>,
+    sign: SignForm,
+}
+
+impl Scope {
+    /// An empty scope.
+    pub fn new(sign: SignForm) -> Self {
+        Self {
+            names: HashMap::new(),
+            sign,
+        }
+    }
+
+    /// Let `name` stand for `node` from now on.
+    pub fn bind(&mut self, name: &str, node: Node) {
+        self.names.insert(name.to_owned(), node);
+    }
+
+    /// From now on `sign` is written like this.
+    pub fn set_sign(&mut self, sign: SignForm) {
+        self.sign = sign;
+    }
+
+    pub fn get(&self, name: &str) -> Option<Node> {
+        self.names.get(name).copied()
+    }
+
+    /// Write the formula into the graph.
+    ///
+    /// # Errors
+    /// A name that the scope does not know, with the nearest one that it does.
+    pub fn lower(&self, graph: &mut Graph, formula: &Formula) -> Result<Node, FormulaError> {
+        self.term(graph, &formula.root)
+            .map_err(|(span, message)| FormulaError::new(&formula.text, span, message))
+    }
+
+    fn term(
+        &self,
+        graph: &mut Graph,
+        term: &Term,
+    ) -> Result<Node, (std::ops::Range<usize>, String)> {
+        match &term.kind {
+            Kind::Number(value) => Ok(graph.constant(*value)),
+            Kind::Name(name) => self.names.get(name).copied().ok_or_else(|| {
+                let mut known: Vec<&str> = self.names.keys().map(String::as_str).collect();
+                known.sort_unstable();
+                let near = suggestion(name, known.iter().copied());
+                let list = if near.is_empty() {
+                    format!("; known are {}", known.join(", "))
+                } else {
+                    near
+                };
+                (term.span.clone(), format!("unknown name `{name}`{list}"))
+            }),
+            Kind::Negate(inner) => {
+                let inner = self.term(graph, inner)?;
+                Ok(graph.neg(inner))
+            }
+            Kind::Infix(infix, a, b) => {
+                let (a, b) = (self.term(graph, a)?, self.term(graph, b)?);
+                Ok(infix_node(graph, *infix, a, b))
+            }
+            Kind::Call(function, arguments) => {
+                let arguments = arguments
+                    .iter()
+                    .map(|a| self.term(graph, a))
+                    .collect::<Result<Vec<_>, _>>()?;
+                Ok(self.call(graph, *function, &arguments))
+            }
+        }
+    }
+
+    fn call(&self, graph: &mut Graph, function: Function, arguments: &[Node]) -> Node {
+        match (function, arguments) {
+            (Function::Unary(op), [a]) => graph.unary(op, *a),
+            (Function::Binary(op), [a, b]) => graph.binary(op, *a, *b),
+            (Function::Clamp, [x, low, high]) => {
+                let raised = graph.binary(Binary::Max, *x, *low);
+                graph.binary(Binary::Min, raised, *high)
+            }
+            (Function::Where, [condition, then, otherwise]) => {
+                graph.select(*condition, *then, *otherwise)
+            }
+            (Function::Sign, [x]) => match self.sign {
+                SignForm::Exact => graph.unary(Unary::Sign, *x),
+                SignForm::Smooth { width } => {
+                    let width = graph.constant(width);
+                    let scaled = graph.div(*x, width);
+                    graph.unary(Unary::Tanh, scaled)
+                }
+            },
+            _ => unreachable!("the parser counts arguments"),
+        }
+    }
+}
+
+fn infix_node(graph: &mut Graph, infix: Infix, a: Node, b: Node) -> Node {
+    let not = |graph: &mut Graph, node| {
+        let one = graph.constant(1.0);
+        graph.sub(one, node)
+    };
+    match infix {
+        Infix::Plain(op) => graph.binary(op, a, b),
+        Infix::Greater => graph.binary(Binary::Less, b, a),
+        Infix::AtMost => {
+            let above = graph.binary(Binary::Less, b, a);
+            not(graph, above)
+        }
+        Infix::AtLeast => {
+            let below = graph.binary(Binary::Less, a, b);
+            not(graph, below)
+        }
+    }
+}

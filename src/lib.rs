@@ -1,0 +1,3 @@
+//! Residyn: from a rig's log to the physical effect that its model lacks.
+pub mod expr;
+pub mod model;
