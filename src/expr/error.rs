@@ -37,16 +37,16 @@ impl fmt::Display for FormulaError {
 
 /// The candidate nearest to `name`, if one is near enough to be a slip of the hand.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.to_lowercase();
     candidates
         .into_iter()
-        .map(|c| {
-            (
-                strsim::damerau_levenshtein(&name.to_lowercase(), &c.to_lowercase()),
-                c,
-            )
-        })
+        .map(|c| (strsim::damerau_levenshtein(&name, &c.to_lowercase()), c))
         .filter(|(distance, c)| *distance <= 1 + c.len().max(name.len()) / 4)
-        .min()
+        // Equal distances are told apart by the shared beginning.
+        .min_by(|a, b| {
+            let likeness = |c: &str| strsim::jaro_winkler(&name, &c.to_lowercase());
+            a.0.cmp(&b.0).then(likeness(b.1).total_cmp(&likeness(a.1)))
+        })
         .map(|(_, c)| c)
 }
 
