@@ -16,7 +16,7 @@ mod program;
 mod replay;
 mod scope;
 
-pub use error::FormulaError;
+pub use error::{FormulaError, suggestion};
 pub use eval::{Real, Tape};
 pub use graph::{Graph, Node};
 pub use op::{Binary, Op, Unary};

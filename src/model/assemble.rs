@@ -1,0 +1,289 @@
+use super::effect::{EFFECT_NAMES, Entry};
+use super::reader::Located;
+use super::system::{FittedEffect, Motion, System};
+use super::{Dynamics, Parameter};
+use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
+
+impl System {
+    /// The declared equations with the file's own effects, ready to run.
+    pub fn dynamics(&self, sign: &[SignForm]) -> Dynamics {
+        self.dynamics_with(&[], sign)
+    }
+
+    /// The declared equations with the file's own effects and `extra` ones.
+    ///
+    /// Effects of the torque act first, in the order given, then forces are added. `load` is the torque
+    /// after the former. `sign` says for each joint how dry friction is written.
+    ///
+    /// # Panics
+    /// When an effect names a joint that the system does not have, or `sign` has not one entry a joint.
+    pub fn dynamics_with(&self, extra: &[FittedEffect], sign: &[SignForm]) -> Dynamics {
+        assert_eq!(
+            sign.len(),
+            self.joints,
+            "one form of the sign for each joint"
+        );
+        let effects: Vec<&FittedEffect> = self.effects.iter().chain(extra).collect();
+        let mut assembly = Assembly::new(self, &effects, sign);
+        assembly.apply_torque_effects();
+        assembly.apply_forces();
+        let accelerations = assembly.accelerations();
+        let mut outputs = assembly.qd.clone();
+        outputs.extend(accelerations);
+        Dynamics {
+            name: self.name.clone(),
+            joints: self.joints,
+            parameters: assembly.parameters,
+            program: assembly.graph.finish(&outputs),
+        }
+    }
+}
+
+impl FittedEffect {
+    /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
+    pub fn expression(&self, names: &[String]) -> String {
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(SignForm::Exact);
+        for name in EFFECT_NAMES {
+            let suffix = if name == "t" {
+                String::new()
+            } else {
+                (self.joint + 1).to_string()
+            };
+            let node = graph.input(&format!("{name}{suffix}"));
+            scope.bind(name, node);
+        }
+        for (parameter, name) in self.effect.parameters.iter().zip(names) {
+            let node = graph.input(name);
+            scope.bind(&parameter.name, node);
+        }
+        let node = scope
+            .lower(&mut graph, self.effect.entry.formula())
+            .expect("formulas were checked when the file was read");
+        graph.finish(&[node]).formula(0)
+    }
+
+    /// The names of the effect's parameters on its joint, told apart from names already `taken`.
+    pub fn parameter_names(&self, taken: &[Parameter]) -> Vec<String> {
+        let joint = self.joint + 1;
+        let is_taken = |name: &str| taken.iter().any(|parameter| parameter.name == name);
+        let name = |own: &str| match format!("{own}{joint}") {
+            plain if is_taken(&plain) => format!("{}_{own}{joint}", self.effect.name),
+            plain => plain,
+        };
+        self.effect
+            .parameters
+            .iter()
+            .map(|p| name(&p.name))
+            .collect()
+    }
+}
+
+/// The graph while it grows.
+struct Assembly<'a> {
+    system: &'a System,
+    effects: Vec<(&'a FittedEffect, Vec<Node>)>,
+    sign: &'a [SignForm],
+    graph: Graph,
+    parameters: Vec<Parameter>,
+    q: Vec<Node>,
+    qd: Vec<Node>,
+    /// The torque after what has been applied so far.
+    tau: Vec<Node>,
+    time: Node,
+    declared: Vec<Node>,
+}
+
+impl<'a> Assembly<'a> {
+    fn new(system: &'a System, effects: &[&'a FittedEffect], sign: &'a [SignForm]) -> Self {
+        let mut graph = Graph::new();
+        let mut numbered = |stem: &str| -> Vec<Node> {
+            (1..=system.joints)
+                .map(|j| graph.input(&format!("{stem}{j}")))
+                .collect()
+        };
+        let (q, qd, tau) = (numbered("q"), numbered("qd"), numbered("tau"));
+        let time = graph.input("t");
+        let declared = system
+            .parameters
+            .iter()
+            .map(|p| graph.input(&p.name))
+            .collect();
+        let mut parameters = system.parameters.clone();
+        let mut with_nodes = Vec::new();
+        for effect in effects {
+            let own = effect_parameters(effect, &parameters);
+            with_nodes.push((*effect, own.iter().map(|p| graph.input(&p.name)).collect()));
+            parameters.extend(own);
+        }
+        Self {
+            system,
+            effects: with_nodes,
+            sign,
+            graph,
+            parameters,
+            q,
+            qd,
+            tau,
+            time,
+            declared,
+        }
+    }
+
+    fn apply_torque_effects(&mut self) {
+        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+            if let Entry::Torque(formula) = &effect.effect.entry {
+                self.tau[effect.joint] = self.effect_node(index, formula);
+            }
+        }
+    }
+
+    fn apply_forces(&mut self) {
+        let mut forces: Vec<(usize, Node)> = Vec::new();
+        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+            if let Entry::Force(formula) = &effect.effect.entry {
+                forces.push((effect.joint, self.effect_node(index, formula)));
+            }
+        }
+        for (joint, force) in forces {
+            self.tau[joint] = self.graph.add(self.tau[joint], force);
+        }
+    }
+
+    /// An effect's formula in terms of its joint.
+    fn effect_node(&mut self, index: usize, formula: &Formula) -> Node {
+        let (effect, nodes) = &self.effects[index];
+        let joint = effect.joint;
+        let mut scope = Scope::new(self.sign[joint]);
+        scope.bind("q", self.q[joint]);
+        scope.bind("qd", self.qd[joint]);
+        scope.bind("tau", self.tau[joint]);
+        scope.bind("load", self.tau[joint]);
+        scope.bind("t", self.time);
+        for (parameter, node) in effect.effect.parameters.iter().zip(nodes) {
+            scope.bind(&parameter.name, *node);
+        }
+        scope
+            .lower(&mut self.graph, formula)
+            .expect("formulas were checked when the file was read")
+    }
+
+    fn accelerations(&mut self) -> Vec<Node> {
+        let scope = self.declared_scope();
+        match &self.system.motion {
+            Motion::Accelerations(formulas) => formulas
+                .iter()
+                .map(|formula| lower(&scope, &mut self.graph, formula))
+                .collect(),
+            Motion::MassAndBias { mass, bias } => {
+                let mut matrix: Vec<Vec<Node>> = mass
+                    .iter()
+                    .map(|row| {
+                        row.iter()
+                            .map(|entry| lower(&scope, &mut self.graph, entry))
+                            .collect()
+                    })
+                    .collect();
+                self.add_inertia(&mut matrix);
+                let right: Vec<Node> = bias
+                    .iter()
+                    .zip(self.tau.clone())
+                    .map(|(entry, tau)| {
+                        let bias = lower(&scope, &mut self.graph, entry);
+                        self.graph.sub(tau, bias)
+                    })
+                    .collect();
+                self.graph.solve_spd(&matrix, &right)
+            }
+        }
+    }
+
+    fn add_inertia(&mut self, matrix: &mut [Vec<Node>]) {
+        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+            if let Entry::Inertia(formula) = &effect.effect.entry {
+                let extra = self.effect_node(index, formula);
+                let own = &mut matrix[effect.joint][effect.joint];
+                *own = self.graph.add(*own, extra);
+            }
+        }
+    }
+
+    /// The names of the declared equations: angles as effects turn them, torques as effects leave them.
+    fn declared_scope(&mut self) -> Scope {
+        let mut angles = self.q.clone();
+        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+            if let Entry::Angle(formula) = &effect.effect.entry {
+                angles[effect.joint] = self.effect_node(index, formula);
+            }
+        }
+        let mut scope = Scope::new(self.narrowest_sign());
+        for j in 0..self.system.joints {
+            scope.bind(&format!("q{}", j + 1), angles[j]);
+            scope.bind(&format!("qd{}", j + 1), self.qd[j]);
+            scope.bind(&format!("tau{}", j + 1), self.tau[j]);
+        }
+        scope.bind("t", self.time);
+        for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
+            scope.bind(&parameter.name, *node);
+        }
+        for (name, formula) in &self.system.lets {
+            let node = lower(&scope, &mut self.graph, formula);
+            self.graph.label(node, name);
+            scope.bind(name, node);
+        }
+        scope
+    }
+
+    /// A declared formula may mix joints, so the narrowest of their widths is safe for all.
+    fn narrowest_sign(&self) -> SignForm {
+        let width = |sign: &SignForm| match sign {
+            SignForm::Exact => 0.0,
+            SignForm::Smooth { width } => *width,
+        };
+        *self
+            .sign
+            .iter()
+            .min_by(|a, b| width(a).total_cmp(&width(b)))
+            .expect("a system has at least one joint")
+    }
+}
+
+fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
+    scope
+        .lower(graph, &formula.value)
+        .expect("formulas were checked when the file was read")
+}
+
+fn effect_parameters(effect: &FittedEffect, taken: &[Parameter]) -> Vec<Parameter> {
+    let names = effect.parameter_names(taken);
+    let declared = effect.effect.parameters.iter().zip(&effect.values);
+    declared
+        .zip(names)
+        .map(|((parameter, (value, ci95)), name)| Parameter {
+            name,
+            value: *value,
+            unit: parameter.unit.clone(),
+            bounds: parameter.bounds,
+            fixed: effect.fixed || parameter.whole,
+            ci95: *ci95,
+            scale: parameter.typical,
+        })
+        .collect()
+}
+
+impl Dynamics {
+    /// Names of the program's outputs, for the printers.
+    pub fn output_names(&self) -> Vec<String> {
+        let numbered = |stem: &str| {
+            (1..=self.joints)
+                .map(move |j| format!("{stem}{j}"))
+                .collect::<Vec<_>>()
+        };
+        [numbered("qd"), numbered("qdd")].concat()
+    }
+
+    /// Outputs 0..n of the program are the rates of the angles, n..2n the accelerations.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+}

@@ -1,0 +1,254 @@
+use std::path::Path;
+
+use super::reader::{Document, FileError, Located, Section};
+use crate::expr::Formula;
+
+/// How an effect enters the equations of its joint. Formulas speak of `q`, `qd`, `tau`, `load`, `t` of
+/// that joint and of the effect's parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// Added to the generalised force, and so passed through the mass matrix.
+    Force(Formula),
+    /// What becomes of the commanded torque.
+    Torque(Formula),
+    /// What stands for the joint's angle in the declared equations.
+    Angle(Formula),
+    /// Added to the joint's own entry of the mass matrix.
+    Inertia(Formula),
+}
+
+impl Entry {
+    pub fn formula(&self) -> &Formula {
+        match self {
+            Self::Force(f) | Self::Torque(f) | Self::Angle(f) | Self::Inertia(f) => f,
+        }
+    }
+}
+
+/// What a searched value is a multiple of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Itself, in the parameter's own unit.
+    One,
+    /// The highest speed of the joint in the logs.
+    Speed,
+    /// The highest torque of the joint in the logs.
+    Torque,
+}
+
+/// A parameter of an effect.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectParameter {
+    pub name: String,
+    pub unit: String,
+    pub about: String,
+    /// Usual magnitude on a rig for the lab bench.
+    pub typical: f64,
+    pub bounds: [f64; 2],
+    /// Values from which a fit starts. One value: zero or whatever leaves the rig as it is.
+    pub starts: Vec<f64>,
+    pub measure: Measure,
+    /// Only whole numbers make sense: searched, never refined.
+    pub whole: bool,
+}
+
+/// A physical effect that a model may lack: one file of `models/effects`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Effect {
+    pub name: String,
+    pub about: String,
+    pub entry: Entry,
+    pub parameters: Vec<EffectParameter>,
+    /// Simpler effects that this one becomes for special values of its parameters.
+    pub contains: Vec<String>,
+    pub confused_with: Vec<String>,
+    /// The motion that shows the effect.
+    pub shown_by: String,
+    /// Acts only where gravity's direction enters: on the first joint of a chain.
+    pub first_joint_only: bool,
+}
+
+const EFFECT_KEYS: &[&str] = &[
+    "name",
+    "about",
+    "force",
+    "torque",
+    "angle",
+    "inertia",
+    "contains",
+    "confused_with",
+    "shown_by",
+    "joints",
+];
+const PARAMETER_KEYS: &[&str] = &[
+    "unit",
+    "about",
+    "typical",
+    "positive",
+    "bounds",
+    "start",
+    "search",
+    "relative_to",
+    "whole",
+];
+/// What a formula of an effect may mention besides its parameters.
+pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
+
+impl Effect {
+    /// Read one effect file.
+    ///
+    /// # Errors
+    /// Unreadable file, unknown or missing key, formula error: with line, column and remedy.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::from_document(&Document::open(path)?)
+    }
+
+    /// The effect in `text`; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`Effect::read`].
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, FileError> {
+        Self::from_document(&Document {
+            path: path.to_owned(),
+            text: text.to_owned(),
+        })
+    }
+
+    fn from_document(document: &Document) -> Result<Self, FileError> {
+        let top = document.parse()?;
+        top.only(&["effect", "parameters"])?;
+        let section = top.required_section("effect")?;
+        section.only(EFFECT_KEYS)?;
+        let parameters = top
+            .required_section("parameters")?
+            .named_sections()?
+            .into_iter()
+            .map(|(name, section)| parameter(name, &section))
+            .collect::<Result<Vec<_>, _>>()?;
+        let entry = entry(document, &section, &parameters)?;
+        let list = |key| -> Result<Vec<String>, FileError> {
+            let texts = section.texts(key)?.unwrap_or_default();
+            Ok(texts.into_iter().map(|text| text.value).collect())
+        };
+        Ok(Self {
+            name: section.required_text("name")?.value,
+            about: section.required_text("about")?.value,
+            entry,
+            parameters,
+            contains: list("contains")?,
+            confused_with: list("confused_with")?,
+            shown_by: section.text_or_empty("shown_by")?,
+            first_joint_only: first_joint_only(&section)?,
+        })
+    }
+}
+
+fn first_joint_only(section: &Section<'_>) -> Result<bool, FileError> {
+    match section.text_or_empty("joints")?.as_str() {
+        "" | "all" => Ok(false),
+        "first" => Ok(true),
+        other => Err(section.error_at(
+            "joints",
+            format!("`joints` is \"all\" or \"first\", found {other:?}"),
+        )),
+    }
+}
+
+fn entry(
+    document: &Document,
+    section: &Section<'_>,
+    parameters: &[EffectParameter],
+) -> Result<Entry, FileError> {
+    let kinds: [(&str, fn(Formula) -> Entry); 4] = [
+        ("force", Entry::Force),
+        ("torque", Entry::Torque),
+        ("angle", Entry::Angle),
+        ("inertia", Entry::Inertia),
+    ];
+    let mut found = None;
+    for (key, make) in kinds {
+        if let Some(formula) = section.formula(key)? {
+            if found.is_some() {
+                return Err(
+                    section.error_at(key, "an effect has one of force, torque, angle and inertia")
+                );
+            }
+            check_names(document, &formula, parameters)?;
+            found = Some(make(formula.value));
+        }
+    }
+    found.ok_or_else(|| {
+        section.error("one of force, torque, angle and inertia is missing in [effect]")
+    })
+}
+
+fn check_names(
+    document: &Document,
+    formula: &Located<Formula>,
+    parameters: &[EffectParameter],
+) -> Result<(), FileError> {
+    let mut graph = crate::expr::Graph::new();
+    let mut scope = crate::expr::Scope::new(crate::expr::SignForm::Exact);
+    for name in EFFECT_NAMES
+        .into_iter()
+        .chain(parameters.iter().map(|p| p.name.as_str()))
+    {
+        let node = graph.input(name);
+        scope.bind(name, node);
+    }
+    match scope.lower(&mut graph, &formula.value) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(document.formula_error(formula.at, &error)),
+    }
+}
+
+fn parameter(name: String, section: &Section<'_>) -> Result<EffectParameter, FileError> {
+    section.only(PARAMETER_KEYS)?;
+    let typical = section.required_number("typical")?;
+    if typical <= 0.0 {
+        return Err(section.error_at("typical", "`typical` is a magnitude: a number above zero"));
+    }
+    let starts = match section.numbers("search")? {
+        Some(values) if values.is_empty() => {
+            return Err(section.error_at("search", "`search` is empty"));
+        }
+        Some(values) => values,
+        None => vec![section.number("start")?.unwrap_or(0.0)],
+    };
+    let measure = match section.text_or_empty("relative_to")?.as_str() {
+        "" => Measure::One,
+        "speed" => Measure::Speed,
+        "torque" => Measure::Torque,
+        other => {
+            let message = format!("`relative_to` is \"speed\" or \"torque\", found {other:?}");
+            return Err(section.error_at("relative_to", message));
+        }
+    };
+    Ok(EffectParameter {
+        name,
+        unit: section.required_text("unit")?.value,
+        about: section.text_or_empty("about")?,
+        typical,
+        bounds: bounds(section)?,
+        starts,
+        measure,
+        whole: section.flag("whole")?,
+    })
+}
+
+/// The admissible range that `positive` and `bounds` declare.
+pub(super) fn bounds(section: &Section<'_>) -> Result<[f64; 2], FileError> {
+    let lowest = if section.flag("positive")? {
+        0.0
+    } else {
+        f64::NEG_INFINITY
+    };
+    match section.numbers("bounds")?.as_deref() {
+        None => Ok([lowest, f64::INFINITY]),
+        Some(&[low, high]) if low < high => Ok([low.max(lowest), high]),
+        Some(_) => Err(section.error_at(
+            "bounds",
+            "`bounds` is a list of two rising numbers, such as [0, 2]",
+        )),
+    }
+}

@@ -1,0 +1,152 @@
+use std::path::{Path, PathBuf};
+
+use include_dir::{Dir, include_dir};
+
+use super::effect::Effect;
+use super::reader::FileError;
+use super::system::System;
+use crate::expr::suggestion;
+
+static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/models");
+
+/// The effects and systems that are known by name: those embedded in the program, and a user's own.
+#[derive(Debug, Clone)]
+pub struct Library {
+    effects: Vec<Effect>,
+}
+
+impl Library {
+    /// What the program carries.
+    ///
+    /// # Panics
+    /// Never: a test reads every embedded file.
+    pub fn built_in() -> Self {
+        let files = BUILT_IN
+            .get_dir("effects")
+            .expect("models/effects is embedded")
+            .files();
+        let mut effects: Vec<Effect> = files
+            .filter(|file| is_toml(file.path()))
+            .map(|file| {
+                let text = file.contents_utf8().expect("embedded files are UTF-8");
+                Effect::from_text(file.path(), text).expect("embedded effects are read by a test")
+            })
+            .collect();
+        effects.sort_by(|a, b| a.name.cmp(&b.name));
+        Self { effects }
+    }
+
+    /// Add every `*.toml` of a folder; an effect of a known name replaces the known one.
+    ///
+    /// # Errors
+    /// Unreadable folder, or the first error in a file.
+    pub fn with_folder(mut self, folder: &Path) -> Result<Self, FileError> {
+        let unreadable = |error: std::io::Error| FileError {
+            path: folder.to_owned(),
+            place: None,
+            message: format!("cannot be read as a folder of effects: {error}"),
+        };
+        let entries = std::fs::read_dir(folder).map_err(unreadable)?;
+        let mut paths: Vec<PathBuf> = entries
+            .map(|entry| entry.map(|entry| entry.path()))
+            .collect::<Result<_, _>>()
+            .map_err(unreadable)?;
+        paths.retain(|path| is_toml(path));
+        paths.sort();
+        for path in paths {
+            let effect = Effect::read(&path)?;
+            self.effects.retain(|known| known.name != effect.name);
+            self.effects.push(effect);
+        }
+        self.effects.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(self)
+    }
+
+    /// All effects, by name.
+    pub fn effects(&self) -> &[Effect] {
+        &self.effects
+    }
+
+    /// The effect of this name.
+    ///
+    /// # Errors
+    /// Unknown name, with the nearest known one.
+    pub fn effect(&self, name: &str) -> Result<&Effect, String> {
+        self.effects
+            .iter()
+            .find(|effect| effect.name == name)
+            .ok_or_else(|| {
+                let near = suggestion(name, self.effects.iter().map(|effect| effect.name.as_str()));
+                format!("unknown effect `{name}`{near}; `residyn list effects` shows all")
+            })
+    }
+
+    /// Names of the embedded systems.
+    pub fn system_names() -> Vec<String> {
+        let mut names: Vec<String> = BUILT_IN
+            .files()
+            .filter(|file| is_toml(file.path()))
+            .filter_map(|file| Some(file.path().file_stem()?.to_str()?.to_owned()))
+            .collect();
+        names.sort();
+        names
+    }
+
+    /// The text of an embedded system.
+    pub fn system_text(name: &str) -> Option<&'static str> {
+        BUILT_IN.get_file(format!("{name}.toml"))?.contents_utf8()
+    }
+
+    /// A system from a file or, where there is no such file, an embedded one of that name.
+    ///
+    /// # Errors
+    /// As [`System::read`]; for a path that is neither, the names that exist.
+    pub fn system(&self, path: &Path) -> Result<System, FileError> {
+        let embedded = path
+            .to_str()
+            .filter(|_| !path.exists())
+            .and_then(Self::system_text);
+        if let Some(text) = embedded {
+            return System::from_text(path, text, &self.effects);
+        }
+        System::read(path, &self.effects).map_err(|mut error| {
+            if error.place.is_none() {
+                error.message += &format!(
+                    "; give a model file or one of {}",
+                    Self::system_names().join(", ")
+                );
+            }
+            error
+        })
+    }
+}
+
+fn is_toml(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension == "toml")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Library;
+    use std::path::Path;
+
+    #[test]
+    fn every_embedded_file_is_sound() {
+        let library = Library::built_in();
+        assert!(library.effects().len() >= 13);
+        for name in Library::system_names() {
+            library.system(Path::new(&name)).unwrap();
+        }
+        for effect in library.effects() {
+            for other in effect.contains.iter().chain(&effect.confused_with) {
+                let later = ["sensor_offset", "parameter_shift"].contains(&other.as_str());
+                assert!(
+                    later || library.effect(other).is_ok(),
+                    "{} names {other}",
+                    effect.name
+                );
+            }
+        }
+    }
+}

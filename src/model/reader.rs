@@ -1,0 +1,364 @@
+//! Reading hand-written TOML so that every complaint names file, line and column, and an unknown key
+//! is met with the nearest known one.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::expr::{Formula, FormulaError, parse, suggestion};
+
+/// What is wrong with a model or effect file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileError {
+    pub path: PathBuf,
+    /// Line and column, counted from 1; `None` where the file as a whole is meant.
+    pub place: Option<(usize, usize)>,
+    pub message: String,
+}
+
+impl std::error::Error for FileError {}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        if let Some((line, column)) = self.place {
+            write!(f, ", line {line}, column {column}")?;
+        }
+        write!(f, ": {}", self.message)
+    }
+}
+
+/// A file's text and name.
+pub(super) struct Document {
+    pub path: PathBuf,
+    pub text: String,
+}
+
+/// A value and where in the text it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Located<T> {
+    pub value: T,
+    pub at: usize,
+}
+
+impl Document {
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read_to_string(path).map_err(|error| FileError {
+            path: path.to_owned(),
+            place: None,
+            message: format!("cannot be read: {error}"),
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            text,
+        })
+    }
+
+    pub fn parse(&self) -> Result<Section<'_>, FileError> {
+        let table = DeTable::parse(&self.text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            self.error(at, error.message())
+        })?;
+        Ok(Section {
+            document: self,
+            name: String::new(),
+            at: 0,
+            table: table.into_inner(),
+        })
+    }
+
+    pub fn error(&self, at: usize, message: impl Into<String>) -> FileError {
+        let before = &self.text[..at.min(self.text.len())];
+        let line = before.matches('\n').count() + 1;
+        let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
+        FileError {
+            path: self.path.clone(),
+            place: Some((line, column)),
+            message: message.into(),
+        }
+    }
+
+    pub fn formula_error(&self, at: usize, error: &FormulaError) -> FileError {
+        self.error(at, error.to_string())
+    }
+
+    pub fn formula(&self, text: &Located<String>) -> Result<Located<Formula>, FileError> {
+        match parse(&text.value) {
+            Ok(value) => Ok(Located { value, at: text.at }),
+            Err(error) => Err(self.formula_error(text.at, &error)),
+        }
+    }
+}
+
+/// One table of the file.
+pub(super) struct Section<'a> {
+    document: &'a Document,
+    /// As in the header, empty for the top level.
+    pub name: String,
+    pub at: usize,
+    table: DeTable<'a>,
+}
+
+impl<'a> Section<'a> {
+    /// The table `key`, if it is there.
+    pub fn section(&self, key: &str) -> Result<Option<Section<'a>>, FileError> {
+        self.get(key)
+            .map(|value| self.table_of(key, value))
+            .transpose()
+    }
+
+    /// The table `key`.
+    pub fn required_section(&self, key: &str) -> Result<Section<'a>, FileError> {
+        self.section(key)?
+            .ok_or_else(|| self.error(format!("the table [{key}] is missing")))
+    }
+
+    /// The array of tables `key`, empty if it is not there.
+    pub fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, FileError> {
+        let Some(value) = self.get(key) else {
+            return Ok(Vec::new());
+        };
+        let items = value
+            .get_ref()
+            .as_array()
+            .ok_or_else(|| self.wrong(value, key, "tables, written [[..]]"))?;
+        items.iter().map(|item| self.table_of(key, item)).collect()
+    }
+
+    /// Every key with its table, in the order of the file.
+    pub fn named_sections(&self) -> Result<Vec<(String, Section<'a>)>, FileError> {
+        self.table
+            .iter()
+            .map(|(key, value)| {
+                Ok((
+                    key.get_ref().to_string(),
+                    self.table_of(key.get_ref(), value)?,
+                ))
+            })
+            .collect()
+    }
+
+    /// Every key with its text, in the order of the file.
+    pub fn named_texts(&self) -> Result<Vec<(String, Located<String>)>, FileError> {
+        self.table
+            .iter()
+            .map(|(key, value)| {
+                Ok((
+                    key.get_ref().to_string(),
+                    self.text_of(key.get_ref(), value)?,
+                ))
+            })
+            .collect()
+    }
+
+    pub fn text(&self, key: &str) -> Result<Option<Located<String>>, FileError> {
+        self.get(key)
+            .map(|value| self.text_of(key, value))
+            .transpose()
+    }
+
+    pub fn required_text(&self, key: &str) -> Result<Located<String>, FileError> {
+        self.text(key)?.ok_or_else(|| self.missing(key))
+    }
+
+    /// A text that may be left out, in which case it is empty.
+    pub fn text_or_empty(&self, key: &str) -> Result<String, FileError> {
+        Ok(self.text(key)?.map_or_else(String::new, |text| text.value))
+    }
+
+    pub fn formula(&self, key: &str) -> Result<Option<Located<Formula>>, FileError> {
+        let text = self.text(key)?;
+        text.map(|text| self.document.formula(&text)).transpose()
+    }
+
+    pub fn number(&self, key: &str) -> Result<Option<f64>, FileError> {
+        self.get(key)
+            .map(|value| self.number_of(key, value))
+            .transpose()
+    }
+
+    pub fn required_number(&self, key: &str) -> Result<f64, FileError> {
+        self.number(key)?.ok_or_else(|| self.missing(key))
+    }
+
+    pub fn whole(&self, key: &str) -> Result<Option<usize>, FileError> {
+        let Some(number) = self.number(key)? else {
+            return Ok(None);
+        };
+        if number.fract() != 0.0 || !(0.0..1e9).contains(&number) {
+            return Err(self.error_at(
+                key,
+                format!("`{key}` must be a whole number, found {number}"),
+            ));
+        }
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just checked
+        Ok(Some(number as usize))
+    }
+
+    /// False if it is not there.
+    pub fn flag(&self, key: &str) -> Result<bool, FileError> {
+        self.get(key).map_or(Ok(false), |value| {
+            value
+                .get_ref()
+                .as_bool()
+                .ok_or_else(|| self.wrong(value, key, "true or false"))
+        })
+    }
+
+    pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, FileError> {
+        let items = self.items(key, "a list of numbers")?;
+        items
+            .map(|items| items.iter().map(|item| self.number_of(key, item)).collect())
+            .transpose()
+    }
+
+    pub fn texts(&self, key: &str) -> Result<Option<Vec<Located<String>>>, FileError> {
+        let items = self.items(key, "a list of texts")?;
+        items
+            .map(|items| items.iter().map(|item| self.text_of(key, item)).collect())
+            .transpose()
+    }
+
+    /// A list of lists of texts.
+    pub fn matrix(&self, key: &str) -> Result<Option<Vec<Vec<Located<String>>>>, FileError> {
+        let Some(rows) = self.items(key, "a list of rows")? else {
+            return Ok(None);
+        };
+        let row = |row: &Spanned<DeValue<'a>>| {
+            let items = row
+                .get_ref()
+                .as_array()
+                .ok_or_else(|| self.wrong(row, key, "a list of rows"))?;
+            items.iter().map(|item| self.text_of(key, item)).collect()
+        };
+        rows.iter().map(row).collect::<Result<_, _>>().map(Some)
+    }
+
+    /// Complain about the first key that is not one of `known`.
+    pub fn only(&self, known: &[&str]) -> Result<(), FileError> {
+        let stranger = self
+            .table
+            .keys()
+            .find(|key| !known.contains(&key.get_ref().as_ref()));
+        stranger.map_or(Ok(()), |key| {
+            let near = suggestion(key.get_ref(), known.iter().copied());
+            let within = if self.name.is_empty() {
+                String::new()
+            } else {
+                format!(" in [{}]", self.name)
+            };
+            let remedy = if near.is_empty() {
+                format!("; known are {}", known.join(", "))
+            } else {
+                near
+            };
+            let message = format!("unknown key `{}`{within}{remedy}", key.get_ref());
+            Err(self.document.error(key.span().start, message))
+        })
+    }
+
+    /// A complaint about this table.
+    pub fn error(&self, message: impl Into<String>) -> FileError {
+        self.document.error(self.at, message)
+    }
+
+    /// A complaint about the value of `key`.
+    pub fn error_at(&self, key: &str, message: impl Into<String>) -> FileError {
+        let at = self.get(key).map_or(self.at, |value| value.span().start);
+        self.document.error(at, message)
+    }
+
+    pub fn has(&self, key: &str) -> bool {
+        self.get(key).is_some()
+    }
+
+    /// The keys, in the order of the file.
+    pub fn keys(&self) -> impl Iterator<Item = &str> {
+        self.table.keys().map(|key| key.get_ref().as_ref())
+    }
+
+    /// Whether `key` holds a table (and not a plain value).
+    pub fn is_table(&self, key: &str) -> bool {
+        self.get(key)
+            .is_some_and(|value| value.get_ref().is_table())
+    }
+
+    fn get(&self, key: &str) -> Option<&Spanned<DeValue<'a>>> {
+        self.table
+            .iter()
+            .find(|(k, _)| k.get_ref() == key)
+            .map(|(_, value)| value)
+    }
+
+    fn missing(&self, key: &str) -> FileError {
+        self.error(format!("`{key}` is missing in [{}]", self.name))
+    }
+
+    fn wrong(&self, value: &Spanned<DeValue<'a>>, key: &str, wanted: &str) -> FileError {
+        let found = value.get_ref().type_str();
+        self.document.error(
+            value.span().start,
+            format!("`{key}` must be {wanted}, found {found}"),
+        )
+    }
+
+    fn items(
+        &self,
+        key: &str,
+        wanted: &str,
+    ) -> Result<Option<Vec<Spanned<DeValue<'a>>>>, FileError> {
+        self.get(key)
+            .map(|value| match value.get_ref().as_array() {
+                Some(items) => Ok(items.iter().cloned().collect()),
+                None => Err(self.wrong(value, key, wanted)),
+            })
+            .transpose()
+    }
+
+    fn table_of(&self, key: &str, value: &Spanned<DeValue<'a>>) -> Result<Section<'a>, FileError> {
+        let table = value
+            .get_ref()
+            .as_table()
+            .ok_or_else(|| self.wrong(value, key, "a table"))?;
+        let prefix = if self.name.is_empty() {
+            String::new()
+        } else {
+            format!("{}.", self.name)
+        };
+        Ok(Section {
+            document: self.document,
+            name: format!("{prefix}{key}"),
+            at: value.span().start,
+            table: table.clone(),
+        })
+    }
+
+    fn text_of(
+        &self,
+        key: &str,
+        value: &Spanned<DeValue<'a>>,
+    ) -> Result<Located<String>, FileError> {
+        let text = value
+            .get_ref()
+            .as_str()
+            .ok_or_else(|| self.wrong(value, key, "a text in quotes"))?;
+        Ok(Located {
+            value: text.to_owned(),
+            at: value.span().start,
+        })
+    }
+
+    fn number_of(&self, key: &str, value: &Spanned<DeValue<'a>>) -> Result<f64, FileError> {
+        let written = match value.get_ref() {
+            DeValue::Float(number) => number.as_str(),
+            DeValue::Integer(number) => number.as_str(),
+            _ => return Err(self.wrong(value, key, "a number")),
+        };
+        match written.parse::<f64>() {
+            Ok(number) if !number.is_nan() => Ok(number),
+            _ => Err(self.wrong(value, key, "a decimal number")),
+        }
+    }
+}
