@@ -1,18 +1,28 @@
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Columns {
-    pub time: String,
-    pub q: Vec<String>,
-    pub qd: Vec<String>,
-    pub tau: Vec<String>,
-}
-impl Columns {
-    pub fn standard(n: usize) -> Self {
-        let c = |s: &str| (1..=n).map(|j| format!("{s}{j}")).collect();
-        Self {
-            time: "time".into(),
-            q: c("q"),
-            qd: c("qd"),
-            tau: c("tau"),
-        }
-    }
-}
+//! Logs of mechanical rigs: reading them, and saying what they are good for.
+//!
+//! A [`Log`] is one trajectory: times, joint angles, joint velocities and joint torques, in s, rad,
+//! rad/s and N m. [`Log::read`] takes it from CSV text and refuses what it cannot read with an error
+//! that names file, line, column and remedy; numbers are never repaired. [`audit`] measures the
+//! quality of a log (sampling, noise, spikes, lags, excitation) and puts what matters for fitting a
+//! model into plain sentences.
+//!
+//! The torque of row `i` acts from `time[i]` to `time[i + 1]` (zero-order hold).
+
+mod audit;
+mod columns;
+mod error;
+mod lag;
+pub mod leave_out;
+mod local_cubic;
+mod log;
+mod read;
+mod signal;
+
+pub use audit::{
+    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueLag, VelocityCheck, audit,
+};
+pub use columns::Columns;
+pub use error::{CellFault, LogError};
+pub use leave_out::{LeaveOut, LeaveOutError};
+pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
+pub use log::{Interval, Log};

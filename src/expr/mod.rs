@@ -9,6 +9,7 @@ mod error;
 mod eval;
 mod gradient;
 mod graph;
+mod inline;
 mod op;
 mod parse;
 mod print;

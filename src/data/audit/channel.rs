@@ -1,0 +1,165 @@
+//! One column of a log by itself.
+
+use serde::Serialize;
+
+use crate::data::signal::{mad, noise_std, quantile, resolution};
+
+/// A jump counts as a spike beyond this many median absolute deviations (four standard deviations of
+/// normal noise).
+pub(super) const SPIKE_MADS: f64 = 6.0;
+
+/// A jump below this share of the channel's working range harms no fit, however rare it is.
+pub(super) const SPIKE_SHARE_OF_RANGE: f64 = 0.05;
+
+/// A jump of fewer quantisation steps than this is rounding.
+pub(super) const SPIKE_RESOLUTION_STEPS: f64 = 3.0;
+
+/// One column of a log: what its numbers look like, in the column's own unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Channel {
+    /// Standard name, such as `qd1`.
+    pub name: String,
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Quantisation step; 0 for a continuous channel.
+    pub resolution: f64,
+    /// Standard deviation of the white noise. An upper bound where the steps are long against the
+    /// motion; 0 where quantisation hides the noise.
+    pub noise_std: f64,
+    /// Rows that jump. For a velocity: rows that disagree with the derivative of the angle. For an
+    /// angle or a torque: single rows away from both neighbours, which agree with each other.
+    pub spikes: usize,
+    /// Share of the rows that sit at exactly the smallest or largest value, as at a limit; 0 if the
+    /// values merely turn round there, or if the limit is zero.
+    pub saturated_fraction: f64,
+    /// Whether all values are the same.
+    pub constant: bool,
+}
+
+impl Channel {
+    /// Measures one column with at least one row. `spikes` is counted by the caller, as its meaning
+    /// depends on the kind of channel.
+    pub(super) fn of(name: String, values: &[f64], spikes: usize) -> Self {
+        let min = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let resolution = resolution(values);
+        let noise = noise_std(values);
+        let saturated = saturated_rows(values, max, max - min, resolution)
+            + saturated_rows(values, min, max - min, resolution);
+        Self {
+            name,
+            min,
+            max,
+            resolution,
+            noise_std: if noise < 0.01 * resolution {
+                0.0
+            } else {
+                noise
+            },
+            spikes,
+            saturated_fraction: saturated as f64 / values.len() as f64,
+            constant: min == max,
+        }
+    }
+
+    /// Largest minus smallest value.
+    pub fn range(&self) -> f64 {
+        self.max - self.min
+    }
+}
+
+/// Rows at a limit (the smallest or largest value), if the channel looks clipped there; else 0.
+///
+/// More than a few rows have to sit at the limit, and four times as many as close by: a sine that is
+/// rounded to steps lingers at its top as well, but at most 2.4 times as long as in the step below.
+fn saturated_rows(values: &[f64], limit: f64, range: f64, resolution: f64) -> usize {
+    // Zero is where an actuator rests, not where it ends.
+    if range == 0.0 || limit.abs() <= 1e-3 * range {
+        return 0;
+    }
+    // One step of a quantised channel. A coarse one (bang-bang) has no neighbouring step to ask.
+    let near = (1.5 * resolution).clamp(0.01 * range, 0.2 * range);
+    let at = values.iter().filter(|value| **value == limit).count();
+    let within = values
+        .iter()
+        .filter(|value| (**value - limit).abs() <= near)
+        .count();
+    let few = (values.len() / 500).max(5);
+    if at > few && at >= 4 * (within - at) {
+        at
+    } else {
+        0
+    }
+}
+
+/// Single rows that jump away from both neighbours while the neighbours agree with each other.
+pub(super) fn isolated_spikes(values: &[f64]) -> usize {
+    let jump = |triple: &[f64]| triple[1] - 0.5 * (triple[0] + triple[2]);
+    let jumps: Vec<f64> = values.windows(3).map(jump).collect();
+    let working_range = quantile(values, 0.95) - quantile(values, 0.05);
+    let floor = (SPIKE_MADS * mad(&jumps))
+        .max(SPIKE_SHARE_OF_RANGE * working_range)
+        .max(SPIKE_RESOLUTION_STEPS * resolution(values));
+    let isolated = |triple: &[f64]| {
+        let [before, after] = [triple[1] - triple[0], triple[1] - triple[2]];
+        let smaller = before.abs().min(after.abs());
+        let neighbours_agree = (triple[2] - triple[0]).abs() < 0.5 * smaller;
+        before * after > 0.0 && smaller > floor && neighbours_agree
+    };
+    values.windows(3).filter(|triple| isolated(triple)).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sine(amplitude: f64) -> Vec<f64> {
+        (0..5000)
+            .map(|i| amplitude * (i as f64 * 0.01).sin())
+            .collect()
+    }
+
+    fn saturated(values: &[f64]) -> f64 {
+        Channel::of("tau1".to_owned(), values, 0).saturated_fraction
+    }
+
+    #[test]
+    fn clipping_is_told_from_turning_round() {
+        assert_eq!(saturated(&sine(1.0)), 0.0);
+        let clipped: Vec<f64> = sine(1.0)
+            .iter()
+            .map(|value| value.clamp(-0.8, 0.8))
+            .collect();
+        // |sin| > 0.8 for 1 - 2 asin(0.8) / pi = 41 % of the time.
+        assert!((saturated(&clipped) - 0.41).abs() < 0.01);
+        for step in [0.0088, 0.05, 0.13] {
+            let rounded: Vec<f64> = sine(1.0)
+                .iter()
+                .map(|value| (value / step).round() * step)
+                .collect();
+            assert_eq!(saturated(&rounded), 0.0, "{step}");
+        }
+    }
+
+    #[test]
+    fn bang_bang_is_saturated_and_rest_is_not() {
+        let bang: Vec<f64> = sine(1.0).iter().map(|value| 0.9 * value.signum()).collect();
+        assert!(saturated(&bang) > 0.99);
+        let pushes: Vec<f64> = sine(1.0).iter().map(|value| value.max(0.0)).collect();
+        assert_eq!(saturated(&pushes), 0.0);
+        assert_eq!(saturated(&[2.0; 100]), 0.0);
+    }
+
+    #[test]
+    fn single_rows_that_jump_are_spikes_and_steps_are_not() {
+        let mut values = sine(1.0);
+        assert_eq!(isolated_spikes(&values), 0);
+        values[700] += 0.5;
+        values[2000] -= 3.0;
+        values.iter_mut().skip(3000).for_each(|value| *value += 2.0);
+        assert_eq!(isolated_spikes(&values), 2);
+        assert_eq!(isolated_spikes(&[1.0, 2.0]), 0);
+    }
+}

@@ -1,0 +1,277 @@
+//! How the channels of one joint agree: logged with derived velocity, acceleration with torque.
+
+use serde::Serialize;
+
+use super::channel::{Channel, SPIKE_MADS, SPIKE_RESOLUTION_STEPS, SPIKE_SHARE_OF_RANGE};
+use super::motion::Motion;
+use crate::data::lag::{Lag, lag};
+use crate::data::signal::{SIGMA_PER_MAD, interpolate, mad, median, resample};
+
+/// The longest lag looked for \[s\]. Filters and buses of real rigs stay below 40 ms; a longer search
+/// would find chance agreements.
+pub const MAX_LAG_S: f64 = 0.05;
+
+/// Below this correlation of acceleration and torque, the lag between them means little: on measured
+/// logs of one rig it scattered by several steps.
+const MIN_TORQUE_CORRELATION: f64 = 0.5;
+
+/// An acceleration cannot come before its torque but for the time stamps, which are off by less than
+/// this many samples. A controller's torque does trail the motion, which is not what is asked.
+const MAX_TORQUE_LEAD: isize = 2;
+
+/// The logged velocity against the derivative of the logged angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VelocityCheck {
+    /// Correlation of the two at their best lag; low when they are not the same quantity.
+    pub correlation: f64,
+    /// By how much the logged velocity trails the derivative \[s\]; at most [`MAX_LAG_S`] is seen.
+    pub lag_s: f64,
+    /// Logged velocity over derivative, lag allowed for; 1 for a velocity in rad/s.
+    pub scale: f64,
+    /// Noise of the logged velocity \[rad/s\]: the median absolute difference of the two in motion as a
+    /// standard deviation, lag and scale allowed for.
+    pub noise_std_rad_s: f64,
+    /// Largest difference \[rad/s\], lag and scale allowed for.
+    pub worst_rad_s: f64,
+}
+
+/// The acceleration against the torque that drives it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TorqueLag {
+    /// By how much the acceleration trails the torque \[s\], beyond the half step that holding a torque
+    /// over each step brings by itself.
+    pub lag_s: f64,
+    /// Correlation of the two at that lag, after gravity, friction and the other joints' acceleration
+    /// are taken out of both by linear regression.
+    pub correlation: f64,
+}
+
+/// The speeds between which a joint moves.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Speeds {
+    /// Slower than this, it cannot be told from a joint at rest \[rad/s\].
+    pub rest_rad_s: f64,
+    /// 95 % of the rows are slower than this \[rad/s\].
+    pub fast_rad_s: f64,
+}
+
+/// Compares logged and derived velocity, and counts the logged ones that disagree.
+pub(super) fn velocity_check(
+    motion: &Motion,
+    qd: &Channel,
+    speeds: Speeds,
+    step_s: f64,
+) -> (Option<VelocityCheck>, usize) {
+    let Speeds {
+        rest_rad_s,
+        fast_rad_s,
+    } = speeds;
+    let found = velocity_lag(motion, step_s).filter(|_| fast_rad_s > 2.0 * rest_rad_s);
+    let Some(Lag {
+        samples,
+        correlation,
+        ..
+    }) = found
+    else {
+        return (None, 0);
+    };
+    let lag_s = samples * lag_step_s(step_s);
+    let pairs = aligned_velocities(motion, lag_s);
+    let scale = velocity_scale(&pairs, fast_rad_s);
+    let off = |(logged, derived): &(f64, f64)| logged - scale * derived;
+    // At rest both are zero and agree to the last digit, which is no measure for rows in motion.
+    let moving = pairs.iter().filter(|pair| pair.1.abs() > rest_rad_s);
+    let spread = mad(&moving.map(off).collect::<Vec<_>>());
+    let floor = (SPIKE_MADS * spread)
+        .max(SPIKE_SHARE_OF_RANGE * scale.abs() * fast_rad_s)
+        .max(SPIKE_RESOLUTION_STEPS * qd.resolution);
+    let sizes = || pairs.iter().map(|pair| off(pair).abs());
+    let check = VelocityCheck {
+        correlation,
+        lag_s,
+        scale,
+        noise_std_rad_s: SIGMA_PER_MAD * spread,
+        worst_rad_s: sizes().fold(0.0, f64::max),
+    };
+    (Some(check), sizes().filter(|size| *size > floor).count())
+}
+
+/// Logged velocity of each row with the derivative of the angle `lag_s` earlier.
+fn aligned_velocities(motion: &Motion, lag_s: f64) -> Vec<(f64, f64)> {
+    let derived = |t: f64| interpolate(&motion.time, &motion.velocity, t - lag_s);
+    let rows = motion.time.iter().zip(&motion.qd);
+    rows.filter_map(|(t, logged)| Some((*logged, derived(*t)?)))
+        .collect()
+}
+
+/// Ratio of logged to derived velocity: the median over the rows faster than a third of the fast
+/// speed, which spikes cannot move and slow rows cannot blur.
+fn velocity_scale(pairs: &[(f64, f64)], fast_rad_s: f64) -> f64 {
+    let ratios: Vec<f64> = pairs
+        .iter()
+        .filter(|(_, derived)| derived.abs() > fast_rad_s / 3.0)
+        .map(|(logged, derived)| logged / derived)
+        .collect();
+    median(&ratios)
+}
+
+/// The step of the uniform series that lags are sought on \[s\]: the log's own, but not below 1 ms, as
+/// the parabola refines the lag far below the step and the derivatives hold nothing faster.
+fn lag_step_s(step_s: f64) -> f64 {
+    step_s.max(0.001)
+}
+
+/// The longest lag to look at, in samples.
+fn reach(step_s: f64) -> isize {
+    (MAX_LAG_S / lag_step_s(step_s)).ceil().max(2.0) as isize
+}
+
+fn velocity_lag(motion: &Motion, step_s: f64) -> Option<Lag> {
+    let uniform = |values: &[f64]| resample(&motion.time, values, lag_step_s(step_s));
+    let (derived, logged) = (uniform(&motion.velocity), uniform(&motion.qd));
+    let ones = vec![1.0; derived.len()];
+    let reach = reach(step_s);
+    lag(&derived, &logged, &[ones], -reach..=reach)
+}
+
+/// Finds how the acceleration of a joint trails its torque.
+///
+/// By itself the acceleration of a swinging joint follows gravity more than torque, and under feedback
+/// the torque follows the motion. So what is linear in the sine and cosine of the angles, in the
+/// velocities and their signs, and in the other joints' accelerations, is taken out of both first.
+///
+/// `fast_rad_s` holds the fast speed of every joint.
+pub(super) fn torque_lag(
+    motions: &[Motion],
+    fast_rad_s: &[f64],
+    joint: usize,
+    step_s: f64,
+) -> Option<TorqueLag> {
+    let uniform = |values: &[f64]| resample(&motions[joint].time, values, lag_step_s(step_s));
+    let mut basis = vec![vec![1.0; uniform(&motions[joint].q).len()]];
+    for (other, motion) in motions.iter().enumerate() {
+        let angle = uniform(&motion.q);
+        let velocity = uniform(&motion.velocity);
+        // Smooth over a tenth of the working speed, as a jump would be a feature of the noise at rest.
+        let width = 0.1 * fast_rad_s[other] + f64::MIN_POSITIVE;
+        basis.push(velocity.iter().map(|v| (v / width).tanh()).collect());
+        basis.push(angle.iter().map(|q| q.sin()).collect());
+        basis.push(angle.iter().map(|q| q.cos()).collect());
+        basis.push(velocity);
+        if other != joint {
+            basis.push(uniform(&motion.acceleration));
+        }
+    }
+    let (tau, acceleration) = (
+        uniform(&motions[joint].tau),
+        uniform(&motions[joint].acceleration),
+    );
+    let found = lag(
+        &tau,
+        &acceleration,
+        &basis,
+        -MAX_TORQUE_LEAD..=reach(step_s),
+    )?;
+    let clear = found.correlation >= MIN_TORQUE_CORRELATION && !found.at_edge;
+    clear.then_some(TorqueLag {
+        lag_s: found.samples * lag_step_s(step_s) - 0.5 * step_s,
+        correlation: found.correlation,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::joint::{JointAudit, audit_joints};
+    use super::super::tests::{one_joint, swing};
+    use crate::data::log::Log;
+
+    fn joint(log: &Log) -> JointAudit {
+        audit_joints(log).remove(0)
+    }
+
+    #[test]
+    fn a_consistent_velocity_has_scale_one_and_no_lag() {
+        let joint = joint(&swing());
+        let check = joint.velocity.unwrap();
+        assert!((check.scale - 1.0).abs() < 1e-3, "{check:?}");
+        assert!(
+            check.lag_s.abs() < 1e-4 && check.correlation > 0.999,
+            "{check:?}"
+        );
+        assert_eq!(joint.qd.spikes, 0);
+    }
+
+    #[test]
+    fn scale_lag_and_spikes_of_a_velocity_are_found_together() {
+        let mut log = swing();
+        let exact = log.qd[0].clone();
+        for row in 3..log.rows() {
+            // Degrees, three rows late.
+            log.qd[0][row] = exact[row - 3].to_degrees();
+        }
+        (0..20).for_each(|i| log.qd[0][400 + 200 * i] += 300.0);
+        let joint = joint(&log);
+        let check = joint.velocity.unwrap();
+        assert!((check.scale / 57.2958 - 1.0).abs() < 0.01, "{check:?}");
+        assert!((check.lag_s - 0.006).abs() < 2e-4, "{check:?}");
+        assert_eq!(joint.qd.spikes, 20);
+        assert!((check.worst_rad_s - 300.0).abs() < 10.0);
+    }
+
+    #[test]
+    fn a_backward_difference_lags_half_a_step() {
+        let mut log = swing();
+        for row in 1..log.rows() {
+            log.qd[0][row] = (log.q[0][row] - log.q[0][row - 1]) / 0.002;
+        }
+        let lag = joint(&log).velocity.unwrap().lag_s;
+        assert!((lag - 0.001).abs() < 1e-4, "{lag}");
+    }
+
+    /// A joint with damping and gravity, driven by noise that is held over each step and acts `delay`
+    /// steps late.
+    fn driven(delay: usize) -> Log {
+        let (rows, step) = (6000, 0.002);
+        let mut torque = vec![0.0; rows];
+        let mut state = 1_u32;
+        for row in (0..rows - 10).step_by(10) {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            torque[row..row + 10].fill(f64::from(state) / 2.0_f64.powi(31) - 1.0);
+        }
+        let (mut q, mut v) = (0.0_f64, 0.0);
+        let (mut qs, mut vs) = (vec![], vec![]);
+        for row in 0..rows {
+            qs.push(q);
+            vs.push(v);
+            let held = if row < delay {
+                0.0
+            } else {
+                torque[row - delay]
+            };
+            for _ in 0..20 {
+                v += step / 20.0 * (-15.0 * q.sin() - 0.5 * v + 20.0 * held);
+                q += step / 20.0 * v;
+            }
+        }
+        let time = (0..rows).map(|row| row as f64 * step).collect();
+        one_joint(time, qs, vs, torque)
+    }
+
+    #[test]
+    fn the_torque_lag_is_the_delay_alone() {
+        for delay in [0, 4] {
+            let found = joint(&driven(delay)).torque_lag.unwrap();
+            assert!(
+                (found.lag_s - 0.002 * delay as f64).abs() < 5e-4,
+                "{delay}: {found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_passive_joint_has_no_torque_lag() {
+        let mut log = swing();
+        log.tau[0].fill(0.0);
+        assert_eq!(joint(&log).torque_lag, None);
+    }
+}

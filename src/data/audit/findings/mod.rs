@@ -1,0 +1,279 @@
+//! What the measured quality of a log means for fitting a model to it, in plain sentences.
+
+mod torque;
+mod velocity;
+
+use super::table::short;
+use super::{Audit, Finding, JointAudit, Severity};
+use crate::data::log::{Interval, Log};
+use Severity::{Info, Serious, Warning};
+
+/// Motion for less than this \[s\] hardly fills one prediction window of 1 s with its ends.
+const LITTLE_MOTION_S: f64 = 2.0;
+
+/// Below this \[s\] not even one window of 0.5 s fits.
+const TOO_LITTLE_MOTION_S: f64 = 0.5;
+
+/// Beyond this, one step in ten or so overruns by a good part of a step, and lags of the order of one
+/// step blur.
+const LARGE_JITTER: f64 = 0.05;
+
+/// A motion of fewer quantisation steps (or noise deviations) than this says little: at rest an
+/// encoder flickers over two or three steps, and a creeping joint over five or six.
+const VISIBLE_STEPS: f64 = 10.0;
+
+/// Beyond this share of bad rows a column is not worth masking row by row.
+const MANY_SPIKES: f64 = 0.01;
+
+/// Fewer bad rows than this share do not move a robust fit.
+const SOME_SPIKES: f64 = 0.001;
+
+/// Beyond this share at rest most rows show static friction at best.
+const MUCH_REST: f64 = 0.5;
+
+/// Beyond this share the logger reads its source more often than that changes.
+const MANY_REPEATS: f64 = 0.2;
+
+/// All findings about a log, the most serious first, otherwise in the order of the joints.
+pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
+    let mut found = Found(vec![]);
+    found.about_reading(log);
+    found.about_sampling(audit);
+    found.about_amount_of_motion(audit);
+    let passive = audit.joints.iter().all(is_passive);
+    if passive {
+        found.add(Info, "all torques are zero throughout: a passive rig; only ratios to the inertia can be found");
+    }
+    for joint in &audit.joints {
+        if !passive {
+            found.about_torque(joint, audit);
+        }
+        if found.moves(joint) {
+            found.about_excitation(joint);
+            found.about_angle(joint, audit.rows);
+            found.about_velocity(joint, audit);
+        }
+    }
+    found.0.sort_by_key(|finding| finding.severity);
+    found.0
+}
+
+fn is_passive(joint: &JointAudit) -> bool {
+    joint.tau.constant && joint.tau.max == 0.0
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", short(100.0 * share))
+}
+
+fn milliseconds(time_s: f64) -> String {
+    format!("{} ms", short(1e3 * time_s))
+}
+
+/// How much a number of bad rows matters.
+fn spike_severity(spikes: usize, rows: usize) -> Severity {
+    let share = spikes as f64 / rows as f64;
+    if share > MANY_SPIKES {
+        Serious
+    } else if share > SOME_SPIKES {
+        Warning
+    } else {
+        Info
+    }
+}
+
+struct Found(Vec<Finding>);
+
+impl Found {
+    fn add(&mut self, severity: Severity, text: impl Into<String>) {
+        let text = text.into();
+        self.0.push(Finding { severity, text });
+    }
+
+    fn about_reading(&mut self, log: &Log) {
+        for note in &log.notes {
+            self.add(Info, note.clone());
+        }
+        if !log.leave_out.is_empty() {
+            let intervals: Vec<String> = log.leave_out.iter().map(Interval::to_string).collect();
+            self.add(
+                Info,
+                format!("left out, but audited: {}", intervals.join(", ")),
+            );
+        }
+    }
+
+    fn about_sampling(&mut self, audit: &Audit) {
+        let Audit {
+            gaps,
+            jitter,
+            min_step_s,
+            max_step_s,
+            ..
+        } = audit;
+        if let Some(longest) = gaps
+            .iter()
+            .max_by(|a, b| a.length_s().total_cmp(&b.length_s()))
+        {
+            self.add(
+                Warning,
+                format!(
+                    "{} gap(s), the longest of {} s at t = {} s: leave out what lies in them ({}@{}-{})",
+                    gaps.len(),
+                    short(longest.length_s()),
+                    short(longest.start_s),
+                    audit.log,
+                    longest.start_s,
+                    longest.end_s
+                ),
+            );
+        }
+        if *jitter > LARGE_JITTER {
+            self.add(
+                Warning,
+                format!(
+                    "the steps vary by {} of their median ({} to {}): delays shorter than the longest \
+                     step cannot be trusted; log from a real-time loop",
+                    percent(*jitter),
+                    milliseconds(*min_step_s),
+                    milliseconds(*max_step_s)
+                ),
+            );
+        }
+    }
+
+    fn about_amount_of_motion(&mut self, audit: &Audit) {
+        let moving_s = |joint: &JointAudit| audit.duration_s * (1.0 - joint.share_at_rest);
+        let motion_s = audit.joints.iter().map(moving_s).fold(0.0, f64::max);
+        let severity = if motion_s < TOO_LITTLE_MOTION_S {
+            Serious
+        } else if motion_s < LITTLE_MOTION_S {
+            Warning
+        } else {
+            return;
+        };
+        self.add(
+            severity,
+            format!(
+                "only {} s of motion: add logs, or record for longer",
+                short(motion_s)
+            ),
+        );
+    }
+
+    /// Whether a joint moves at all; says so if not.
+    fn moves(&mut self, joint: &JointAudit) -> bool {
+        let q = &joint.q;
+        let visible = VISIBLE_STEPS * q.resolution.max(q.noise_std);
+        let moves = !q.constant && q.range() >= visible;
+        if !moves {
+            self.add(
+                Serious,
+                format!(
+                    "joint {} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or noise \
+                     deviations: its parameters will not be identifiable from this log",
+                    joint.joint,
+                    short(q.range())
+                ),
+            );
+        }
+        moves
+    }
+
+    fn about_excitation(&mut self, joint: &JointAudit) {
+        let name = &joint.q.name;
+        if joint.reversals == 0 {
+            self.add(
+                Warning,
+                format!(
+                    "{name} never reverses: dry friction cannot be told from a constant torque; move \
+                     both ways"
+                ),
+            );
+        }
+        if joint.share_at_rest > MUCH_REST {
+            self.add(
+                Info,
+                format!(
+                    "joint {} is at rest in {} of the rows",
+                    joint.joint,
+                    percent(joint.share_at_rest)
+                ),
+            );
+        }
+    }
+
+    fn about_angle(&mut self, joint: &JointAudit, rows: usize) {
+        let name = &joint.q.name;
+        if joint.q.spikes > 0 {
+            self.add(
+                spike_severity(joint.q.spikes, rows),
+                format!(
+                    "{name} has {} single-row spike(s): check the encoder's wiring",
+                    joint.q.spikes
+                ),
+            );
+        }
+        if joint.repeated_fraction > MANY_REPEATS {
+            self.add(
+                Serious,
+                format!(
+                    "{name} repeats the row before in {} of the rows in motion: the log is written \
+                     faster than the encoder is read; keep only the rows that changed",
+                    percent(joint.repeated_fraction)
+                ),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::audit;
+    use super::super::tests::{one_joint, swing};
+    use super::*;
+
+    /// Whether the audit says something of this severity that holds all the given words.
+    pub(super) fn says(log: &Log, severity: Severity, words: &[&str]) -> bool {
+        let audit = audit(log);
+        let fits = |finding: &Finding| {
+            finding.severity == severity && words.iter().all(|word| finding.text.contains(word))
+        };
+        audit.findings.iter().any(fits)
+    }
+
+    #[test]
+    fn a_good_log_draws_no_warning() {
+        let findings = audit(&swing()).findings;
+        assert!(
+            findings.iter().all(|finding| finding.severity == Info),
+            "{findings:?}"
+        );
+    }
+
+    #[test]
+    fn motions_that_show_little_are_named() {
+        let time: Vec<f64> = (0..700).map(|i| i as f64 * 0.002).collect();
+        let log = one_joint(time.clone(), time.clone(), vec![1.0; 700], time.clone());
+        assert!(says(&log, Warning, &["q1 never reverses"]));
+        assert!(says(&log, Warning, &["only 1.398", "s of motion"]));
+        let still = one_joint(time.clone(), vec![0.5; 700], vec![0.0; 700], time);
+        assert!(says(&still, Serious, &["joint 1 moves by 0 rad"]));
+    }
+
+    #[test]
+    fn sampling_faults_come_with_their_remedy() {
+        let mut log = swing();
+        log.time.iter_mut().skip(2500).for_each(|t| *t += 0.2);
+        assert!(says(
+            &log,
+            Warning,
+            &[
+                "1 gap(s), the longest of 0.202 s at t = 4.998 s",
+                "rig.csv@4.998-"
+            ]
+        ));
+        log.notes.push("columns ignored: \"mode\"".to_owned());
+        assert!(says(&log, Info, &["columns ignored"]));
+    }
+}

@@ -1,0 +1,186 @@
+//! One joint: whether its channels agree with each other, and what its motion can show.
+
+use serde::Serialize;
+
+use super::channel::{Channel, isolated_spikes};
+use super::compare::{Speeds, TorqueLag, VelocityCheck, torque_lag, velocity_check};
+use super::motion::Motion;
+use crate::data::local_cubic::{LocalCubic, half_width_s};
+use crate::data::log::Log;
+use crate::data::signal::quantile;
+
+/// Slower than this share of the fast speed counts as rest.
+const REST_SHARE_OF_FAST: f64 = 0.01;
+
+/// One joint of a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointAudit {
+    /// Number of the joint, from 1.
+    pub joint: usize,
+    /// The angle \[rad\].
+    pub q: Channel,
+    /// The velocity as logged \[rad/s\].
+    pub qd: Channel,
+    /// The torque \[N m\].
+    pub tau: Channel,
+    /// How the logged velocity compares with the derivative of the angle; `None` where one of them
+    /// stands still, the joint is too slow to be told from one at rest, or the log is too short.
+    pub velocity: Option<VelocityCheck>,
+    /// How the acceleration trails the torque; `None` where the torque is constant, or too little of
+    /// the acceleration follows it to tell.
+    pub torque_lag: Option<TorqueLag>,
+    /// How often the motion changes direction, jitter about rest not counted.
+    pub reversals: usize,
+    /// Share of the rows at rest: slower than 1 % of the fast speed, or than three standard deviations
+    /// of what noise on the angle looks like as a velocity.
+    pub share_at_rest: f64,
+    /// Speed that 95 % of the rows stay below \[rad/s\], from the angles.
+    pub fast_rad_s: f64,
+    /// Whether the angle covers a full turn.
+    pub covers_full_turn: bool,
+    /// Share of the rows in motion that repeat the angle of the row before although it should have
+    /// moved by two steps of its resolution: a logger that is faster than its source.
+    pub repeated_fraction: f64,
+}
+
+/// Audits every joint of a log.
+pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
+    let motions: Vec<Motion> = (0..log.joints())
+        .map(|joint| Motion::of(log, joint))
+        .collect();
+    let mut joints: Vec<JointAudit> = (0..log.joints())
+        .map(|joint| JointAudit::of(log, joint, &motions[joint]))
+        .collect();
+    for joint in 0..log.joints() {
+        let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
+        joints[joint].torque_lag = torque_lag(&motions, &fast, joint, log.median_step());
+    }
+    joints
+}
+
+impl JointAudit {
+    /// All but the torque's lag, which needs the other joints as well.
+    fn of(log: &Log, joint: usize, motion: &Motion) -> Self {
+        let number = joint + 1;
+        let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
+        let channel =
+            |kind: &str, values, spikes| Channel::of(format!("{kind}{number}"), values, spikes);
+        let q_channel = channel("q", q, isolated_spikes(q));
+        let qd_channel = channel("qd", qd, 0);
+        // A log too short for derivatives still has a speed: the logged one.
+        let velocity = if motion.rows() > 0 {
+            &motion.velocity
+        } else {
+            qd
+        };
+        let speeds: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
+        let fast_rad_s = quantile(&speeds, 0.95);
+        let rest_rad_s = rest_speed(&q_channel, fast_rad_s, log.median_step());
+        let range = Speeds {
+            rest_rad_s,
+            fast_rad_s,
+        };
+        let (check, spikes) = velocity_check(motion, &qd_channel, range, log.median_step());
+        let at_rest = speeds.iter().filter(|speed| **speed <= rest_rad_s).count();
+        Self {
+            joint: number,
+            velocity: check,
+            torque_lag: None,
+            reversals: reversals(velocity, rest_rad_s),
+            share_at_rest: at_rest as f64 / speeds.len().max(1) as f64,
+            fast_rad_s,
+            covers_full_turn: q_channel.range() >= std::f64::consts::TAU,
+            repeated_fraction: repeated_fraction(motion, rest_rad_s, &q_channel, log.median_step()),
+            q: q_channel,
+            qd: Channel {
+                spikes,
+                ..qd_channel
+            },
+            tau: channel("tau", tau, isolated_spikes(tau)),
+        }
+    }
+}
+
+/// The speed below which a joint cannot be told from one at rest \[rad/s\].
+fn rest_speed(q: &Channel, fast_rad_s: f64, step_s: f64) -> f64 {
+    let half_width = half_width_s(step_s);
+    let rows = 1.0 + 2.0 * half_width / step_s;
+    // Rounding to a step is noise of 1/sqrt(12) steps.
+    let noise = q.noise_std.max(q.resolution / 12.0_f64.sqrt());
+    let of_noise = 3.0 * noise * LocalCubic::slope_noise_gain(half_width, rows);
+    of_noise.max(REST_SHARE_OF_FAST * fast_rad_s)
+}
+
+/// Changes of direction, where both directions are faster than `rest`.
+fn reversals(velocity: &[f64], rest: f64) -> usize {
+    let moving: Vec<f64> = velocity
+        .iter()
+        .copied()
+        .filter(|v| v.abs() > rest)
+        .collect();
+    moving
+        .windows(2)
+        .filter(|pair| pair[0] * pair[1] < 0.0)
+        .count()
+}
+
+fn repeated_fraction(motion: &Motion, rest: f64, q: &Channel, step_s: f64) -> f64 {
+    let visible = (2.0 * q.resolution / step_s).max(rest);
+    let moving = (0..motion.rows()).filter(|&row| motion.velocity[row].abs() > visible);
+    let (mut rows, mut repeated) = (0_usize, 0_usize);
+    for row in moving {
+        rows += 1;
+        repeated += usize::from(motion.moved[row] == 0.0);
+    }
+    repeated as f64 / rows.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{one_joint, swing};
+    use super::*;
+
+    fn joint(log: &Log) -> JointAudit {
+        audit_joints(log).remove(0)
+    }
+
+    #[test]
+    fn reversals_turns_and_rest_are_counted() {
+        let time: Vec<f64> = (0..8000).map(|i| i as f64 * 0.001).collect();
+        // Two swings over 8 rad, then rest with the jitter of one encoder step.
+        let angle = |i: usize| {
+            if i < 4000 {
+                4.0 * (time[i] * std::f64::consts::PI).cos()
+            } else {
+                4.0
+            }
+        };
+        let jitter = |i: usize| 0.001 * f64::from(u8::from(i.is_multiple_of(7)));
+        let q = (0..8000)
+            .map(|i| ((angle(i) + jitter(i)) / 0.001).round() * 0.001)
+            .collect();
+        let joint = joint(&one_joint(
+            time.clone(),
+            q,
+            vec![0.0; 8000],
+            vec![0.0; 8000],
+        ));
+        assert_eq!(joint.reversals, 3);
+        assert!(joint.covers_full_turn);
+        assert!(
+            (joint.share_at_rest - 0.5).abs() < 0.05,
+            "{}",
+            joint.share_at_rest
+        );
+        assert_eq!(joint.velocity, None);
+    }
+
+    #[test]
+    fn a_logger_that_repeats_its_source_is_seen() {
+        let mut log = swing();
+        assert!(joint(&log).repeated_fraction < 0.01);
+        let exact = log.q[0].clone();
+        (0..log.rows()).for_each(|row| log.q[0][row] = exact[row - row % 2]);
+        assert!((joint(&log).repeated_fraction - 0.5).abs() < 0.05);
+    }
+}

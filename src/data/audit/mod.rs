@@ -1,0 +1,197 @@
+//! What a log is good for: sampling, noise, spikes, lags and excitation, measured before any fit.
+//!
+//! The audit reads the log alone and no model. It changes nothing: what it finds is told, and the
+//! fit decides. Intervals that are left out are read like all others.
+
+mod channel;
+mod compare;
+mod findings;
+mod joint;
+mod motion;
+mod table;
+
+use serde::Serialize;
+
+pub use channel::Channel;
+pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
+pub use joint::JointAudit;
+
+use super::log::{Interval, Log};
+use super::signal::{differences, median};
+
+/// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
+/// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
+const GAP_STEPS: f64 = 5.0;
+
+/// The quality of one log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Audit {
+    /// The log's file name.
+    pub log: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// Time from the first to the last row \[s\].
+    pub duration_s: f64,
+    /// Median time between neighbouring rows \[s\].
+    pub median_step_s: f64,
+    /// Shortest time between neighbouring rows \[s\].
+    pub min_step_s: f64,
+    /// Longest time between neighbouring rows \[s\].
+    pub max_step_s: f64,
+    /// Standard deviation of the steps over the median step, gaps not counted.
+    pub jitter: f64,
+    /// Steps longer than five median steps.
+    pub gaps: Vec<Interval>,
+    /// One entry a joint.
+    pub joints: Vec<JointAudit>,
+    /// What an engineer should know before fitting, the most serious first.
+    pub findings: Vec<Finding>,
+}
+
+/// How much a finding matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Results will be wrong or cannot be had from this log unless something is done.
+    Serious,
+    /// Results will be poorer, or some effects cannot be told apart.
+    Warning,
+    /// Good to know.
+    Info,
+}
+
+/// One plain sentence about a log, with its evidence and, where there is one, its remedy.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// How much it matters.
+    pub severity: Severity,
+    /// The sentence.
+    pub text: String,
+}
+
+/// Measures the quality of a log.
+///
+/// Works on any log that [`Log::read`] returns; quantities that need more rows or more motion than
+/// the log has are `None` or 0, as their documentation says.
+pub fn audit(log: &Log) -> Audit {
+    let steps = differences(&log.time);
+    let median_step_s = median(&steps);
+    let is_gap = |step: &f64| *step > GAP_STEPS * median_step_s;
+    let gaps = log
+        .time
+        .windows(2)
+        .filter(|pair| is_gap(&(pair[1] - pair[0])))
+        .map(|pair| Interval {
+            start_s: pair[0],
+            end_s: pair[1],
+        });
+    let regular: Vec<f64> = steps.iter().copied().filter(|step| !is_gap(step)).collect();
+    let mut audit = Audit {
+        log: log.name(),
+        rows: log.rows(),
+        duration_s: log.duration(),
+        median_step_s,
+        min_step_s: steps.iter().copied().reduce(f64::min).unwrap_or(0.0),
+        max_step_s: steps.iter().copied().reduce(f64::max).unwrap_or(0.0),
+        jitter: relative_deviation(&regular, median_step_s),
+        gaps: gaps.collect(),
+        joints: joint::audit_joints(log),
+        findings: vec![],
+    };
+    audit.findings = findings::of(&audit, log);
+    audit
+}
+
+/// Standard deviation of the steps over their median; 0 for no steps.
+fn relative_deviation(steps: &[f64], median_step_s: f64) -> f64 {
+    if steps.is_empty() {
+        return 0.0;
+    }
+    let count = steps.len() as f64;
+    let mean = steps.iter().sum::<f64>() / count;
+    let variance = steps.iter().map(|step| (step - mean).powi(2)).sum::<f64>() / count;
+    variance.sqrt() / median_step_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn one_joint(time: Vec<f64>, q: Vec<f64>, qd: Vec<f64>, tau: Vec<f64>) -> Log {
+        Log {
+            path: "rig.csv".into(),
+            time,
+            q: vec![q],
+            qd: vec![qd],
+            tau: vec![tau],
+            leave_out: vec![],
+            notes: vec![],
+        }
+    }
+
+    fn uniform(rows: usize, step_s: f64) -> Vec<f64> {
+        (0..rows).map(|row| row as f64 * step_s).collect()
+    }
+
+    /// A swing q = sin(3t) + 0.4 sin(7.3t) whose torque is its acceleration, sampled at 500 Hz.
+    pub(super) fn swing() -> Log {
+        let time = uniform(5000, 0.002);
+        let over = |f: fn(f64) -> f64| time.iter().map(|t| f(*t)).collect();
+        let q = over(|t| (3.0 * t).sin() + 0.4 * (7.3 * t).sin());
+        let qd = over(|t| 3.0 * (3.0 * t).cos() + 2.92 * (7.3 * t).cos());
+        let tau = over(|t| -9.0 * (3.0 * t).sin() - 21.316 * (7.3 * t).sin());
+        one_joint(time, q, qd, tau)
+    }
+
+    #[test]
+    fn sampling_is_measured_apart_from_gaps() {
+        let mut log = swing();
+        log.time.iter_mut().skip(2500).for_each(|t| *t += 0.2);
+        let audit = audit(&log);
+        assert_eq!(audit.gaps.len(), 1);
+        assert!((audit.gaps[0].length_s() - 0.202).abs() < 1e-9);
+        assert!(audit.jitter < 1e-9 && (audit.max_step_s - 0.202).abs() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_is_too_small_or_too_dull_to_audit() {
+        for rows in [2, 3, 5, 10, 30] {
+            let still = one_joint(
+                uniform(rows, 0.01),
+                vec![1.0; rows],
+                vec![0.0; rows],
+                vec![0.0; rows],
+            );
+            let ramp = one_joint(
+                uniform(rows, 0.01),
+                uniform(rows, 0.1),
+                vec![10.0; rows],
+                vec![1.0; rows],
+            );
+            for log in [still, ramp] {
+                let audit = audit(&log);
+                assert!(!audit.findings.is_empty());
+                assert!(!audit.to_string().contains("NaN"), "{audit}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_clock_that_jumps_by_years_costs_no_memory() {
+        let mut log = swing();
+        log.time.iter_mut().skip(2500).for_each(|t| *t += 1e9);
+        let audit = audit(&log);
+        assert_eq!((audit.gaps.len(), audit.joints[0].velocity), (1, None));
+    }
+
+    #[test]
+    fn irregular_sampling_is_audited() {
+        let mut log = swing();
+        let late = |row: usize| 0.0009 * ((row * 7919) % 13) as f64 / 13.0;
+        log.time
+            .iter_mut()
+            .enumerate()
+            .for_each(|(row, t)| *t += late(row));
+        assert!(audit(&log).jitter > 0.1);
+    }
+}

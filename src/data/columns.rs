@@ -1,0 +1,333 @@
+//! Which column of a file holds which channel.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::error::LogError;
+
+/// Names under which a log file holds time, angles, velocities and torques.
+///
+/// This is the `[columns]` table of a model file. An empty list stands for the standard names
+/// (`q1..`, `qd1..`, `tau1..`), so that a model file has to name only what differs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Columns {
+    /// Column of the time \[s\].
+    pub time: String,
+    /// Columns of the joint angles \[rad\], joint 1 first.
+    pub q: Vec<String>,
+    /// Columns of the joint velocities \[rad/s\], joint 1 first.
+    pub qd: Vec<String>,
+    /// Columns of the joint torques \[N m\], joint 1 first.
+    pub tau: Vec<String>,
+}
+
+impl Default for Columns {
+    /// `time`, and the standard names for however many joints the model has.
+    fn default() -> Self {
+        Self {
+            time: "time".to_owned(),
+            q: vec![],
+            qd: vec![],
+            tau: vec![],
+        }
+    }
+}
+
+impl Columns {
+    /// The standard names `time`, `q1..`, `qd1..`, `tau1..` for a number of joints.
+    pub fn standard(joints: usize) -> Self {
+        Self {
+            q: numbered("q", joints),
+            qd: numbered("qd", joints),
+            tau: numbered("tau", joints),
+            ..Self::default()
+        }
+    }
+
+    /// All names: time, angles, velocities, torques.
+    pub(super) fn in_file_order(&self) -> impl Iterator<Item = &String> {
+        std::iter::once(&self.time)
+            .chain(&self.q)
+            .chain(&self.qd)
+            .chain(&self.tau)
+    }
+
+    /// These names with every empty list filled with the standard names.
+    fn completed(&self, joints: usize, path: &Path) -> Result<Columns, LogError> {
+        let list = |list: &'static str, names: &Vec<String>| match names.len() {
+            0 => Ok(numbered(list, joints)),
+            named if named == joints => Ok(names.clone()),
+            named => Err(LogError::Mapping {
+                path: path.to_owned(),
+                list,
+                named,
+                joints,
+            }),
+        };
+        Ok(Columns {
+            time: self.time.clone(),
+            q: list("q", &self.q)?,
+            qd: list("qd", &self.qd)?,
+            tau: list("tau", &self.tau)?,
+        })
+    }
+}
+
+fn numbered(prefix: &str, joints: usize) -> Vec<String> {
+    (1..=joints)
+        .map(|joint| format!("{prefix}{joint}"))
+        .collect()
+}
+
+/// The header of a file, and where it stands.
+pub(super) struct Header<'a> {
+    pub path: &'a Path,
+    pub line: usize,
+    pub names: Vec<String>,
+}
+
+/// Where in a row the channels stand, as indices into the row's cells.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    pub time: usize,
+    pub q: Vec<usize>,
+    pub qd: Vec<usize>,
+    /// `None` for the log of a passive rig, which has no torque columns.
+    pub tau: Option<Vec<usize>>,
+    /// Names of the columns that nothing reads.
+    pub ignored: Vec<String>,
+}
+
+impl Header<'_> {
+    /// Finds the columns of a model with `joints` joints.
+    pub fn layout(&self, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
+        self.check_is_a_header()?;
+        let columns = columns.completed(joints, self.path)?;
+        if columns == Columns::standard(joints) {
+            self.check_joint_count(joints)?;
+        }
+        let all = |names: &[String], list| {
+            let find = |name: &String| self.find(name, list, &columns);
+            names.iter().map(find).collect::<Result<Vec<_>, _>>()
+        };
+        let passive = columns.tau == numbered("tau", joints) && self.has_no_torque();
+        Ok(Layout {
+            time: self.find(&columns.time, "time", &columns)?,
+            q: all(&columns.q, "q")?,
+            qd: all(&columns.qd, "qd")?,
+            tau: if passive {
+                None
+            } else {
+                Some(all(&columns.tau, "tau")?)
+            },
+            ignored: self.others(&columns),
+        })
+    }
+
+    fn check_is_a_header(&self) -> Result<(), LogError> {
+        let (path, line) = (self.path.to_owned(), self.line);
+        if self.names.iter().all(|name| name.parse::<f64>().is_ok()) {
+            return Err(LogError::NoHeader { path, line });
+        }
+        match self.names.as_slice() {
+            [only] => match only.find([';', '\t', '|']) {
+                Some(at) => Err(LogError::Separator {
+                    path,
+                    line,
+                    separator: char::from(only.as_bytes()[at]),
+                }),
+                None => Ok(()),
+            },
+            _ => Ok(()),
+        }
+    }
+
+    /// A header with another number of complete joints is most likely the log of another rig. Where
+    /// only one of a joint's columns lacks, its name is the likelier fault, and `find` tells that.
+    fn check_joint_count(&self, joints: usize) -> Result<(), LogError> {
+        let has = |name: String| self.names.contains(&name);
+        let header = (1..).take_while(|joint| has(format!("q{joint}"))).count();
+        let next = header + 1;
+        let next_is_absent = !has(format!("qd{next}")) && !has(format!("tau{next}"));
+        if header > joints || (0 < header && header < joints && next_is_absent) {
+            return Err(LogError::JointCount {
+                path: self.path.to_owned(),
+                line: self.line,
+                header,
+                model: joints,
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether no column looks like a torque. A torque under an unexpected name must not turn a
+    /// driven rig into a passive one unseen.
+    fn has_no_torque(&self) -> bool {
+        let like_torque = |name: &String| {
+            let name = name.to_lowercase();
+            ["tau", "torque", "effort"]
+                .iter()
+                .any(|word| name.contains(word))
+        };
+        !self.names.iter().any(like_torque)
+    }
+
+    fn find(&self, name: &String, list: &str, columns: &Columns) -> Result<usize, LogError> {
+        let mut places = (0..self.names.len()).filter(|&index| self.names[index] == *name);
+        let (path, line, column) = (self.path.to_owned(), self.line, name.clone());
+        match (places.next(), places.next()) {
+            (Some(index), None) => Ok(index),
+            (Some(_), Some(_)) => Err(LogError::DuplicateColumn { path, line, column }),
+            (None, _) => Err(LogError::MissingColumn {
+                path,
+                line,
+                column,
+                remedy: self.remedy(name, list, &self.others(columns)),
+            }),
+        }
+    }
+
+    /// Points to the nearest of the names that are `free` (no other channel's) where one is near, and
+    /// to all names otherwise.
+    fn remedy(&self, wanted: &str, list: &str, free: &[String]) -> String {
+        let nearest = free
+            .iter()
+            .map(|name| (likeness(name, wanted), name))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(likeness, _)| *likeness >= 0.5)
+            .map(|(_, name)| name);
+        let example = nearest.map_or("NAME", String::as_str);
+        let entry = match list {
+            "time" => format!("time = {example:?}"),
+            list => format!("{list} = [{example:?}]"),
+        };
+        let known = match nearest {
+            Some(name) => format!("did you mean {name:?}?"),
+            None => format!("the header has {}.", self.names.join(", ")),
+        };
+        format!("{known} Rename it, or name it under [columns] in the model file: {entry}")
+    }
+
+    fn others(&self, columns: &Columns) -> Vec<String> {
+        let used = |name: &&String| columns.in_file_order().any(|wanted| wanted == *name);
+        let unused = self.names.iter().filter(|name| !used(name));
+        unused.cloned().collect()
+    }
+}
+
+/// 1 for the same name but for case, 0 for nothing in common; a swap of neighbours (`dq1` for `qd1`)
+/// counts as one change.
+fn likeness(a: &str, b: &str) -> f64 {
+    strsim::normalized_damerau_levenshtein(&a.to_lowercase(), &b.to_lowercase())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(header: &str, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
+        let header = Header {
+            path: Path::new("rig.csv"),
+            line: 1,
+            names: header.split(',').map(str::to_owned).collect(),
+        };
+        header.layout(joints, columns)
+    }
+
+    fn message(header: &str, joints: usize) -> String {
+        layout(header, joints, &Columns::default())
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn order_is_free_and_extra_columns_are_named() {
+        let found = layout("tau1,note,qd1,q1,time", 1, &Columns::default()).unwrap();
+        let expected = Layout {
+            time: 4,
+            q: vec![3],
+            qd: vec![2],
+            tau: Some(vec![0]),
+            ignored: vec!["note".to_owned()],
+        };
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_near_name_is_suggested_with_its_mapping() {
+        assert_eq!(
+            message("time,q1,dq1,tau1", 1),
+            "rig.csv, line 1: there is no column \"qd1\"; did you mean \"dq1\"? Rename it, or name it \
+             under [columns] in the model file: qd = [\"dq1\"]"
+        );
+        assert!(
+            message("Time,q1,qd1,tau1", 1).ends_with("in the model file: time = \"Time\""),
+            "{}",
+            message("Time,q1,qd1,tau1", 1)
+        );
+        assert!(message("time,angle,qd1", 1).contains("the header has time, angle, qd1."));
+    }
+
+    #[test]
+    fn another_number_of_joints_is_told_as_such() {
+        let more = message("time,q1,q2,qd1,qd2,tau1,tau2", 1);
+        assert!(
+            more.contains("has 2 joint(s) (q1 to q2) but the model has 1"),
+            "{more}"
+        );
+        let fewer = message("time,q1,qd1,tau1", 2);
+        assert!(
+            fewer.contains("has 1 joint(s) (q1 to q1) but the model has 2"),
+            "{fewer}"
+        );
+        let misspelt = message("time,q1,Q2,qd1,qd2,tau1,tau2", 2);
+        assert!(misspelt.contains("did you mean \"Q2\"?"), "{misspelt}");
+    }
+
+    #[test]
+    fn a_mapping_chooses_one_joint_of_many() {
+        let columns = Columns {
+            q: vec!["q2".into()],
+            qd: vec!["qd2".into()],
+            tau: vec!["tau2".into()],
+            ..Columns::default()
+        };
+        let found = layout("time,q1,q2,qd1,qd2,tau1,tau2", 1, &columns).unwrap();
+        assert_eq!(
+            (found.q, found.qd, found.tau),
+            (vec![2], vec![4], Some(vec![6]))
+        );
+    }
+
+    #[test]
+    fn only_a_header_without_any_torque_is_passive() {
+        assert_eq!(
+            layout("time,q1,qd1", 1, &Columns::default()).unwrap().tau,
+            None
+        );
+        assert!(message("time,q1,qd1,torque_1", 1).contains("there is no column \"tau1\""));
+        assert!(message("time,q1,q2,qd1,qd2,tau1", 2).contains("there is no column \"tau2\""));
+    }
+
+    #[test]
+    fn mappings_of_the_wrong_length_and_twins_are_errors() {
+        let columns = Columns {
+            tau: vec!["a".into(), "b".into()],
+            ..Columns::default()
+        };
+        let error = layout("time,q1,qd1,a,b", 1, &columns).unwrap_err();
+        assert!(
+            error.to_string().contains("names 2 column(s) for `tau`"),
+            "{error}"
+        );
+        assert!(message("time,q1,q1,qd1,tau1", 1).contains("column \"q1\" occurs more than once"));
+    }
+
+    #[test]
+    fn numbers_and_other_separators_are_no_header() {
+        assert!(message("0,1,2,3", 1).contains("has numbers where the header should be"));
+        assert!(message("time;q1;qd1;tau1", 1).contains("separated by ';'"));
+    }
+}

@@ -1,0 +1,182 @@
+//! What can be wrong with a log file, in words that let its owner repair it.
+
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a log could not be read or written.
+///
+/// Each message is whole in itself: file, line (from 1, as an editor counts), column name, what is
+/// wrong and what to do. None has a source to print beside it.
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// The file cannot be opened or read.
+    #[error("{path}: cannot be read: {why}; check the path and its permissions")]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        why: io::Error,
+    },
+    /// The file cannot be written.
+    #[error("{path}: cannot be written: {why}; check that the folder exists and can be written to")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        why: io::Error,
+    },
+    /// The bytes are not UTF-8 text.
+    #[error("{path}, line {line}: not UTF-8 text; save the log as CSV in UTF-8")]
+    NotUtf8 {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first byte that is not text.
+        line: usize,
+    },
+    /// There is nothing in the file.
+    #[error("{path}: is empty; a log begins with a header such as time,q1,qd1,tau1")]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The first line holds numbers.
+    #[error(
+        "{path}, line {line}: has numbers where the header should be; put column names \
+         such as time,q1,qd1,tau1 above them"
+    )]
+    NoHeader {
+        /// The file.
+        path: PathBuf,
+        /// Line where the header was expected.
+        line: usize,
+    },
+    /// The columns are not separated by commas.
+    #[error(
+        "{path}, line {line}: the columns seem to be separated by {separator:?}; \
+         separate them by commas and write decimal points"
+    )]
+    Separator {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// What seems to separate the columns.
+        separator: char,
+    },
+    /// There are too few rows below the header.
+    #[error("{path}: has {rows} row(s) of numbers below its header; a log needs at least two")]
+    TooFewRows {
+        /// The file.
+        path: PathBuf,
+        /// How many there are: none or one.
+        rows: usize,
+    },
+    /// A column that the model needs is not in the header.
+    #[error("{path}, line {line}: there is no column {column:?}; {remedy}")]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// The name looked for.
+        column: String,
+        /// The nearest name, or all names, and how to map them.
+        remedy: String,
+    },
+    /// A column that the model needs is in the header more than once.
+    #[error("{path}, line {line}: column {column:?} occurs more than once; rename or delete one")]
+    DuplicateColumn {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// The name.
+        column: String,
+    },
+    /// The log and the model have different numbers of joints.
+    #[error(
+        "{path}, line {line}: the header has {header} joint(s) (q1 to q{header}) but the model has \
+         {model}; use the model of this rig, or choose columns under [columns] in the model file"
+    )]
+    JointCount {
+        /// The file.
+        path: PathBuf,
+        /// Line of the header.
+        line: usize,
+        /// Joints in the header.
+        header: usize,
+        /// Joints of the model.
+        model: usize,
+    },
+    /// The model file maps another number of columns than the model has joints.
+    #[error(
+        "[columns] in the model file names {named} column(s) for `{list}` but the model has {joints} \
+         joint(s); name one for each (reading {path})"
+    )]
+    Mapping {
+        /// The log that was to be read.
+        path: PathBuf,
+        /// `q`, `qd` or `tau`.
+        list: &'static str,
+        /// Columns named.
+        named: usize,
+        /// Joints of the model.
+        joints: usize,
+    },
+    /// A row has more or fewer cells than the header.
+    #[error(
+        "{path}, line {line}: has {found} cell(s) where the header has {expected}; give every row one \
+         cell for each column (with decimal points, not commas)"
+    )]
+    Width {
+        /// The file.
+        path: PathBuf,
+        /// The row's line.
+        line: usize,
+        /// Cells in the row.
+        found: usize,
+        /// Cells in the header.
+        expected: usize,
+    },
+    /// A cell does not hold a usable number.
+    #[error("{path}, line {line}, column {column:?}: {fault}")]
+    Cell {
+        /// The file.
+        path: PathBuf,
+        /// The cell's line.
+        line: usize,
+        /// The cell's column, as the header names it.
+        column: String,
+        /// What is wrong with it.
+        fault: CellFault,
+    },
+}
+
+/// What is wrong with one cell.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum CellFault {
+    /// Nothing in it.
+    #[error("is empty; write a number or delete the row")]
+    Empty,
+    /// Text that is not a number; long text is cut.
+    #[error("{0:?} is not a number; write a decimal number such as 0.25")]
+    NotANumber(String),
+    /// NaN, infinity, or a number too large to hold.
+    #[error("{0:?} is not a finite number; delete the row, or cut the log there")]
+    NotFinite(String),
+    /// A time that is not later than the one before.
+    #[error(
+        "time {time} s does not come after {previous} s of line {previous_line}; sort the rows, \
+         drop repeated ones, or cut the file into one log per run"
+    )]
+    NotLater {
+        /// This row's time \[s\].
+        time: f64,
+        /// The previous row's time \[s\].
+        previous: f64,
+        /// The previous row's line.
+        previous_line: usize,
+    },
+}

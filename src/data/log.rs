@@ -1,0 +1,230 @@
+//! One trajectory of a rig, in memory and as a file.
+
+use std::fmt;
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::columns::Columns;
+use super::error::{CellFault, LogError};
+use super::signal::{differences, median};
+
+/// A span of a log's own time, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Where it begins \[s\], on the log's time axis.
+    pub start_s: f64,
+    /// Where it ends \[s\], on the log's time axis.
+    pub end_s: f64,
+}
+
+impl Interval {
+    /// Length \[s\].
+    pub fn length_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { start_s, end_s } = self;
+        write!(f, "{start_s} to {end_s} s")
+    }
+}
+
+/// One trajectory of a rig with N joints.
+///
+/// The channels are indexed `[joint][row]`; each of them has as many rows as `time`, which increases
+/// strictly. [`Log::read`] guarantees this, and that every number is finite; whoever builds a log by
+/// hand has to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// Where the log was read from, as the caller gave it.
+    pub path: PathBuf,
+    /// Time of each row \[s\].
+    pub time: Vec<f64>,
+    /// Joint angles \[rad\], counted through full turns.
+    pub q: Vec<Vec<f64>>,
+    /// Joint velocities \[rad/s\] as the rig reports them.
+    pub qd: Vec<Vec<f64>>,
+    /// Joint torques \[N m\]; row i acts from `time[i]` to `time[i + 1]`.
+    pub tau: Vec<Vec<f64>>,
+    /// Intervals that are neither fitted nor scored, for instance because a person touched the rig.
+    pub leave_out: Vec<Interval>,
+    /// What a reader of the log should know about how it was read, one sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Log {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Time from the first to the last row \[s\]; 0 for a log without rows.
+    pub fn duration(&self) -> f64 {
+        match (self.time.first(), self.time.last()) {
+            (Some(first), Some(last)) => last - first,
+            _ => 0.0,
+        }
+    }
+
+    /// Median time between neighbouring rows \[s\]; 0 for fewer than two rows.
+    pub fn median_step(&self) -> f64 {
+        median(&differences(&self.time))
+    }
+
+    /// The file's name without its folder.
+    pub fn name(&self) -> String {
+        let name = self.path.file_name().unwrap_or(self.path.as_os_str());
+        name.to_string_lossy().into_owned()
+    }
+
+    /// Writes the log as CSV with the standard header `time,q1..,qd1..,tau1..`.
+    ///
+    /// Every number is the shortest text that reads back as the same number. The text goes to a
+    /// temporary name in the same folder that is renamed when complete, so `path` never holds half a
+    /// log. Left-out intervals and notes are not part of the file.
+    ///
+    /// # Errors
+    /// [`LogError::Cell`] for a number that is not finite (no reader would accept it), and
+    /// [`LogError::Write`] if the folder or the file cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), LogError> {
+        let path = path.as_ref();
+        self.check_finite(path)?;
+        let partial = partial_name(path);
+        let written = self
+            .write_rows(&partial)
+            .and_then(|()| fs::rename(&partial, path));
+        written.map_err(|why| {
+            // Best effort: the error worth telling is the first one.
+            let _ = fs::remove_file(&partial);
+            LogError::Write {
+                path: path.to_owned(),
+                why,
+            }
+        })
+    }
+
+    /// The columns in file order.
+    fn columns(&self) -> impl Iterator<Item = &Vec<f64>> {
+        std::iter::once(&self.time)
+            .chain(&self.q)
+            .chain(&self.qd)
+            .chain(&self.tau)
+    }
+
+    fn check_finite(&self, path: &Path) -> Result<(), LogError> {
+        let names = Columns::standard(self.joints());
+        for (name, values) in names.in_file_order().zip(self.columns()) {
+            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+                return Err(LogError::Cell {
+                    path: path.to_owned(),
+                    // The header is line 1.
+                    line: row + 2,
+                    column: name.clone(),
+                    fault: CellFault::NotFinite(values[row].to_string()),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn write_rows(&self, path: &Path) -> io::Result<()> {
+        let mut out = BufWriter::new(fs::File::create(path)?);
+        let names = Columns::standard(self.joints());
+        let header: Vec<&str> = names.in_file_order().map(String::as_str).collect();
+        writeln!(out, "{}", header.join(","))?;
+        for row in 0..self.rows() {
+            // `{:?}` of a float is its shortest text that reads back the same, with an exponent
+            // where the plain digits would be long.
+            let cells: Vec<String> = self
+                .columns()
+                .map(|values| format!("{:?}", values[row]))
+                .collect();
+            writeln!(out, "{}", cells.join(","))?;
+        }
+        out.into_inner()?.sync_all()
+    }
+}
+
+/// A name beside `path`, since renaming is only atomic within one folder. The process number keeps
+/// two programs that write the same log apart.
+fn partial_name(path: &Path) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or(path.as_os_str()));
+    name.push(format!(".{}.partial", std::process::id()));
+    path.with_file_name(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn log() -> Log {
+        Log {
+            path: "rig.csv".into(),
+            time: vec![0.0, 0.1, 0.30000000000000004],
+            q: vec![vec![1.0, -1e-300, 3.5], vec![0.1, 0.2, 1.0 / 3.0]],
+            qd: vec![vec![0.0; 3], vec![1e22, 0.0, -7.25]],
+            tau: vec![vec![0.0; 3], vec![0.5; 3]],
+            leave_out: vec![],
+            notes: vec![],
+        }
+    }
+
+    #[test]
+    fn what_is_written_reads_back_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rig.csv");
+        log().write(&path).unwrap();
+        let back = Log::read(&path, 2, &Columns::default()).unwrap();
+        assert_eq!(
+            back,
+            Log {
+                path: path.clone(),
+                ..log()
+            }
+        );
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_number_that_no_reader_accepts_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rig.csv");
+        let mut log = log();
+        log.qd[1][2] = f64::NAN;
+        let message = log.write(&path).unwrap_err().to_string();
+        assert!(
+            message.contains("line 4, column \"qd2\": \"NaN\""),
+            "{message}"
+        );
+        assert!(!path.exists());
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_an_error() {
+        let message = log()
+            .write("/no/such/folder/rig.csv")
+            .unwrap_err()
+            .to_string();
+        assert!(message.starts_with("/no/such/folder/rig.csv: cannot be written"));
+    }
+
+    #[test]
+    fn durations_and_steps_of_tiny_logs_are_defined() {
+        let mut log = log();
+        assert_eq!((log.rows(), log.joints()), (3, 2));
+        assert!((log.median_step() - 0.15).abs() < 1e-12);
+        log.time.clear();
+        assert_eq!((log.duration(), log.median_step()), (0.0, 0.0));
+    }
+}

@@ -1,0 +1,241 @@
+//! Robust statistics of one channel.
+//!
+//! Medians rather than means throughout: logs of real rigs carry spikes, and a statistic that a
+//! single row can move measures that row.
+
+/// Standard deviation of a normal distribution per median absolute deviation.
+pub(super) const SIGMA_PER_MAD: f64 = 1.4826;
+
+/// Fewer rows than this show no quantisation that could be told from chance.
+const MIN_ROWS_FOR_RESOLUTION: usize = 20;
+
+/// Resampling that makes more than this many values of each is not worth its memory.
+const MAX_FILL: f64 = 10.0;
+
+/// Differences of neighbours; one fewer than the values.
+pub(super) fn differences(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|pair| pair[1] - pair[0]).collect()
+}
+
+/// The value below which a `share` (0 to 1) of the values lies; 0 for no values.
+pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let mut values = values.to_vec();
+    let place = (share * (values.len() - 1) as f64).round() as usize;
+    *values.select_nth_unstable_by(place, f64::total_cmp).1
+}
+
+/// The middle value, or the mean of the two middle ones; 0 for no values.
+pub(super) fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let half = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    let even = values.len().is_multiple_of(2);
+    let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
+    match below.iter().copied().max_by(f64::total_cmp) {
+        Some(lower) if even => (lower + upper) / 2.0,
+        _ => upper,
+    }
+}
+
+/// Median absolute deviation from the median; 0 for no values.
+pub(super) fn mad(values: &[f64]) -> f64 {
+    let centre = median(values);
+    let deviations: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
+    median(&deviations)
+}
+
+/// Standard deviation of white noise on a smooth channel, in the channel's unit.
+///
+/// Second differences remove everything that is straight over three rows; white noise of deviation s
+/// leaves them with sqrt(6) s. Curvature of the signal adds, so that for steps that are long against
+/// the motion the result is an upper bound. 0 for fewer than three rows.
+pub(super) fn noise_std(values: &[f64]) -> f64 {
+    let second = differences(&differences(values));
+    SIGMA_PER_MAD * mad(&second) / 6.0_f64.sqrt()
+}
+
+/// The step in which a channel is quantised, in its unit; 0 for a continuous channel.
+///
+/// A step counts as found when it, its double or its triple makes up at least 5 % of the gaps between
+/// neighbouring distinct values, and at least 90 % of the short gaps are whole multiples of it. The
+/// first keeps the last printed digit from passing for a quantum, the second refuses steps that merely
+/// happen to be small. A log that visits few of its steps may hide them.
+pub(super) fn resolution(values: &[f64]) -> f64 {
+    if values.len() < MIN_ROWS_FOR_RESOLUTION {
+        return 0.0;
+    }
+    let gaps = distinct_gaps(values);
+    // The smallest gap is the quantum, unless an artefact such as a wrapped angle made smaller ones;
+    // then the quantum is among the small ones.
+    let candidates = [0.0, 0.02, 0.1, 0.3, 0.5].map(|share| quantile(&gaps, share));
+    let step = candidates.into_iter().find_map(|near| quantum(&gaps, near));
+    step.unwrap_or(0.0)
+}
+
+/// Gaps between the sorted distinct values. Closer than 1e-9 of the largest value, values differ by
+/// rounding only.
+fn distinct_gaps(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let largest = sorted
+        .iter()
+        .fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    let mut gaps = differences(&sorted);
+    gaps.retain(|gap| *gap > 1e-9 * largest);
+    gaps
+}
+
+/// The quantum that explains the gaps near a given one, if the others bear it out. Some converters
+/// skip levels, so that their commonest gaps are two and three quanta.
+fn quantum(gaps: &[f64], near: f64) -> Option<f64> {
+    let equal = gaps.iter().filter(|gap| (**gap - near).abs() <= 0.1 * near);
+    let (count, sum) = equal.fold((0_usize, 0.0), |(count, sum), gap| (count + 1, sum + gap));
+    if count == 0 || (count as f64) < 0.05 * gaps.len() as f64 {
+        return None;
+    }
+    let mean = sum / count as f64;
+    let steps = [mean, mean / 2.0, mean / 3.0];
+    steps.into_iter().find(|step| are_multiples(gaps, *step))
+}
+
+/// Whether at least 90 % of the gaps shorter than 20 steps are whole multiples of the step. Over longer
+/// gaps the error of the step itself would blur what is whole.
+fn are_multiples(gaps: &[f64], step: f64) -> bool {
+    let short: Vec<f64> = gaps
+        .iter()
+        .map(|gap| gap / step)
+        .filter(|n| *n < 20.0)
+        .collect();
+    let is_whole = |n: &&f64| n.round() > 0.0 && (**n - n.round()).abs() < 0.1;
+    short.iter().filter(is_whole).count() as f64 >= 0.9 * short.len() as f64
+}
+
+/// Linear interpolation of a series at one time \[s\]; `None` outside the series.
+pub(super) fn interpolate(time: &[f64], values: &[f64], at_s: f64) -> Option<f64> {
+    let after = time.partition_point(|t| *t <= at_s);
+    if after == 0 {
+        return None;
+    }
+    let (t0, v0) = (time[after - 1], values[after - 1]);
+    if at_s == t0 {
+        return Some(v0);
+    }
+    let (t1, v1) = (time.get(after)?, values.get(after)?);
+    Some(v0 + (v1 - v0) * (at_s - t0) / (t1 - t0))
+}
+
+/// A series at a uniform step \[s\], linear between its rows. The step has to be positive. Empty for a
+/// series that is mostly gap, of which next to nothing would be measured.
+pub(super) fn resample(time: &[f64], values: &[f64], step_s: f64) -> Vec<f64> {
+    let (Some(first), Some(last)) = (time.first(), time.last()) else {
+        return vec![];
+    };
+    if last - first > MAX_FILL * step_s * time.len() as f64 {
+        return vec![];
+    }
+    // The small addition keeps the last row of a uniform series from being lost to rounding.
+    let count = ((last - first) / step_s + 1e-6) as usize + 1;
+    let at = |index: usize| (first + index as f64 * step_s).min(*last);
+    (0..count)
+        .filter_map(|index| interpolate(time, values, at(index)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reproducible noise, uniform in -0.5 to 0.5.
+    pub(crate) fn noise(count: usize) -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn medians_and_quantiles() {
+        assert_eq!(median(&[]), 0.0);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert_eq!(quantile(&[5.0, 1.0, 3.0], 1.0), 5.0);
+        assert_eq!(mad(&[1.0, 1.0, 2.0, 100.0, 1.0]), 0.0);
+    }
+
+    #[test]
+    fn noise_is_measured_on_top_of_motion_and_despite_spikes() {
+        let mut values: Vec<f64> = (0..4000).map(|i| (i as f64 * 0.01).sin()).collect();
+        // Uniform noise of width 0.1 has a deviation of 0.1 / sqrt(12) = 0.0289. Its second
+        // differences are flatter than normal ones, which the median sees as 13 % more.
+        let added = noise(values.len());
+        values
+            .iter_mut()
+            .zip(added)
+            .for_each(|(value, noise)| *value += 0.1 * noise);
+        (0..40).for_each(|i| values[i * 97] += 50.0);
+        assert!(
+            (noise_std(&values) - 0.0327).abs() < 0.002,
+            "{}",
+            noise_std(&values)
+        );
+        assert_eq!(noise_std(&[1.0, 2.0]), 0.0);
+    }
+
+    #[test]
+    fn a_quantum_is_found_and_none_is_invented() {
+        let step = 191.0 / 65535.0;
+        let smooth: Vec<f64> = (0..2000)
+            .map(|i| 2.0 * (i as f64 * 0.0031).sin() + 0.3)
+            .collect();
+        let coarse: Vec<f64> = smooth
+            .iter()
+            .map(|value| (value / step).round() * step)
+            .collect();
+        assert!((resolution(&coarse) / step - 1.0).abs() < 1e-6);
+        let skipping: Vec<f64> = (0..300)
+            .map(|i| 0.022 * f64::from(5 * (i / 2) + 2 * (i % 2)))
+            .collect();
+        assert!((resolution(&skipping) - 0.022).abs() < 1e-6);
+        assert_eq!(resolution(&smooth), 0.0);
+        assert_eq!(resolution(&noise(5000)), 0.0);
+        assert_eq!(resolution(&[1.0; 50]), 0.0);
+        assert_eq!(resolution(&[1.0, 2.0]), 0.0);
+    }
+
+    #[test]
+    fn a_quantum_survives_an_angle_that_was_wrapped() {
+        let step = 0.003;
+        let wrapped = |i: usize| {
+            let turns = if i < 1000 { 0.0 } else { std::f64::consts::TAU };
+            ((i as f64 * 0.004).sin() / step).round() * step + turns - 3.0 * turns.signum()
+        };
+        let values: Vec<f64> = (0..2000).map(wrapped).collect();
+        assert!(
+            (resolution(&values) - step).abs() < 1e-5,
+            "{}",
+            resolution(&values)
+        );
+    }
+
+    #[test]
+    fn resampling_keeps_straight_lines_and_ends() {
+        let time = [0.0, 0.1, 0.35, 0.4];
+        let values = time.map(|t| 2.0 * t + 1.0);
+        let uniform = resample(&time, &values, 0.05);
+        assert_eq!(uniform.len(), 9);
+        for (index, value) in uniform.iter().enumerate() {
+            assert!((value - (2.0 * 0.05 * index as f64 + 1.0)).abs() < 1e-12);
+        }
+        assert_eq!(interpolate(&time, &values, 0.5), None);
+        assert_eq!(interpolate(&time, &values, -0.1), None);
+    }
+}

@@ -1,0 +1,183 @@
+use crate::expr::{Graph, Program, Tape};
+use crate::model::Dynamics;
+
+/// Lanes of the identification: one AVX-512 register, two AVX2 registers of f64.
+pub(super) const LANES: usize = 8;
+pub(super) type Lane = [f64; LANES];
+
+/// What is free in each window, besides the parameters that all windows share.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Local {
+    /// The state at the window's start.
+    State,
+    /// That, and a constant generalised force a joint: what the model lacks there.
+    StateAndForce,
+}
+
+/// The program of a model's accelerations with their derivatives by states, shared parameters and forces.
+///
+/// Outputs: accelerations (n), then for each joint a row of derivatives by `q`, `qd`, active
+/// parameters and, if they are free, forces. The identification is for physics: dq/dt = qd.
+pub(super) struct Tangent {
+    pub program: Program,
+    pub joints: usize,
+    /// Indices into the model's parameters.
+    pub active: Vec<usize>,
+    pub local: Local,
+}
+
+impl Tangent {
+    pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
+        let n = dynamics.joints;
+        let mut graph = Graph::new();
+        let inputs: Vec<_> = dynamics.program.inputs().iter().map(|name| graph.input(name)).collect();
+        let outputs = graph.append(&dynamics.program, &inputs);
+        let accelerations = &outputs[n..];
+        let mut wrt = inputs[..2 * n].to_vec();
+        wrt.extend(active.iter().map(|&k| inputs[3 * n + 1 + k]));
+        if local == Local::StateAndForce {
+            wrt.extend(&inputs[2 * n..3 * n]);
+        }
+        let jacobian = graph.jacobian(accelerations, &wrt);
+        let all: Vec<_> = accelerations.iter().copied().chain(jacobian.into_iter().flatten()).collect();
+        Self {
+            program: graph.finish(&all),
+            joints: n,
+            active: active.to_vec(),
+            local,
+        }
+    }
+
+    /// Columns of the sensitivities: shared parameters, then what is local to a window.
+    pub fn columns(&self) -> usize {
+        self.active.len() + self.locals()
+    }
+
+    /// Free values of one window.
+    pub fn locals(&self) -> usize {
+        match self.local {
+            Local::State => 2 * self.joints,
+            Local::StateAndForce => 3 * self.joints,
+        }
+    }
+}
+
+/// Integrates states and their sensitivities together, by the classical Runge-Kutta method of order 4.
+///
+/// The sensitivity of column c obeys dS/dt = (df/dx) S + df/dc; rows are angles, then velocities.
+pub(super) struct Flow<'t> {
+    tangent: &'t Tangent,
+    tape: Tape<'t, f64, LANES>,
+    /// `[row]` of states, then `[row * columns + column]` of sensitivities.
+    pub now: Vec<Lane>,
+    inner: Vec<Lane>,
+    slope: Vec<Lane>,
+    sum: Vec<Lane>,
+}
+
+/// The classical Runge-Kutta method: time of the stage, reach of the next stage, weight in the sum.
+const STAGES: [(f64, f64, f64); 4] =
+    [(0.0, 0.5, 1.0 / 6.0), (0.5, 0.5, 1.0 / 3.0), (0.5, 1.0, 1.0 / 3.0), (1.0, 0.0, 1.0 / 6.0)];
+
+impl<'t> Flow<'t> {
+    pub fn new(tangent: &'t Tangent, values: &[f64]) -> Self {
+        let n = tangent.joints;
+        let mut tape = tangent.program.tape();
+        for (slot, value) in tape.inputs()[3 * n + 1..].iter_mut().zip(values) {
+            *slot = [*value; LANES];
+        }
+        let size = 2 * n * (1 + tangent.columns());
+        Self {
+            tangent,
+            tape,
+            now: vec![[0.0; LANES]; size],
+            inner: vec![[0.0; LANES]; size],
+            slope: vec![[0.0; LANES]; size],
+            sum: vec![[0.0; LANES]; size],
+        }
+    }
+
+    /// Start at these states; only the columns of the initial state are sensitive to them.
+    pub fn start(&mut self, states: &[Lane]) {
+        let (n, columns) = (self.tangent.joints, self.tangent.columns());
+        self.now.fill([0.0; LANES]);
+        self.now[..2 * n].copy_from_slice(&states[..2 * n]);
+        for row in 0..2 * n {
+            self.now[2 * n + row * columns + self.tangent.active.len() + row] = [1.0; LANES];
+        }
+    }
+
+    pub fn advance(&mut self, tau: &[Lane], time: Lane, dt: Lane, substeps: usize) {
+        let n = self.tangent.joints;
+        self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
+        #[allow(clippy::cast_precision_loss)] // few substeps
+        let h = dt.map(|dt| dt / substeps as f64);
+        let mut now = time;
+        for _ in 0..substeps {
+            self.step(now, h);
+            now = std::array::from_fn(|lane| now[lane] + h[lane]);
+        }
+    }
+
+    fn step(&mut self, time: Lane, h: Lane) {
+        self.inner.copy_from_slice(&self.now);
+        self.sum.copy_from_slice(&self.now);
+        for (part, reach, weight) in STAGES {
+            let stage_time = std::array::from_fn(|lane| time[lane] + part * h[lane]);
+            self.derivative(stage_time);
+            for (((sum, inner), slope), now) in
+                self.sum.iter_mut().zip(&mut self.inner).zip(&self.slope).zip(&self.now)
+            {
+                for lane in 0..LANES {
+                    sum[lane] += weight * h[lane] * slope[lane];
+                    inner[lane] = now[lane] + reach * h[lane] * slope[lane];
+                }
+            }
+        }
+        std::mem::swap(&mut self.now, &mut self.sum);
+    }
+
+    fn derivative(&mut self, time: Lane) {
+        let n = self.tangent.joints;
+        let inputs = self.tape.inputs();
+        inputs[..2 * n].copy_from_slice(&self.inner[..2 * n]);
+        inputs[3 * n] = time;
+        self.tape.run();
+        let (positions, velocities) = (0..n, n..2 * n);
+        for row in positions {
+            self.slope[row] = self.inner[n + row];
+        }
+        for row in velocities {
+            self.slope[row] = *self.tape.output(row - n);
+        }
+        self.sensitivity_slopes();
+    }
+
+    fn sensitivity_slopes(&mut self) {
+        let (n, columns) = (self.tangent.joints, self.tangent.columns());
+        let shared = self.tangent.active.len();
+        let inner = &self.inner[2 * n..];
+        let (angles, velocities) = self.slope[2 * n..].split_at_mut(n * columns);
+        angles.copy_from_slice(&inner[n * columns..]);
+        for joint in 0..n {
+            // A row of derivatives: 2n states, then parameters, then forces; as many as there are columns.
+            let row = n + joint * columns;
+            for column in 0..columns {
+                let direct = match column {
+                    parameter if parameter < shared => Some(2 * n + parameter),
+                    force if force >= shared + 2 * n => Some(force),
+                    _ => None,
+                };
+                let mut out = direct.map_or([0.0; LANES], |at| *self.tape.output(row + at));
+                for state in 0..2 * n {
+                    let slope = self.tape.output(row + state);
+                    let inner = &inner[state * columns + column];
+                    for lane in 0..LANES {
+                        out[lane] += slope[lane] * inner[lane];
+                    }
+                }
+                velocities[joint * columns + column] = out;
+            }
+        }
+    }
+}

@@ -1,0 +1,302 @@
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::sensitivity::{Flow, LANES, Lane, Tangent};
+use super::window::{Window, initial_state};
+use crate::data::Log;
+use crate::model::{Dynamics, Rollout};
+
+/// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
+/// stable and accurate with dry friction smoothed to a fraction of a percent of the top speed.
+const LONGEST_STEP_S: f64 = 2e-3;
+
+/// Residuals beyond this many scales count by their size, not by their square (Huber 1964): spikes
+/// stay harmless, while of a normal sample only 0.3 % are touched.
+const HUBER: f64 = 3.0;
+
+/// Least squares over windows of logs ("multiple shooting"): in each window the model starts from a
+/// free state and is compared with the logged positions at every row.
+pub struct Shooting<'l> {
+    pub logs: &'l [Log],
+    pub windows: Vec<Window>,
+    /// Standard deviation of the positions' noise, one a joint.
+    pub noise: Vec<f64>,
+    packs: Vec<Pack>,
+}
+
+/// What one window says about the free values, shared ones first, then its own.
+#[derive(Debug, Clone)]
+pub struct WindowTerms {
+    /// Sum of the Huber losses of its residuals.
+    pub cost: f64,
+    pub gradient: DVector<f64>,
+    pub hessian: DMatrix<f64>,
+}
+
+/// Up to [`LANES`] windows side by side, padded with steps of no length and rows of no weight.
+struct Pack {
+    windows: Vec<usize>,
+    time: Vec<Lane>,
+    dt: Vec<Lane>,
+    substeps: Vec<usize>,
+    /// `[row][joint]`
+    tau: Vec<Vec<Lane>>,
+    q: Vec<Vec<Lane>>,
+    /// 1 / noise, 0 where a lane has no such row.
+    weight: Vec<Vec<Lane>>,
+}
+
+impl<'l> Shooting<'l> {
+    /// # Panics
+    /// When `noise` has not one entry a joint of the logs.
+    pub fn new(logs: &'l [Log], windows: Vec<Window>, noise: &[f64]) -> Self {
+        let mut order: Vec<usize> = (0..windows.len()).collect();
+        // Windows of equal length side by side waste no padding.
+        order.sort_by_key(|&w| windows[w].rows());
+        let packs = order.chunks(LANES).map(|chunk| Pack::new(logs, &windows, chunk, noise)).collect();
+        Self {
+            logs,
+            windows,
+            noise: noise.to_vec(),
+            packs,
+        }
+    }
+
+    /// Each window's first guess of its state, with `extra` zeros behind.
+    pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
+        let guess = |window: &Window| {
+            let mut state = initial_state(&self.logs[window.log], window.first).expect("cut() checks this");
+            state.resize(state.len() + extra, 0.0);
+            state
+        };
+        self.windows.iter().map(guess).collect()
+    }
+
+    /// Normalised residuals (model - log) / noise of every window: `[window][row * n + joint]`.
+    pub fn residuals(&self, dynamics: &Dynamics, values: &[f64], locals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let n = dynamics.joints;
+        let per_pack: Vec<Vec<(usize, Vec<f64>)>> = self
+            .packs
+            .par_iter()
+            .map(|pack| {
+                let mut all: Vec<(usize, Vec<f64>)> = pack.windows.iter().map(|&w| (w, Vec::new())).collect();
+                pack.roll(dynamics, values, locals, |row, q| {
+                    for (lane, (window, residuals)) in all.iter_mut().enumerate() {
+                        if row < self.windows[*window].rows() {
+                            residuals.extend((0..n).map(|j| {
+                                (q[j][lane] - pack.q[row][j][lane]) * pack.weight[row][j][lane]
+                            }));
+                        }
+                    }
+                });
+                all
+            })
+            .collect();
+        let mut out = vec![Vec::new(); self.windows.len()];
+        for (window, residuals) in per_pack.into_iter().flatten() {
+            out[window] = residuals;
+        }
+        out
+    }
+
+    /// The Huber loss of each window at residual scale `scale`; infinite where the model diverges.
+    pub fn costs(&self, dynamics: &Dynamics, values: &[f64], locals: &[Vec<f64>], scale: f64) -> Vec<f64> {
+        self.residuals(dynamics, values, locals)
+            .iter()
+            .map(|residuals| residuals.iter().map(|r| loss(r / scale).0).sum::<f64>())
+            .map(|cost| if cost.is_finite() { cost } else { f64::INFINITY })
+            .collect()
+    }
+
+    /// Cost, gradient and Gauss-Newton matrix of each window.
+    pub(super) fn linearise(
+        &self,
+        tangent: &Tangent,
+        values: &[f64],
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<WindowTerms> {
+        let per_pack: Vec<Vec<(usize, WindowTerms)>> = self
+            .packs
+            .par_iter()
+            .map(|pack| pack.linearise(tangent, values, locals, scale))
+            .collect();
+        let mut all: Vec<_> = per_pack.into_iter().flatten().collect();
+        all.sort_by_key(|(window, _)| *window);
+        all.into_iter().map(|(_, terms)| terms).collect()
+    }
+}
+
+/// Huber's loss, and the weight that makes its gradient that of least squares.
+fn loss(residual: f64) -> (f64, f64) {
+    let size = residual.abs();
+    if size <= HUBER {
+        (0.5 * residual * residual, 1.0)
+    } else {
+        (HUBER * (size - 0.5 * HUBER), HUBER / size)
+    }
+}
+
+impl Pack {
+    fn new(logs: &[Log], windows: &[Window], members: &[usize], noise: &[f64]) -> Self {
+        let n = noise.len();
+        let rows = members.iter().map(|&w| windows[w].rows()).max().unwrap_or(0);
+        let zeros = || vec![vec![[0.0; LANES]; n]; rows];
+        let mut pack = Self {
+            windows: members.to_vec(),
+            time: vec![[0.0; LANES]; rows],
+            dt: vec![[0.0; LANES]; rows],
+            substeps: Vec::new(),
+            tau: zeros(),
+            q: zeros(),
+            weight: zeros(),
+        };
+        for lane in 0..LANES {
+            // Empty lanes repeat the last window, without weight.
+            let window = windows[members[lane.min(members.len() - 1)]];
+            let log = &logs[window.log];
+            for row in 0..rows {
+                let at = (window.first + row).min(window.last);
+                pack.time[row][lane] = log.time[at];
+                pack.dt[row][lane] = if at < window.last { log.time[at + 1] - log.time[at] } else { 0.0 };
+                for j in 0..n {
+                    pack.tau[row][j][lane] = log.tau[j][at];
+                    pack.q[row][j][lane] = log.q[j][at];
+                    let counts = lane < members.len() && row < window.rows();
+                    pack.weight[row][j][lane] = if counts { 1.0 / noise[j] } else { 0.0 };
+                }
+            }
+        }
+        pack.substeps = pack.dt.iter().map(|dt| substeps(dt)).collect();
+        pack
+    }
+
+    fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// The local values of each lane as lanes.
+    fn gather(&self, locals: &[Vec<f64>]) -> Vec<Lane> {
+        let lane_of = |lane: usize| &locals[self.windows[lane.min(self.windows.len() - 1)]];
+        (0..lane_of(0).len())
+            .map(|k| std::array::from_fn(|lane| lane_of(lane)[k]))
+            .collect()
+    }
+
+    /// The torque at `row` with the windows' own forces, if any, added.
+    fn torque(&self, row: usize, forces: &[Lane]) -> Vec<Lane> {
+        let mut tau = self.tau[row].clone();
+        for (tau, force) in tau.iter_mut().zip(forces) {
+            for lane in 0..LANES {
+                tau[lane] += force[lane];
+            }
+        }
+        tau
+    }
+
+    /// Integrate and show the angles at each row.
+    fn roll(
+        &self,
+        dynamics: &Dynamics,
+        values: &[f64],
+        locals: &[Vec<f64>],
+        mut see: impl FnMut(usize, &[Lane]),
+    ) {
+        let mut state = self.gather(locals);
+        let forces = state.split_off(dynamics.states());
+        let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
+        for row in 0..self.rows() {
+            see(row, &state[..dynamics.joints]);
+            let tau = self.torque(row, &forces);
+            rollout.advance(&mut state, &tau, self.time[row], self.dt[row], self.substeps[row]);
+        }
+    }
+
+    fn linearise(
+        &self,
+        tangent: &Tangent,
+        values: &[f64],
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<(usize, WindowTerms)> {
+        let (n, columns) = (tangent.joints, tangent.columns());
+        let states = self.gather(locals);
+        let mut sums = Sums::new(columns);
+        let mut flow = Flow::new(tangent, values);
+        flow.start(&states);
+        for row in 0..self.rows() {
+            for j in 0..n {
+                let weight = self.weight[row][j].map(|w| w / scale);
+                let residual = std::array::from_fn(|l| (flow.now[j][l] - self.q[row][j][l]) * weight[l]);
+                let first = 2 * n + j * columns;
+                sums.add(&residual, &flow.now[first..first + columns], &weight);
+            }
+            let tau = self.torque(row, &states[2 * n..]);
+            flow.advance(&tau, self.time[row], self.dt[row], self.substeps[row]);
+        }
+        self.windows.iter().enumerate().map(|(lane, &window)| (window, sums.lane(lane))).collect()
+    }
+}
+
+fn substeps(dt: &Lane) -> usize {
+    let longest = dt.iter().fold(0.0_f64, |a, b| a.max(*b));
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
+    let steps = (longest / LONGEST_STEP_S - 1e-6).ceil() as usize;
+    steps.max(1)
+}
+
+/// Running sums of the normal equations, all lanes at once; the matrix as its upper triangle.
+struct Sums {
+    columns: usize,
+    cost: Lane,
+    gradient: Vec<Lane>,
+    triangle: Vec<Lane>,
+}
+
+impl Sums {
+    fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            cost: [0.0; LANES],
+            gradient: vec![[0.0; LANES]; columns],
+            triangle: vec![[0.0; LANES]; columns * (columns + 1) / 2],
+        }
+    }
+
+    /// Add one row: normalised `residual`, sensitivities of the angle, and 1 / (noise scale).
+    fn add(&mut self, residual: &Lane, sensitivities: &[Lane], weight: &Lane) {
+        let losses = residual.map(loss);
+        for lane in 0..LANES {
+            self.cost[lane] += losses[lane].0;
+        }
+        let mut entries = self.triangle.iter_mut();
+        for (i, a) in sensitivities.iter().enumerate() {
+            let scaled: Lane = std::array::from_fn(|l| losses[l].1 * weight[l] * a[l]);
+            for lane in 0..LANES {
+                self.gradient[i][lane] += scaled[lane] * residual[lane];
+            }
+            for (b, entry) in sensitivities[i..].iter().zip(&mut entries) {
+                for lane in 0..LANES {
+                    entry[lane] += scaled[lane] * weight[lane] * b[lane];
+                }
+            }
+        }
+    }
+
+    fn lane(&self, lane: usize) -> WindowTerms {
+        let mut hessian = DMatrix::zeros(self.columns, self.columns);
+        let mut entries = self.triangle.iter();
+        for i in 0..self.columns {
+            for j in i..self.columns {
+                let value = entries.next().expect("the triangle has this entry")[lane];
+                hessian[(i, j)] = value;
+                hessian[(j, i)] = value;
+            }
+        }
+        WindowTerms {
+            cost: self.cost[lane],
+            gradient: DVector::from_iterator(self.columns, self.gradient.iter().map(|g| g[lane])),
+            hessian,
+        }
+    }
+}

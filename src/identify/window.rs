@@ -1,0 +1,77 @@
+use crate::data::{Log, half_width_s, local_cubic};
+
+/// A stretch of one log, rows `first..=last`, over which a model is integrated open loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Index into the list of logs.
+    pub log: usize,
+    pub first: usize,
+    pub last: usize,
+}
+
+impl Window {
+    /// Number of rows, the first one included.
+    pub fn rows(&self) -> usize {
+        self.last - self.first + 1
+    }
+
+    /// Time of the first row in s.
+    pub fn start_s(&self, logs: &[Log]) -> f64 {
+        logs[self.log].time[self.first]
+    }
+}
+
+/// A pause this many median steps long is a gap: no window spans it.
+const GAP_STEPS: f64 = 5.0;
+
+/// Consecutive windows of `length_s` seconds in all logs, none of which spans a gap or touches a
+/// left-out interval, each beginning where the state can be estimated from the log.
+pub fn cut(logs: &[Log], length_s: f64) -> Vec<Window> {
+    let mut windows = Vec::new();
+    for (index, log) in logs.iter().enumerate() {
+        let mut first = 0;
+        while first + 1 < log.rows() {
+            match window_at(log, first, length_s) {
+                Ok(last) => {
+                    windows.push(Window { log: index, first, last });
+                    first = last;
+                }
+                Err(next) => first = next,
+            }
+        }
+    }
+    windows
+}
+
+/// The last row of a window that begins at `first`, or the next row at which one may begin.
+fn window_at(log: &Log, first: usize, length_s: f64) -> Result<usize, usize> {
+    // Times are rounded decimals: half a step of slack keeps windows at their nominal length.
+    let end = log.time[first] + length_s + 0.5 * log.median_step();
+    let last = log.time.partition_point(|t| *t <= end) - 1;
+    if log.time[last] < log.time[first] + length_s - 0.5 * log.median_step() {
+        return Err(if last + 1 < log.rows() { last + 1 } else { log.rows() });
+    }
+    let touched = log
+        .leave_out
+        .iter()
+        .find(|span| span.start_s <= log.time[last] && span.end_s >= log.time[first]);
+    if let Some(span) = touched {
+        return Err(log.time.partition_point(|t| *t <= span.end_s).max(first + 1));
+    }
+    let gap = (first..last).find(|&row| log.time[row + 1] - log.time[row] > GAP_STEPS * log.median_step());
+    if let Some(row) = gap {
+        return Err(row + 1);
+    }
+    initial_state(log, first).map(|_| last).ok_or(first + 1)
+}
+
+/// Angles, then velocities at a row, from the logged positions alone; `None` near the log's ends.
+pub fn initial_state(log: &Log, row: usize) -> Option<Vec<f64>> {
+    let half = half_width_s(log.median_step());
+    let fits: Option<Vec<_>> = log.q.iter().map(|q| local_cubic(&log.time, q, row, half)).collect();
+    fits.map(|fits| {
+        let angles = fits.iter().map(|fit| fit.value);
+        let velocities = fits.iter().map(|fit| fit.slope);
+        angles.chain(velocities).collect()
+    })
+}
