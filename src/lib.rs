@@ -1,4 +1,6 @@
 //! Residyn: from a rig's log to the physical effect that its model lacks.
 pub mod data;
+pub mod evaluate;
 pub mod expr;
+pub mod identify;
 pub mod model;

@@ -30,7 +30,12 @@ impl Tangent {
     pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
         let n = dynamics.joints;
         let mut graph = Graph::new();
-        let inputs: Vec<_> = dynamics.program.inputs().iter().map(|name| graph.input(name)).collect();
+        let inputs: Vec<_> = dynamics
+            .program
+            .inputs()
+            .iter()
+            .map(|name| graph.input(name))
+            .collect();
         let outputs = graph.append(&dynamics.program, &inputs);
         let accelerations = &outputs[n..];
         let mut wrt = inputs[..2 * n].to_vec();
@@ -39,7 +44,11 @@ impl Tangent {
             wrt.extend(&inputs[2 * n..3 * n]);
         }
         let jacobian = graph.jacobian(accelerations, &wrt);
-        let all: Vec<_> = accelerations.iter().copied().chain(jacobian.into_iter().flatten()).collect();
+        let all: Vec<_> = accelerations
+            .iter()
+            .copied()
+            .chain(jacobian.into_iter().flatten())
+            .collect();
         Self {
             program: graph.finish(&all),
             joints: n,
@@ -76,8 +85,12 @@ pub(super) struct Flow<'t> {
 }
 
 /// The classical Runge-Kutta method: time of the stage, reach of the next stage, weight in the sum.
-const STAGES: [(f64, f64, f64); 4] =
-    [(0.0, 0.5, 1.0 / 6.0), (0.5, 0.5, 1.0 / 3.0), (0.5, 1.0, 1.0 / 3.0), (1.0, 0.0, 1.0 / 6.0)];
+const STAGES: [(f64, f64, f64); 4] = [
+    (0.0, 0.5, 1.0 / 6.0),
+    (0.5, 0.5, 1.0 / 3.0),
+    (0.5, 1.0, 1.0 / 3.0),
+    (1.0, 0.0, 1.0 / 6.0),
+];
 
 impl<'t> Flow<'t> {
     pub fn new(tangent: &'t Tangent, values: &[f64]) -> Self {
@@ -125,8 +138,12 @@ impl<'t> Flow<'t> {
         for (part, reach, weight) in STAGES {
             let stage_time = std::array::from_fn(|lane| time[lane] + part * h[lane]);
             self.derivative(stage_time);
-            for (((sum, inner), slope), now) in
-                self.sum.iter_mut().zip(&mut self.inner).zip(&self.slope).zip(&self.now)
+            for (((sum, inner), slope), now) in self
+                .sum
+                .iter_mut()
+                .zip(&mut self.inner)
+                .zip(&self.slope)
+                .zip(&self.now)
             {
                 for lane in 0..LANES {
                     sum[lane] += weight * h[lane] * slope[lane];

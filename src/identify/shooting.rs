@@ -53,7 +53,10 @@ impl<'l> Shooting<'l> {
         let mut order: Vec<usize> = (0..windows.len()).collect();
         // Windows of equal length side by side waste no padding.
         order.sort_by_key(|&w| windows[w].rows());
-        let packs = order.chunks(LANES).map(|chunk| Pack::new(logs, &windows, chunk, noise)).collect();
+        let packs = order
+            .chunks(LANES)
+            .map(|chunk| Pack::new(logs, &windows, chunk, noise))
+            .collect();
         Self {
             logs,
             windows,
@@ -65,7 +68,8 @@ impl<'l> Shooting<'l> {
     /// Each window's first guess of its state, with `extra` zeros behind.
     pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
         let guess = |window: &Window| {
-            let mut state = initial_state(&self.logs[window.log], window.first).expect("cut() checks this");
+            let mut state =
+                initial_state(&self.logs[window.log], window.first).expect("cut() checks this");
             state.resize(state.len() + extra, 0.0);
             state
         };
@@ -73,13 +77,19 @@ impl<'l> Shooting<'l> {
     }
 
     /// Normalised residuals (model - log) / noise of every window: `[window][row * n + joint]`.
-    pub fn residuals(&self, dynamics: &Dynamics, values: &[f64], locals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub fn residuals(
+        &self,
+        dynamics: &Dynamics,
+        values: &[f64],
+        locals: &[Vec<f64>],
+    ) -> Vec<Vec<f64>> {
         let n = dynamics.joints;
         let per_pack: Vec<Vec<(usize, Vec<f64>)>> = self
             .packs
             .par_iter()
             .map(|pack| {
-                let mut all: Vec<(usize, Vec<f64>)> = pack.windows.iter().map(|&w| (w, Vec::new())).collect();
+                let mut all: Vec<(usize, Vec<f64>)> =
+                    pack.windows.iter().map(|&w| (w, Vec::new())).collect();
                 pack.roll(dynamics, values, locals, |row, q| {
                     for (lane, (window, residuals)) in all.iter_mut().enumerate() {
                         if row < self.windows[*window].rows() {
@@ -100,11 +110,23 @@ impl<'l> Shooting<'l> {
     }
 
     /// The Huber loss of each window at residual scale `scale`; infinite where the model diverges.
-    pub fn costs(&self, dynamics: &Dynamics, values: &[f64], locals: &[Vec<f64>], scale: f64) -> Vec<f64> {
+    pub fn costs(
+        &self,
+        dynamics: &Dynamics,
+        values: &[f64],
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<f64> {
         self.residuals(dynamics, values, locals)
             .iter()
             .map(|residuals| residuals.iter().map(|r| loss(r / scale).0).sum::<f64>())
-            .map(|cost| if cost.is_finite() { cost } else { f64::INFINITY })
+            .map(|cost| {
+                if cost.is_finite() {
+                    cost
+                } else {
+                    f64::INFINITY
+                }
+            })
             .collect()
     }
 
@@ -140,7 +162,11 @@ fn loss(residual: f64) -> (f64, f64) {
 impl Pack {
     fn new(logs: &[Log], windows: &[Window], members: &[usize], noise: &[f64]) -> Self {
         let n = noise.len();
-        let rows = members.iter().map(|&w| windows[w].rows()).max().unwrap_or(0);
+        let rows = members
+            .iter()
+            .map(|&w| windows[w].rows())
+            .max()
+            .unwrap_or(0);
         let zeros = || vec![vec![[0.0; LANES]; n]; rows];
         let mut pack = Self {
             windows: members.to_vec(),
@@ -158,7 +184,11 @@ impl Pack {
             for row in 0..rows {
                 let at = (window.first + row).min(window.last);
                 pack.time[row][lane] = log.time[at];
-                pack.dt[row][lane] = if at < window.last { log.time[at + 1] - log.time[at] } else { 0.0 };
+                pack.dt[row][lane] = if at < window.last {
+                    log.time[at + 1] - log.time[at]
+                } else {
+                    0.0
+                };
                 for j in 0..n {
                     pack.tau[row][j][lane] = log.tau[j][at];
                     pack.q[row][j][lane] = log.q[j][at];
@@ -208,7 +238,13 @@ impl Pack {
         for row in 0..self.rows() {
             see(row, &state[..dynamics.joints]);
             let tau = self.torque(row, &forces);
-            rollout.advance(&mut state, &tau, self.time[row], self.dt[row], self.substeps[row]);
+            rollout.advance(
+                &mut state,
+                &tau,
+                self.time[row],
+                self.dt[row],
+                self.substeps[row],
+            );
         }
     }
 
@@ -227,14 +263,19 @@ impl Pack {
         for row in 0..self.rows() {
             for j in 0..n {
                 let weight = self.weight[row][j].map(|w| w / scale);
-                let residual = std::array::from_fn(|l| (flow.now[j][l] - self.q[row][j][l]) * weight[l]);
+                let residual =
+                    std::array::from_fn(|l| (flow.now[j][l] - self.q[row][j][l]) * weight[l]);
                 let first = 2 * n + j * columns;
                 sums.add(&residual, &flow.now[first..first + columns], &weight);
             }
             let tau = self.torque(row, &states[2 * n..]);
             flow.advance(&tau, self.time[row], self.dt[row], self.substeps[row]);
         }
-        self.windows.iter().enumerate().map(|(lane, &window)| (window, sums.lane(lane))).collect()
+        self.windows
+            .iter()
+            .enumerate()
+            .map(|(lane, &window)| (window, sums.lane(lane)))
+            .collect()
     }
 }
 

@@ -33,7 +33,11 @@ pub fn cut(logs: &[Log], length_s: f64) -> Vec<Window> {
         while first + 1 < log.rows() {
             match window_at(log, first, length_s) {
                 Ok(last) => {
-                    windows.push(Window { log: index, first, last });
+                    windows.push(Window {
+                        log: index,
+                        first,
+                        last,
+                    });
                     first = last;
                 }
                 Err(next) => first = next,
@@ -49,16 +53,24 @@ fn window_at(log: &Log, first: usize, length_s: f64) -> Result<usize, usize> {
     let end = log.time[first] + length_s + 0.5 * log.median_step();
     let last = log.time.partition_point(|t| *t <= end) - 1;
     if log.time[last] < log.time[first] + length_s - 0.5 * log.median_step() {
-        return Err(if last + 1 < log.rows() { last + 1 } else { log.rows() });
+        return Err(if last + 1 < log.rows() {
+            last + 1
+        } else {
+            log.rows()
+        });
     }
     let touched = log
         .leave_out
         .iter()
         .find(|span| span.start_s <= log.time[last] && span.end_s >= log.time[first]);
     if let Some(span) = touched {
-        return Err(log.time.partition_point(|t| *t <= span.end_s).max(first + 1));
+        return Err(log
+            .time
+            .partition_point(|t| *t <= span.end_s)
+            .max(first + 1));
     }
-    let gap = (first..last).find(|&row| log.time[row + 1] - log.time[row] > GAP_STEPS * log.median_step());
+    let gap = (first..last)
+        .find(|&row| log.time[row + 1] - log.time[row] > GAP_STEPS * log.median_step());
     if let Some(row) = gap {
         return Err(row + 1);
     }
@@ -68,7 +80,11 @@ fn window_at(log: &Log, first: usize, length_s: f64) -> Result<usize, usize> {
 /// Angles, then velocities at a row, from the logged positions alone; `None` near the log's ends.
 pub fn initial_state(log: &Log, row: usize) -> Option<Vec<f64>> {
     let half = half_width_s(log.median_step());
-    let fits: Option<Vec<_>> = log.q.iter().map(|q| local_cubic(&log.time, q, row, half)).collect();
+    let fits: Option<Vec<_>> = log
+        .q
+        .iter()
+        .map(|q| local_cubic(&log.time, q, row, half))
+        .collect();
     fits.map(|fits| {
         let angles = fits.iter().map(|fit| fit.value);
         let velocities = fits.iter().map(|fit| fit.slope);

@@ -274,11 +274,6 @@ impl<'a> Section<'a> {
         self.get(key).is_some()
     }
 
-    /// The keys, in the order of the file.
-    pub fn keys(&self) -> impl Iterator<Item = &str> {
-        self.table.keys().map(|key| key.get_ref().as_ref())
-    }
-
     /// Whether `key` holds a table (and not a plain value).
     pub fn is_table(&self, key: &str) -> bool {
         self.get(key)

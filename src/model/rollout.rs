@@ -16,7 +16,11 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
     /// # Panics
     /// When `values` has not one entry a parameter.
     pub fn new(dynamics: &'d Dynamics, values: &[f64]) -> Self {
-        assert_eq!(values.len(), dynamics.parameters.len(), "one value for each parameter");
+        assert_eq!(
+            values.len(),
+            dynamics.parameters.len(),
+            "one value for each parameter"
+        );
         let mut tape = dynamics.program.tape();
         let joints = dynamics.joints;
         for (slot, value) in tape.inputs()[3 * joints + 1..].iter_mut().zip(values) {
@@ -33,7 +37,14 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
 
     /// Advance `state` (`[2n][lane]`: angles, then velocities) from `time` by `dt` seconds in `substeps`
     /// equal steps under the torque `tau` (`[n][lane]`).
-    pub fn advance(&mut self, state: &mut [[T; W]], tau: &[[T; W]], time: [T; W], dt: [T; W], substeps: usize) {
+    pub fn advance(
+        &mut self,
+        state: &mut [[T; W]],
+        tau: &[[T; W]],
+        time: [T; W],
+        dt: [T; W],
+        substeps: usize,
+    ) {
         let n = self.joints;
         self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
         let parts = T::from_usize(substeps).expect("few substeps");

@@ -1,0 +1,193 @@
+use rayon::prelude::*;
+
+use super::summary::{Summary, summarise};
+use crate::data::{Log, half_width_s};
+use crate::identify::{Window, initial_state};
+use crate::model::{Dynamics, Rollout};
+
+/// Squared errors of one window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WindowError {
+    /// Index of the log.
+    pub log: usize,
+    /// Time of its first row in s.
+    pub start_s: f64,
+    /// Rows that were compared.
+    pub rows: usize,
+    /// Sum over the rows of the squared position error, one a joint.
+    pub position: Vec<f64>,
+    /// Sum over the rows of the squared velocity error, one a joint.
+    pub velocity: Vec<f64>,
+    /// The model left every sensible range; the errors are what it had reached by then, held.
+    pub diverged: bool,
+}
+
+/// All windows of one horizon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OpenLoop {
+    pub horizon_s: f64,
+    pub windows: Vec<WindowError>,
+}
+
+/// The error of a model on logs at several horizons.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    pub horizons: Vec<OpenLoop>,
+    /// Length of the integrator's steps in s at which halving them changed no number by more than
+    /// 0.1 %, or the shortest that was tried.
+    pub step_s: f64,
+    /// The largest relative change of a number at the last halving.
+    pub step_error: f64,
+}
+
+/// Windows side by side in one rollout.
+const LANES: usize = 8;
+/// A state beyond this (rad, or rad/s) is no motion of a rig.
+const SENSIBLE: f64 = 1e4;
+/// Halving the step may change no number by more than this share.
+const STEP_TOLERANCE: f64 = 1e-3;
+/// First and last length of the integrator's steps in s.
+const LONGEST_STEP_S: f64 = 1e-3;
+const SHORTEST_STEP_S: f64 = 1e-3 / 64.0;
+
+/// The open-loop error of `dynamics` with parameters `values` on `logs`. `values` may differ by log (own
+/// sensor offsets, say): it is asked for each.
+///
+/// Windows start every half horizon and last one; their start states come from the log alone. The
+/// logged torque is held over each step.
+pub fn assess<'v>(
+    dynamics: &Dynamics,
+    values: impl Fn(usize) -> &'v [f64] + Sync,
+    logs: &[Log],
+    horizons_s: &[f64],
+) -> Assessment {
+    let mut step_s = LONGEST_STEP_S;
+    let mut coarse = run(dynamics, &values, logs, horizons_s, step_s);
+    loop {
+        let fine = run(dynamics, &values, logs, horizons_s, step_s / 2.0);
+        let step_error = largest_change(&coarse, &fine, dynamics.joints);
+        if step_error <= STEP_TOLERANCE || step_s / 2.0 <= SHORTEST_STEP_S {
+            return Assessment { horizons: fine, step_s: step_s / 2.0, step_error };
+        }
+        coarse = fine;
+        step_s /= 2.0;
+    }
+}
+
+fn run<'v>(
+    dynamics: &Dynamics,
+    values: &(impl Fn(usize) -> &'v [f64] + Sync),
+    logs: &[Log],
+    horizons_s: &[f64],
+    step_s: f64,
+) -> Vec<OpenLoop> {
+    let one = |&horizon_s: &f64| {
+        let windows: Vec<Window> =
+            logs.iter().enumerate().flat_map(|(index, log)| windows(index, log, horizon_s)).collect();
+        let packs: Vec<&[Window]> = windows
+            .chunk_by(|a, b| a.log == b.log)
+            .flat_map(|of_one_log| of_one_log.chunks(LANES))
+            .collect();
+        let errors: Vec<Vec<WindowError>> = packs
+            .par_iter()
+            .map(|pack| roll(dynamics, values(pack[0].log), &logs[pack[0].log], pack, step_s))
+            .collect();
+        OpenLoop { horizon_s, windows: errors.into_iter().flatten().collect() }
+    };
+    horizons_s.iter().map(one).collect()
+}
+
+/// The windows of one log: every half horizon from the first row that has enough before it.
+pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
+    let slack = 1e-6 * horizon_s;
+    let half_width = half_width_s(log.median_step());
+    let row_at = |time: f64| log.time.partition_point(|t| *t < time - slack);
+    let first = row_at(log.time[0] + half_width);
+    let Some(&begin) = log.time.get(first) else {
+        return Vec::new();
+    };
+    let end_of_log = log.time[log.rows() - 1] + slack;
+    let starts = (0..).map(|k| begin + f64::from(k) * horizon_s / 2.0);
+    starts
+        .take_while(|start| start + horizon_s <= end_of_log)
+        .filter_map(|start| {
+            let first = row_at(start);
+            let end = log.time[first] + horizon_s + slack;
+            let last = log.time.partition_point(|t| *t <= end) - 1;
+            let touched = |from: f64, to: f64| {
+                log.leave_out.iter().any(|span| span.start_s <= to && span.end_s >= from)
+            };
+            let whole = end <= end_of_log + slack && last > first && !touched(log.time[first], end);
+            (whole && initial_state(log, first).is_some()).then_some(Window { log: index, first, last })
+        })
+        .collect()
+}
+
+/// Integrate up to [`LANES`] windows of one log.
+fn roll(dynamics: &Dynamics, values: &[f64], log: &Log, pack: &[Window], step_s: f64) -> Vec<WindowError> {
+    let n = dynamics.joints;
+    let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
+    let starts: Vec<Vec<f64>> =
+        pack.iter().map(|w| initial_state(log, w.first).expect("windows() checks this")).collect();
+    let mut state: Vec<[f64; LANES]> = (0..2 * n)
+        .map(|k| std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k]))
+        .collect();
+    let mut errors: Vec<WindowError> = pack.iter().map(|w| WindowError::none(w, log, n)).collect();
+    let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
+    let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
+    for row in 0..rows - 1 {
+        let at: [usize; LANES] = std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
+        let time = at.map(|row| log.time[row]);
+        let dt = at.map(|row| log.time[row + 1] - log.time[row]);
+        let tau: Vec<[f64; LANES]> = log.tau.iter().map(|tau| at.map(|row| tau[row])).collect();
+        let longest = dt.iter().fold(0.0_f64, |a, b| a.max(*b));
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
+        let substeps = ((longest / step_s - 1e-6).ceil() as usize).max(1);
+        rollout.advance(&mut state, &tau, time, dt, substeps);
+        for (l, error) in errors.iter_mut().enumerate() {
+            if pack[l].first + row < pack[l].last {
+                error.add(&mut state, l, log, pack[l].first + row + 1);
+            }
+        }
+    }
+    errors
+}
+
+impl WindowError {
+    fn none(window: &Window, log: &Log, joints: usize) -> Self {
+        Self {
+            log: window.log,
+            start_s: log.time[window.first],
+            rows: 0,
+            position: vec![0.0; joints],
+            velocity: vec![0.0; joints],
+            diverged: false,
+        }
+    }
+
+    fn add(&mut self, state: &mut [[f64; LANES]], lane: usize, log: &Log, row: usize) {
+        let n = self.position.len();
+        for value in state.iter_mut() {
+            let value = &mut value[lane];
+            if !(value.abs() <= SENSIBLE) {
+                self.diverged = true;
+                // Held at the edge of the sensible: it counts as what it is, and stays a number.
+                *value = if value.is_nan() { SENSIBLE } else { value.clamp(-SENSIBLE, SENSIBLE) };
+            }
+        }
+        self.rows += 1;
+        for j in 0..n {
+            self.position[j] += (state[j][lane] - log.q[j][row]).powi(2);
+            self.velocity[j] += (state[n + j][lane] - log.qd[j][row]).powi(2);
+        }
+    }
+}
+
+fn largest_change(coarse: &[OpenLoop], fine: &[OpenLoop], joints: usize) -> f64 {
+    let numbers = |all: &[OpenLoop]| -> Vec<f64> {
+        let summary: Summary = summarise(all, joints);
+        [summary.position_rmse, summary.position_median, summary.velocity_rmse].concat().concat()
+    };
+    let pairs = numbers(coarse).into_iter().zip(numbers(fine));
+    pairs.map(|(a, b)| (a - b).abs() / b.abs().max(f64::MIN_POSITIVE)).fold(0.0, f64::max)
+}

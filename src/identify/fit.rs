@@ -1,0 +1,320 @@
+use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
+
+use super::sensitivity::{Local, Tangent};
+use super::shooting::{Shooting, WindowTerms};
+use crate::model::Dynamics;
+
+/// Why parameters could not be fitted.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum FitError {
+    #[error(
+        "the logs give no window to fit: every stretch is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
+    )]
+    NoWindow,
+    #[error(
+        "with its starting values the model diverges in {diverged} of {windows} windows of the logs; give parameters nearer to the rig in the model file"
+    )]
+    Diverged { diverged: usize, windows: usize },
+}
+
+/// The outcome of a fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// All parameters of the model, in its order.
+    pub values: Vec<f64>,
+    /// Which of them were free.
+    pub active: Vec<usize>,
+    /// Each window's own values: its start state, then forces if they were free.
+    pub locals: Vec<Vec<f64>>,
+    /// Robust standard deviation of the normalised residuals: 1 where the model explains all but noise.
+    pub scale: f64,
+    /// Sum of the losses at that scale.
+    pub cost: f64,
+    /// What each window says about the free parameters, its own values eliminated.
+    pub reduced: Vec<WindowTerms>,
+    /// Steps that were taken.
+    pub iterations: usize,
+}
+
+/// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
+const MOST_STEPS: usize = 40;
+/// A fit ends when a step lowers the cost by less than this share.
+const ENOUGH: f64 = 1e-7;
+
+/// Fit the parameters `active` of `dynamics` to the windows, starting from `values` and `locals`, with
+/// every window's start state (and forces) free: Levenberg-Marquardt with the windows' own values
+/// eliminated by the Schur complement. `scale` fixes the scale of the residuals; without it, it is estimated
+/// by their median absolute deviation as the fit proceeds.
+///
+/// # Errors
+/// No window, or a model that diverges at the starting values.
+pub fn fit(
+    shooting: &Shooting<'_>,
+    dynamics: &Dynamics,
+    active: &[usize],
+    values: &[f64],
+    locals: Vec<Vec<f64>>,
+    scale: Option<f64>,
+) -> Result<Fit, FitError> {
+    let local = if locals.first().is_some_and(|l| l.len() > dynamics.states()) {
+        Local::StateAndForce
+    } else {
+        Local::State
+    };
+    let tangent = Tangent::new(dynamics, active, local);
+    let mut search = Search::new(shooting, dynamics, &tangent, values, locals, scale)?;
+    while search.iterations < MOST_STEPS && search.step() {}
+    // A last look with a scale that belongs to the final residuals.
+    if scale.is_none() {
+        search.rescale();
+        while search.iterations < MOST_STEPS && search.step() {}
+    }
+    Ok(search.finish())
+}
+
+struct Search<'a> {
+    shooting: &'a Shooting<'a>,
+    dynamics: &'a Dynamics,
+    tangent: &'a Tangent,
+    values: Vec<f64>,
+    locals: Vec<Vec<f64>>,
+    scale: f64,
+    cost: f64,
+    damping: f64,
+    iterations: usize,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        shooting: &'a Shooting<'a>,
+        dynamics: &'a Dynamics,
+        tangent: &'a Tangent,
+        values: &[f64],
+        locals: Vec<Vec<f64>>,
+        scale: Option<f64>,
+    ) -> Result<Self, FitError> {
+        if shooting.windows.is_empty() {
+            return Err(FitError::NoWindow);
+        }
+        let mut search = Self {
+            shooting,
+            dynamics,
+            tangent,
+            values: values.to_vec(),
+            locals,
+            scale: scale.unwrap_or(1.0),
+            cost: f64::INFINITY,
+            damping: 1e-3,
+            iterations: 0,
+        };
+        let costs = shooting.costs(dynamics, &search.values, &search.locals, search.scale);
+        let diverged = costs.iter().filter(|cost| !cost.is_finite()).count();
+        if diverged > 0 {
+            return Err(FitError::Diverged {
+                diverged,
+                windows: costs.len(),
+            });
+        }
+        if scale.is_none() {
+            search.rescale();
+        } else {
+            search.cost = costs.iter().sum();
+        }
+        Ok(search)
+    }
+
+    /// Estimate the scale from the residuals at hand.
+    fn rescale(&mut self) {
+        let residuals = self
+            .shooting
+            .residuals(self.dynamics, &self.values, &self.locals);
+        self.scale = robust_scale(residuals.into_iter().flatten());
+        self.cost = self.total(&self.values, &self.locals);
+        self.damping = 1e-3;
+    }
+
+    fn total(&self, values: &[f64], locals: &[Vec<f64>]) -> f64 {
+        self.shooting
+            .costs(self.dynamics, values, locals, self.scale)
+            .iter()
+            .sum()
+    }
+
+    /// One accepted step; false when there is nothing left to gain.
+    fn step(&mut self) -> bool {
+        self.iterations += 1;
+        let terms = self
+            .shooting
+            .linearise(self.tangent, &self.values, &self.locals, self.scale);
+        while self.damping < 1e12 {
+            let (values, locals) = self.propose(&terms);
+            let cost = self.total(&values, &locals);
+            if cost < self.cost {
+                let gain = (self.cost - cost) / self.cost.max(f64::MIN_POSITIVE);
+                (self.values, self.locals, self.cost) = (values, locals, cost);
+                self.damping = (self.damping * 0.1).max(1e-12);
+                return gain > ENOUGH;
+            }
+            self.damping *= 10.0;
+        }
+        false
+    }
+
+    fn propose(&self, terms: &[WindowTerms]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let shared = self.tangent.active.len();
+        let mut matrix = DMatrix::zeros(shared, shared);
+        let mut right = DVector::zeros(shared);
+        let eliminated: Vec<Eliminated> = terms
+            .iter()
+            .map(|terms| Eliminated::new(terms, shared, self.damping))
+            .collect();
+        for part in &eliminated {
+            matrix += &part.matrix;
+            right -= &part.gradient;
+        }
+        let step = self.bounded_solution(matrix, right);
+        let mut values = self.values.clone();
+        for (&k, step) in self.tangent.active.iter().zip(step.iter()) {
+            let [low, high] = self.dynamics.parameters[k].bounds;
+            values[k] = (values[k] + step).clamp(low, high);
+        }
+        let taken = DVector::from_iterator(
+            shared,
+            self.tangent
+                .active
+                .iter()
+                .map(|&k| values[k] - self.values[k]),
+        );
+        let locals = eliminated
+            .iter()
+            .zip(&self.locals)
+            .map(|(part, local)| {
+                part.local_step(&taken)
+                    .iter()
+                    .zip(local)
+                    .map(|(d, x)| x + d)
+                    .collect()
+            })
+            .collect();
+        (values, locals)
+    }
+
+    /// The damped step, with parameters that a bound would stop taken out one after the other.
+    fn bounded_solution(&self, mut matrix: DMatrix<f64>, right: DVector<f64>) -> DVector<f64> {
+        for (i, &k) in self.tangent.active.iter().enumerate() {
+            // Steps are damped against each parameter's own magnitude: a flat direction stays where it is.
+            let floor = 1e-9 / self.dynamics.parameters[k].scale.powi(2);
+            matrix[(i, i)] += self.damping * matrix[(i, i)] + floor;
+        }
+        let mut held = vec![false; right.len()];
+        loop {
+            let step = solve_with_held(&matrix, &right, &held);
+            let stopped = self.tangent.active.iter().enumerate().position(|(i, &k)| {
+                let [low, high] = self.dynamics.parameters[k].bounds;
+                let at = self.values[k];
+                !held[i] && ((at <= low && step[i] < 0.0) || (at >= high && step[i] > 0.0))
+            });
+            match stopped {
+                Some(i) => held[i] = true,
+                None => return step,
+            }
+        }
+    }
+
+    fn finish(self) -> Fit {
+        let terms = self
+            .shooting
+            .linearise(self.tangent, &self.values, &self.locals, self.scale);
+        let shared = self.tangent.active.len();
+        let reduced = terms
+            .iter()
+            .map(|terms| {
+                let part = Eliminated::new(terms, shared, 0.0);
+                WindowTerms {
+                    cost: terms.cost,
+                    gradient: part.gradient,
+                    hessian: part.matrix,
+                }
+            })
+            .collect();
+        Fit {
+            values: self.values,
+            active: self.tangent.active.clone(),
+            locals: self.locals,
+            scale: self.scale,
+            cost: self.cost,
+            reduced,
+            iterations: self.iterations,
+        }
+    }
+}
+
+/// One window's normal equations with its own values eliminated.
+struct Eliminated {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// Own values = -(own^-1 gradient) - (own^-1 cross) shared step.
+    local_gradient: DVector<f64>,
+    local_cross: DMatrix<f64>,
+}
+
+impl Eliminated {
+    fn new(terms: &WindowTerms, shared: usize, damping: f64) -> Self {
+        let locals = terms.gradient.len() - shared;
+        let mut own = terms
+            .hessian
+            .view((shared, shared), (locals, locals))
+            .into_owned();
+        for i in 0..locals {
+            own[(i, i)] += damping * own[(i, i)] + 1e-12;
+        }
+        let cross = terms
+            .hessian
+            .view((shared, 0), (locals, shared))
+            .into_owned();
+        let own_gradient = terms.gradient.rows(shared, locals).into_owned();
+        let inverse = own.clone().cholesky().map_or_else(
+            // Not positive definite: the window says nothing about its own values, which then stay.
+            || DMatrix::zeros(locals, locals),
+            |cholesky| cholesky.inverse(),
+        );
+        let local_gradient = &inverse * own_gradient;
+        let local_cross = &inverse * &cross;
+        let matrix =
+            terms.hessian.view((0, 0), (shared, shared)) - cross.transpose() * &local_cross;
+        let gradient = terms.gradient.rows(0, shared) - cross.transpose() * &local_gradient;
+        Self {
+            matrix,
+            gradient,
+            local_gradient,
+            local_cross,
+        }
+    }
+
+    fn local_step(&self, shared_step: &DVector<f64>) -> DVector<f64> {
+        -(&self.local_gradient + &self.local_cross * shared_step)
+    }
+}
+
+/// The solution with the held unknowns at zero.
+fn solve_with_held(matrix: &DMatrix<f64>, right: &DVector<f64>, held: &[bool]) -> DVector<f64> {
+    let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
+    let part = matrix.select_rows(&free).select_columns(&free);
+    let mut step = DVector::zeros(held.len());
+    if let Some(cholesky) = part.cholesky() {
+        let solution = cholesky.solve(&right.select_rows(&free));
+        for (&i, value) in free.iter().zip(solution.iter()) {
+            step[i] = *value;
+        }
+    }
+    step
+}
+
+/// Standard deviation of a normal sample with the same median absolute value; never zero.
+fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
+    let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    let middle = sizes.len() / 2;
+    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+    (1.4826 * *median).max(1e-6)
+}

@@ -1,0 +1,101 @@
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::fit::Fit;
+use crate::model::Dynamics;
+
+/// Which combinations of the free parameters the logs determine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identifiability {
+    /// Number of free parameters.
+    pub free: usize,
+    /// Number of independent combinations that are determined.
+    pub determined: usize,
+    /// Combinations that are not: for each, the parameters that take part and their relative weight.
+    /// Changing them together by these shares of their magnitude changes no prediction.
+    pub undetermined: Vec<Vec<(String, f64)>>,
+    /// Parameters to hold at their declared value so that the rest is determined.
+    pub hold: Vec<usize>,
+}
+
+/// A combination counts as undetermined where its standard deviation, as a share of the parameters'
+/// magnitude, is beyond this: it may then be anything up to ten times its value.
+const LOOSE: f64 = 3.0;
+/// Or where its information is this small beside the best determined one's: rounding, not data.
+const ROUNDING: f64 = 1e-11;
+/// Parts of a combination smaller than this are not named.
+const NAMED: f64 = 0.1;
+
+/// The verdict on a fit's free parameters, from the eigenvalues of its information matrix in relative units.
+pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
+    let information = relative_information(dynamics, fit);
+    let loose = loose_directions(&information);
+    let name = |i: usize| dynamics.parameters[fit.active[i]].name.clone();
+    let undetermined = loose
+        .iter()
+        .map(|direction| {
+            let parts = direction
+                .iter()
+                .enumerate()
+                .filter(|(_, w)| w.abs() > NAMED);
+            parts.map(|(i, w)| (name(i), *w)).collect()
+        })
+        .collect();
+    Identifiability {
+        free: fit.active.len(),
+        determined: fit.active.len() - loose.len(),
+        undetermined,
+        hold: hold(&information, fit),
+    }
+}
+
+/// Hold the parameter that takes part most in what is loose, until nothing is.
+fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
+    let mut left: Vec<usize> = (0..fit.active.len()).collect();
+    let mut hold = Vec::new();
+    loop {
+        let part = information.select_rows(&left).select_columns(&left);
+        let loose = loose_directions(&part);
+        let share = |i: usize| {
+            loose
+                .iter()
+                .map(|direction| direction[i].powi(2))
+                .sum::<f64>()
+        };
+        // Of equal shares the later parameter is held: files name the leading ones first.
+        let Some(most) = (0..left.len())
+            .filter(|_| !loose.is_empty())
+            .max_by(|&a, &b| share(a).total_cmp(&share(b)))
+        else {
+            return hold;
+        };
+        hold.push(fit.active[left.remove(most)]);
+    }
+}
+
+fn relative_information(dynamics: &Dynamics, fit: &Fit) -> DMatrix<f64> {
+    let size = fit.active.len();
+    let mut information = DMatrix::zeros(size, size);
+    for terms in &fit.reduced {
+        information += &terms.hessian;
+    }
+    let magnitude = |i: usize| {
+        let k = fit.active[i];
+        fit.values[k].abs().max(1e-3 * dynamics.parameters[k].scale)
+    };
+    DMatrix::from_fn(size, size, |i, j| {
+        information[(i, j)] * magnitude(i) * magnitude(j)
+    })
+}
+
+fn loose_directions(information: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    if information.is_empty() {
+        return Vec::new();
+    }
+    let eigen = SymmetricEigen::new(information.clone());
+    let best = eigen.eigenvalues.max();
+    let is_loose = |value: f64| value <= ROUNDING * best || value < 1.0 / (LOOSE * LOOSE);
+    (0..information.nrows())
+        .filter(|&i| is_loose(eigen.eigenvalues[i]))
+        .map(|i| eigen.eigenvectors.column(i).iter().copied().collect())
+        .collect()
+}

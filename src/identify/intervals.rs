@@ -1,0 +1,86 @@
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::fit::Fit;
+use super::shooting::Shooting;
+
+/// How well a fit determines its free parameters.
+#[derive(Debug, Clone)]
+pub struct Uncertainty {
+    /// Covariance of the free parameters, in their order.
+    pub covariance: DMatrix<f64>,
+    /// Blocks of windows that count as independent.
+    pub blocks: usize,
+}
+
+/// Windows nearer than this (s) belong to one block: what a model lacks is correlated over a swing or two.
+const BLOCK_S: f64 = 2.0;
+
+/// For each window, the block it belongs to: stretches of a log of about two seconds.
+pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
+    let mut blocks = Vec::with_capacity(shooting.windows.len());
+    let mut current: Option<(usize, f64)> = None;
+    let mut count = 0;
+    for window in &shooting.windows {
+        let start = window.start_s(shooting.logs);
+        let continues =
+            current.is_some_and(|(log, since)| log == window.log && start - since < BLOCK_S);
+        if !continues {
+            current = Some((window.log, start));
+            count += 1;
+        }
+        blocks.push(count - 1);
+    }
+    blocks
+}
+
+/// Covariance of the free parameters by the cluster-robust sandwich: it holds when residuals within a
+/// block are correlated, as they are wherever a model lacks something (Liang and Zeger 1986).
+pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
+    let blocks = blocks(shooting);
+    let count = blocks.last().map_or(0, |last| last + 1);
+    let size = fit.active.len();
+    let mut hessian = DMatrix::zeros(size, size);
+    let mut scores = vec![DVector::zeros(size); count];
+    for (terms, &block) in fit.reduced.iter().zip(&blocks) {
+        hessian += &terms.hessian;
+        scores[block] += &terms.gradient;
+    }
+    let mut spread = DMatrix::zeros(size, size);
+    for score in &scores {
+        spread += score * score.transpose();
+    }
+    #[allow(clippy::cast_precision_loss)] // few blocks
+    let correction = count as f64 / (count as f64 - 1.0).max(1.0);
+    let inverse = hessian
+        .pseudo_inverse(1e-14)
+        .unwrap_or_else(|_| DMatrix::zeros(size, size));
+    Uncertainty {
+        covariance: &inverse * spread * &inverse * correction,
+        blocks: count,
+    }
+}
+
+impl Uncertainty {
+    /// Half width of the 95 % interval of the i-th free parameter: Student's t with one degree of
+    /// freedom a block less one.
+    pub fn half_width(&self, i: usize) -> f64 {
+        self.quantile(0.975) * self.covariance[(i, i)].max(0.0).sqrt()
+    }
+
+    /// Two-sided p-value of the hypothesis that the i-th free parameter is `null`, given `value`.
+    pub fn p_value(&self, i: usize, value: f64, null: f64) -> f64 {
+        let deviation = self.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
+        2.0 * (1.0 - self.student().cdf(((value - null) / deviation).abs()))
+    }
+
+    fn quantile(&self, share: f64) -> f64 {
+        self.student().inverse_cdf(share)
+    }
+
+    fn student(&self) -> StudentsT {
+        #[allow(clippy::cast_precision_loss)] // few blocks
+        let freedom = (self.blocks as f64 - 1.0).max(1.0);
+        StudentsT::new(0.0, 1.0, freedom).expect("freedom is at least one")
+    }
+}

@@ -1,0 +1,19 @@
+//! Physical parameters from logs: least squares on trajectories in f64.
+//!
+//! Nothing here differentiates measured data. Windows of a log are integrated open loop from free start
+//! states and compared with the logged positions; reported velocities, which are filtered or delayed on
+//! most rigs, are not used.
+
+mod fit;
+mod identifiability;
+mod intervals;
+mod sensitivity;
+mod shooting;
+mod window;
+
+pub use fit::{Fit, FitError, fit};
+pub use identifiability::{Identifiability, identifiability};
+pub use intervals::{Uncertainty, uncertainty};
+pub use sensitivity::Local;
+pub use shooting::{Shooting, WindowTerms};
+pub use window::{Window, cut, initial_state};
