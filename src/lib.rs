@@ -1,6 +1,8 @@
 //! Residyn: from a rig's log to the physical effect that its model lacks.
+pub mod closeloop;
 pub mod data;
 pub mod evaluate;
 pub mod expr;
 pub mod identify;
 pub mod model;
+pub mod plant;

@@ -67,7 +67,11 @@ pub fn assess<'v>(
         let fine = run(dynamics, &values, logs, horizons_s, step_s / 2.0);
         let step_error = largest_change(&coarse, &fine, dynamics.joints);
         if step_error <= STEP_TOLERANCE || step_s / 2.0 <= SHORTEST_STEP_S {
-            return Assessment { horizons: fine, step_s: step_s / 2.0, step_error };
+            return Assessment {
+                horizons: fine,
+                step_s: step_s / 2.0,
+                step_error,
+            };
         }
         coarse = fine;
         step_s /= 2.0;
@@ -82,17 +86,31 @@ fn run<'v>(
     step_s: f64,
 ) -> Vec<OpenLoop> {
     let one = |&horizon_s: &f64| {
-        let windows: Vec<Window> =
-            logs.iter().enumerate().flat_map(|(index, log)| windows(index, log, horizon_s)).collect();
+        let windows: Vec<Window> = logs
+            .iter()
+            .enumerate()
+            .flat_map(|(index, log)| windows(index, log, horizon_s))
+            .collect();
         let packs: Vec<&[Window]> = windows
             .chunk_by(|a, b| a.log == b.log)
             .flat_map(|of_one_log| of_one_log.chunks(LANES))
             .collect();
         let errors: Vec<Vec<WindowError>> = packs
             .par_iter()
-            .map(|pack| roll(dynamics, values(pack[0].log), &logs[pack[0].log], pack, step_s))
+            .map(|pack| {
+                roll(
+                    dynamics,
+                    values(pack[0].log),
+                    &logs[pack[0].log],
+                    pack,
+                    step_s,
+                )
+            })
             .collect();
-        OpenLoop { horizon_s, windows: errors.into_iter().flatten().collect() }
+        OpenLoop {
+            horizon_s,
+            windows: errors.into_iter().flatten().collect(),
+        }
     };
     horizons_s.iter().map(one).collect()
 }
@@ -115,20 +133,35 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
             let end = log.time[first] + horizon_s + slack;
             let last = log.time.partition_point(|t| *t <= end) - 1;
             let touched = |from: f64, to: f64| {
-                log.leave_out.iter().any(|span| span.start_s <= to && span.end_s >= from)
+                log.leave_out
+                    .iter()
+                    .any(|span| span.start_s <= to && span.end_s >= from)
             };
             let whole = end <= end_of_log + slack && last > first && !touched(log.time[first], end);
-            (whole && initial_state(log, first).is_some()).then_some(Window { log: index, first, last })
+            (whole && initial_state(log, half_width, first).is_some()).then_some(Window {
+                log: index,
+                first,
+                last,
+            })
         })
         .collect()
 }
 
 /// Integrate up to [`LANES`] windows of one log.
-fn roll(dynamics: &Dynamics, values: &[f64], log: &Log, pack: &[Window], step_s: f64) -> Vec<WindowError> {
+fn roll(
+    dynamics: &Dynamics,
+    values: &[f64],
+    log: &Log,
+    pack: &[Window],
+    step_s: f64,
+) -> Vec<WindowError> {
     let n = dynamics.joints;
+    let half_width = half_width_s(log.median_step());
     let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
-    let starts: Vec<Vec<f64>> =
-        pack.iter().map(|w| initial_state(log, w.first).expect("windows() checks this")).collect();
+    let starts: Vec<Vec<f64>> = pack
+        .iter()
+        .map(|w| initial_state(log, half_width, w.first).expect("windows() checks this"))
+        .collect();
     let mut state: Vec<[f64; LANES]> = (0..2 * n)
         .map(|k| std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k]))
         .collect();
@@ -136,12 +169,14 @@ fn roll(dynamics: &Dynamics, values: &[f64], log: &Log, pack: &[Window], step_s:
     let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
     let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
     for row in 0..rows - 1 {
-        let at: [usize; LANES] = std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
+        let at: [usize; LANES] =
+            std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
         let time = at.map(|row| log.time[row]);
         let dt = at.map(|row| log.time[row + 1] - log.time[row]);
         let tau: Vec<[f64; LANES]> = log.tau.iter().map(|tau| at.map(|row| tau[row])).collect();
         let longest = dt.iter().fold(0.0_f64, |a, b| a.max(*b));
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // a small positive number
         let substeps = ((longest / step_s - 1e-6).ceil() as usize).max(1);
         rollout.advance(&mut state, &tau, time, dt, substeps);
         for (l, error) in errors.iter_mut().enumerate() {
@@ -172,7 +207,11 @@ impl WindowError {
             if !(value.abs() <= SENSIBLE) {
                 self.diverged = true;
                 // Held at the edge of the sensible: it counts as what it is, and stays a number.
-                *value = if value.is_nan() { SENSIBLE } else { value.clamp(-SENSIBLE, SENSIBLE) };
+                *value = if value.is_nan() {
+                    SENSIBLE
+                } else {
+                    value.clamp(-SENSIBLE, SENSIBLE)
+                };
             }
         }
         self.rows += 1;
@@ -186,8 +225,16 @@ impl WindowError {
 fn largest_change(coarse: &[OpenLoop], fine: &[OpenLoop], joints: usize) -> f64 {
     let numbers = |all: &[OpenLoop]| -> Vec<f64> {
         let summary: Summary = summarise(all, joints);
-        [summary.position_rmse, summary.position_median, summary.velocity_rmse].concat().concat()
+        [
+            summary.position_rmse,
+            summary.position_median,
+            summary.velocity_rmse,
+        ]
+        .concat()
+        .concat()
     };
     let pairs = numbers(coarse).into_iter().zip(numbers(fine));
-    pairs.map(|(a, b)| (a - b).abs() / b.abs().max(f64::MIN_POSITIVE)).fold(0.0, f64::max)
+    pairs
+        .map(|(a, b)| (a - b).abs() / b.abs().max(f64::MIN_POSITIVE))
+        .fold(0.0, f64::max)
 }

@@ -20,16 +20,27 @@ pub struct Summary {
 /// Put windows together into numbers; a horizon without windows has zeros and says so by its count.
 pub fn summarise(horizons: &[OpenLoop], joints: usize) -> Summary {
     let per_joint = |f: &dyn Fn(&OpenLoop, usize) -> f64| -> Vec<Vec<f64>> {
-        horizons.iter().map(|horizon| (0..joints).map(|j| f(horizon, j)).collect()).collect()
+        horizons
+            .iter()
+            .map(|horizon| (0..joints).map(|j| f(horizon, j)).collect())
+            .collect()
     };
     Summary {
         horizons_s: horizons.iter().map(|horizon| horizon.horizon_s).collect(),
         position_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| w.position[j])),
         position_median: per_joint(&|horizon, j| {
-            median(horizon.windows.iter().map(|w| root_mean(std::slice::from_ref(w), |w| w.position[j])))
+            median(
+                horizon
+                    .windows
+                    .iter()
+                    .map(|w| root_mean(std::slice::from_ref(w), |w| w.position[j])),
+            )
         }),
         velocity_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| w.velocity[j])),
-        windows: horizons.iter().map(|horizon| horizon.windows.len()).collect(),
+        windows: horizons
+            .iter()
+            .map(|horizon| horizon.windows.len())
+            .collect(),
         diverged: horizons
             .iter()
             .map(|horizon| horizon.windows.iter().filter(|w| w.diverged).count())

@@ -73,6 +73,43 @@ pub fn fit(
     Ok(search.finish())
 }
 
+/// The cost that one Gauss-Newton step promises for the model at `values`, within the parameters' bounds:
+/// the worth of a candidate before it is fitted. `None` where the model diverges there.
+pub fn promise(
+    shooting: &Shooting<'_>,
+    dynamics: &Dynamics,
+    active: &[usize],
+    values: &[f64],
+    locals: &[Vec<f64>],
+    scale: f64,
+) -> Option<f64> {
+    let tangent = Tangent::new(dynamics, active, Local::State);
+    let search = Search::new(
+        shooting,
+        dynamics,
+        &tangent,
+        values,
+        locals.to_vec(),
+        Some(scale),
+    )
+    .ok()?;
+    let terms = shooting.linearise(&tangent, values, locals, scale);
+    let (mut matrix, mut gradient) = (
+        DMatrix::zeros(active.len(), active.len()),
+        DVector::zeros(active.len()),
+    );
+    let mut own_gain = 0.0;
+    for terms in &terms {
+        let part = Eliminated::new(terms, active.len(), search.damping);
+        own_gain += part.own_gain;
+        matrix += part.matrix;
+        gradient += part.gradient;
+    }
+    let step = search.bounded_solution(matrix.clone(), -&gradient);
+    let gain = -gradient.dot(&step) - 0.5 * step.dot(&(matrix * &step)) + own_gain;
+    gain.is_finite().then_some(search.cost - gain)
+}
+
 struct Search<'a> {
     shooting: &'a Shooting<'a>,
     dynamics: &'a Dynamics,
@@ -257,6 +294,8 @@ struct Eliminated {
     /// Own values = -(own^-1 gradient) - (own^-1 cross) shared step.
     local_gradient: DVector<f64>,
     local_cross: DMatrix<f64>,
+    /// What the cost falls when the own values alone are adapted.
+    own_gain: f64,
 }
 
 impl Eliminated {
@@ -279,7 +318,7 @@ impl Eliminated {
             || DMatrix::zeros(locals, locals),
             |cholesky| cholesky.inverse(),
         );
-        let local_gradient = &inverse * own_gradient;
+        let local_gradient = &inverse * &own_gradient;
         let local_cross = &inverse * &cross;
         let matrix =
             terms.hessian.view((0, 0), (shared, shared)) - cross.transpose() * &local_cross;
@@ -287,6 +326,7 @@ impl Eliminated {
         Self {
             matrix,
             gradient,
+            own_gain: 0.5 * own_gradient.dot(&local_gradient),
             local_gradient,
             local_cross,
         }

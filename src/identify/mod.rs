@@ -11,9 +11,9 @@ mod sensitivity;
 mod shooting;
 mod window;
 
-pub use fit::{Fit, FitError, fit};
+pub use fit::{Fit, FitError, fit, promise};
 pub use identifiability::{Identifiability, identifiability};
-pub use intervals::{Uncertainty, uncertainty};
+pub use intervals::{Uncertainty, blocks, uncertainty};
 pub use sensitivity::Local;
 pub use shooting::{Shooting, WindowTerms};
 pub use window::{Window, cut, initial_state};

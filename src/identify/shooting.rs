@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::sensitivity::{Flow, LANES, Lane, Tangent};
 use super::window::{Window, initial_state};
-use crate::data::Log;
+use crate::data::{Log, half_width_s};
 use crate::model::{Dynamics, Rollout};
 
 /// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
@@ -67,9 +67,15 @@ impl<'l> Shooting<'l> {
 
     /// Each window's first guess of its state, with `extra` zeros behind.
     pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
+        let half_widths: Vec<f64> = self
+            .logs
+            .iter()
+            .map(|log| half_width_s(log.median_step()))
+            .collect();
         let guess = |window: &Window| {
-            let mut state =
-                initial_state(&self.logs[window.log], window.first).expect("cut() checks this");
+            let log = &self.logs[window.log];
+            let mut state = initial_state(log, half_widths[window.log], window.first)
+                .expect("cut() checks this");
             state.resize(state.len() + extra, 0.0);
             state
         };

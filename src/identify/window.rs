@@ -29,9 +29,10 @@ const GAP_STEPS: f64 = 5.0;
 pub fn cut(logs: &[Log], length_s: f64) -> Vec<Window> {
     let mut windows = Vec::new();
     for (index, log) in logs.iter().enumerate() {
+        let step_s = log.median_step();
         let mut first = 0;
         while first + 1 < log.rows() {
-            match window_at(log, first, length_s) {
+            match window_at(log, step_s, first, length_s) {
                 Ok(last) => {
                     windows.push(Window {
                         log: index,
@@ -48,11 +49,11 @@ pub fn cut(logs: &[Log], length_s: f64) -> Vec<Window> {
 }
 
 /// The last row of a window that begins at `first`, or the next row at which one may begin.
-fn window_at(log: &Log, first: usize, length_s: f64) -> Result<usize, usize> {
+fn window_at(log: &Log, step_s: f64, first: usize, length_s: f64) -> Result<usize, usize> {
     // Times are rounded decimals: half a step of slack keeps windows at their nominal length.
-    let end = log.time[first] + length_s + 0.5 * log.median_step();
+    let end = log.time[first] + length_s + 0.5 * step_s;
     let last = log.time.partition_point(|t| *t <= end) - 1;
-    if log.time[last] < log.time[first] + length_s - 0.5 * log.median_step() {
+    if log.time[last] < log.time[first] + length_s - 0.5 * step_s {
         return Err(if last + 1 < log.rows() {
             last + 1
         } else {
@@ -69,21 +70,22 @@ fn window_at(log: &Log, first: usize, length_s: f64) -> Result<usize, usize> {
             .partition_point(|t| *t <= span.end_s)
             .max(first + 1));
     }
-    let gap = (first..last)
-        .find(|&row| log.time[row + 1] - log.time[row] > GAP_STEPS * log.median_step());
+    let gap = (first..last).find(|&row| log.time[row + 1] - log.time[row] > GAP_STEPS * step_s);
     if let Some(row) = gap {
         return Err(row + 1);
     }
-    initial_state(log, first).map(|_| last).ok_or(first + 1)
+    initial_state(log, half_width_s(step_s), first)
+        .map(|_| last)
+        .ok_or(first + 1)
 }
 
-/// Angles, then velocities at a row, from the logged positions alone; `None` near the log's ends.
-pub fn initial_state(log: &Log, row: usize) -> Option<Vec<f64>> {
-    let half = half_width_s(log.median_step());
+/// Angles, then velocities at a row, from the logged positions within `half_width_s` alone (see
+/// [`half_width_s`]); `None` near the log's ends.
+pub fn initial_state(log: &Log, half_width_s: f64, row: usize) -> Option<Vec<f64>> {
     let fits: Option<Vec<_>> = log
         .q
         .iter()
-        .map(|q| local_cubic(&log.time, q, row, half))
+        .map(|q| local_cubic(&log.time, q, row, half_width_s))
         .collect();
     fits.map(|fits| {
         let angles = fits.iter().map(|fit| fit.value);

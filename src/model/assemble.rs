@@ -2,29 +2,28 @@ use super::effect::{EFFECT_NAMES, Entry};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
 use super::{Dynamics, Parameter};
-use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
+use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 impl System {
     /// The declared equations with the file's own effects, ready to run.
     pub fn dynamics(&self, sign: &[SignForm]) -> Dynamics {
-        self.dynamics_with(&[], sign)
+        self.dynamics_with(&self.effects, sign)
     }
 
-    /// The declared equations with the file's own effects and `extra` ones.
+    /// The declared equations with `effects` in place of the file's own.
     ///
     /// Effects of the torque act first, in the order given, then forces are added. `load` is the torque
     /// after the former. `sign` says for each joint how dry friction is written.
     ///
     /// # Panics
     /// When an effect names a joint that the system does not have, or `sign` has not one entry a joint.
-    pub fn dynamics_with(&self, extra: &[FittedEffect], sign: &[SignForm]) -> Dynamics {
+    pub fn dynamics_with(&self, effects: &[FittedEffect], sign: &[SignForm]) -> Dynamics {
         assert_eq!(
             sign.len(),
             self.joints,
             "one form of the sign for each joint"
         );
-        let effects: Vec<&FittedEffect> = self.effects.iter().chain(extra).collect();
-        let mut assembly = Assembly::new(self, &effects, sign);
+        let mut assembly = Assembly::new(self, effects, sign);
         assembly.apply_torque_effects();
         assembly.apply_forces();
         let accelerations = assembly.accelerations();
@@ -95,7 +94,7 @@ struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    fn new(system: &'a System, effects: &[&'a FittedEffect], sign: &'a [SignForm]) -> Self {
+    fn new(system: &'a System, effects: &'a [FittedEffect], sign: &'a [SignForm]) -> Self {
         let mut graph = Graph::new();
         let mut numbered = |stem: &str| -> Vec<Node> {
             (1..=system.joints)
@@ -113,7 +112,7 @@ impl<'a> Assembly<'a> {
         let mut with_nodes = Vec::new();
         for effect in effects {
             let own = effect_parameters(effect, &parameters);
-            with_nodes.push((*effect, own.iter().map(|p| graph.input(&p.name)).collect()));
+            with_nodes.push((effect, own.iter().map(|p| graph.input(&p.name)).collect()));
             parameters.extend(own);
         }
         Self {
@@ -131,7 +130,8 @@ impl<'a> Assembly<'a> {
     }
 
     fn apply_torque_effects(&mut self) {
-        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+        for index in 0..self.effects.len() {
+            let effect = self.effects[index].0;
             if let Entry::Torque(formula) = &effect.effect.entry {
                 self.tau[effect.joint] = self.effect_node(index, formula);
             }
@@ -140,7 +140,8 @@ impl<'a> Assembly<'a> {
 
     fn apply_forces(&mut self) {
         let mut forces: Vec<(usize, Node)> = Vec::new();
-        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+        for index in 0..self.effects.len() {
+            let effect = self.effects[index].0;
             if let Entry::Force(formula) = &effect.effect.entry {
                 forces.push((effect.joint, self.effect_node(index, formula)));
             }
@@ -199,7 +200,8 @@ impl<'a> Assembly<'a> {
     }
 
     fn add_inertia(&mut self, matrix: &mut [Vec<Node>]) {
-        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+        for index in 0..self.effects.len() {
+            let effect = self.effects[index].0;
             if let Entry::Inertia(formula) = &effect.effect.entry {
                 let extra = self.effect_node(index, formula);
                 let own = &mut matrix[effect.joint][effect.joint];
@@ -211,7 +213,8 @@ impl<'a> Assembly<'a> {
     /// The names of the declared equations: angles as effects turn them, torques as effects leave them.
     fn declared_scope(&mut self) -> Scope {
         let mut angles = self.q.clone();
-        for (index, (effect, _)) in self.effects.clone().iter().enumerate() {
+        for index in 0..self.effects.len() {
+            let effect = self.effects[index].0;
             if let Entry::Angle(formula) = &effect.effect.entry {
                 angles[effect.joint] = self.effect_node(index, formula);
             }
@@ -269,21 +272,4 @@ fn effect_parameters(effect: &FittedEffect, taken: &[Parameter]) -> Vec<Paramete
             scale: parameter.typical,
         })
         .collect()
-}
-
-impl Dynamics {
-    /// Names of the program's outputs, for the printers.
-    pub fn output_names(&self) -> Vec<String> {
-        let numbered = |stem: &str| {
-            (1..=self.joints)
-                .map(move |j| format!("{stem}{j}"))
-                .collect::<Vec<_>>()
-        };
-        [numbered("qd"), numbered("qdd")].concat()
-    }
-
-    /// Outputs 0..n of the program are the rates of the angles, n..2n the accelerations.
-    pub fn program(&self) -> &Program {
-        &self.program
-    }
 }

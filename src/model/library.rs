@@ -13,6 +13,7 @@ static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/models");
 #[derive(Debug, Clone)]
 pub struct Library {
     effects: Vec<Effect>,
+    probes: Vec<Effect>,
 }
 
 impl Library {
@@ -21,19 +22,10 @@ impl Library {
     /// # Panics
     /// Never: a test reads every embedded file.
     pub fn built_in() -> Self {
-        let files = BUILT_IN
-            .get_dir("effects")
-            .expect("models/effects is embedded")
-            .files();
-        let mut effects: Vec<Effect> = files
-            .filter(|file| is_toml(file.path()))
-            .map(|file| {
-                let text = file.contents_utf8().expect("embedded files are UTF-8");
-                Effect::from_text(file.path(), text).expect("embedded effects are read by a test")
-            })
-            .collect();
-        effects.sort_by(|a, b| a.name.cmp(&b.name));
-        Self { effects }
+        Self {
+            effects: embedded("effects"),
+            probes: embedded("probes"),
+        }
     }
 
     /// Add every `*.toml` of a folder; an effect of a known name replaces the known one.
@@ -65,6 +57,11 @@ impl Library {
     /// All effects, by name.
     pub fn effects(&self) -> &[Effect] {
         &self.effects
+    }
+
+    /// Flexible shapes that name nothing: what is left over is asked whether it follows one of them.
+    pub fn probes(&self) -> &[Effect] {
+        &self.probes
     }
 
     /// The effect of this name.
@@ -119,6 +116,23 @@ impl Library {
             error
         })
     }
+}
+
+/// The embedded effect files of one folder, by name.
+fn embedded(folder: &str) -> Vec<Effect> {
+    let files = BUILT_IN
+        .get_dir(folder)
+        .expect("the folder is embedded")
+        .files();
+    let mut effects: Vec<Effect> = files
+        .filter(|file| is_toml(file.path()))
+        .map(|file| {
+            let text = file.contents_utf8().expect("embedded files are UTF-8");
+            Effect::from_text(file.path(), text).expect("embedded effects are read by a test")
+        })
+        .collect();
+    effects.sort_by(|a, b| a.name.cmp(&b.name));
+    effects
 }
 
 fn is_toml(path: &Path) -> bool {

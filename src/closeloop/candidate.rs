@@ -1,0 +1,96 @@
+use super::study::{Fitted, Study, joined};
+use crate::identify::promise;
+use crate::model::{Effect, Entry, FittedEffect};
+
+/// Every effect of the library on every joint where it can act and where it is not in the model yet.
+pub fn candidates(
+    study: &Study<'_>,
+    library: &[Effect],
+    present: &[FittedEffect],
+) -> Vec<FittedEffect> {
+    let mut all = Vec::new();
+    for effect in library {
+        let joints = if effect.first_joint_only {
+            1
+        } else {
+            study.system.joints
+        };
+        for joint in 0..joints {
+            let there = present
+                .iter()
+                .any(|p| p.joint == joint && p.effect.name == effect.name);
+            if !there && can_act(study, effect, joint) {
+                all.push(FittedEffect {
+                    effect: effect.clone(),
+                    joint,
+                    values: vec![(0.0, None); effect.parameters.len()],
+                    fixed: false,
+                });
+            }
+        }
+    }
+    all
+}
+
+fn can_act(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
+    let formula = effect.entry.formula();
+    let needs_torque = formula
+        .names()
+        .iter()
+        .any(|name| ["tau", "load"].contains(name));
+    match effect.entry {
+        Entry::Inertia(_) => study.system.has_mass_matrix(),
+        Entry::Torque(_) => study.top_torque[joint] > 0.0,
+        Entry::Force(_) | Entry::Angle(_) => !needs_torque || study.top_torque[joint] > 0.0,
+    }
+}
+
+/// The candidate at each of its starting points, every combination of searched values.
+fn starts(study: &Study<'_>, candidate: &FittedEffect) -> Vec<FittedEffect> {
+    let mut points = vec![Vec::new()];
+    for parameter in &candidate.effect.parameters {
+        let unit = study.unit_of(parameter.measure, candidate.joint);
+        let grown = points.iter().flat_map(|point| {
+            parameter.starts.iter().map(move |start| {
+                let value = (start * unit).clamp(parameter.bounds[0], parameter.bounds[1]);
+                [point.as_slice(), &[(value, None)]].concat()
+            })
+        });
+        points = grown.collect();
+    }
+    points
+        .into_iter()
+        .map(|values| FittedEffect {
+            values,
+            ..candidate.clone()
+        })
+        .collect()
+}
+
+/// The starting point of a candidate that promises most beside the model at hand, and the cost it promises.
+pub fn best_start(
+    study: &Study<'_>,
+    model: &Fitted,
+    candidate: &FittedEffect,
+) -> Option<(FittedEffect, f64)> {
+    let promised = |start: FittedEffect| {
+        let mut effects = model.effects.clone();
+        effects.push(start.clone());
+        let dynamics = study.system.dynamics_with(&effects, &study.sign);
+        let values = joined(&model.declared, &effects);
+        let (active, locals) = (study.active(&dynamics), &model.fit.locals);
+        promise(
+            &study.shooting,
+            &dynamics,
+            &active,
+            &values,
+            locals,
+            model.fit.scale,
+        )
+        .map(|cost| (start, cost))
+    };
+    starts(study, candidate)
+        .into_iter()
+        .filter_map(promised)
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+}

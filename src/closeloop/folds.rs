@@ -1,0 +1,67 @@
+use nalgebra::{DMatrix, DVector};
+
+use crate::identify::{Fit, Shooting, blocks};
+
+/// With this many logs a whole log is left out at a time; with fewer, stretches of two seconds.
+const ENOUGH_LOGS: usize = 8;
+
+/// For each window the fold that it is left out with: its trajectory or, where there are few, a stretch of it.
+pub fn folds(shooting: &Shooting<'_>) -> Vec<usize> {
+    if shooting.logs.len() >= ENOUGH_LOGS {
+        shooting.windows.iter().map(|window| window.log).collect()
+    } else {
+        blocks(shooting)
+    }
+}
+
+/// The loss on each fold of the parameters fitted without it. The fit is not repeated: each window's loss
+/// is taken as quadratic around the joint optimum, where leaving out a fold moves the parameters by
+/// (H - `H_k`)^-1 `g_k`.
+pub fn left_out_losses(fit: &Fit, folds: &[usize]) -> Vec<f64> {
+    let count = folds.iter().max().map_or(0, |last| last + 1);
+    let size = fit.active.len();
+    let mut parts = vec![(0.0, DVector::zeros(size), DMatrix::zeros(size, size)); count];
+    for (terms, &fold) in fit.reduced.iter().zip(folds) {
+        let part = &mut parts[fold];
+        part.0 += terms.cost;
+        part.1 += &terms.gradient;
+        part.2 += &terms.hessian;
+    }
+    let all = parts
+        .iter()
+        .fold(DMatrix::zeros(size, size), |sum, part| sum + &part.2);
+    let total = parts
+        .iter()
+        .fold(DVector::zeros(size), |sum: DVector<f64>, part| {
+            sum + &part.1
+        });
+    parts
+        .iter()
+        .map(|(cost, gradient, hessian)| {
+            // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
+            let own = gradient - &total * share(hessian, &all);
+            let step = free_step(&(&all - hessian), &own);
+            cost + gradient.dot(&step) + 0.5 * step.dot(&(hessian * &step))
+        })
+        .collect()
+}
+
+/// The part of the information that one fold holds.
+fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
+    part.trace() / all.trace().max(f64::MIN_POSITIVE)
+}
+
+fn free_step(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
+    let scale = matrix
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(right.len(), right.len(), |i, j| {
+        matrix[(i, j)] * scale[i] * scale[j]
+    });
+    let inverse = scaled
+        .pseudo_inverse(1e-10)
+        .unwrap_or_else(|_| DMatrix::zeros(right.len(), right.len()));
+    let step = inverse * right.component_mul(&scale);
+    step.component_mul(&scale)
+}

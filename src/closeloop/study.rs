@@ -1,0 +1,245 @@
+use thiserror::Error;
+
+use crate::data::{Audit, Log, audit};
+use crate::expr::SignForm;
+use crate::identify::{Fit, FitError, Shooting, cut, fit, identifiability};
+use crate::model::{Dynamics, FittedEffect, Measure, System};
+
+/// Why the loop could not be closed at all.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    #[error(transparent)]
+    Fit(#[from] FitError),
+}
+
+/// Windows over which models are fitted and compared, in s: short ones first, in which even a poor start
+/// does not diverge, then the length over which most effects show.
+pub const WINDOWS_S: [f64; 2] = [0.15, 0.5];
+
+/// Dry friction is smoothed over this share of a joint's top speed in the logs, so that the width means the
+/// same on a slow axis and on a fast arm.
+const SIGN_WIDTH: f64 = 0.002;
+
+/// A declared system, logs to learn from, and what both imply.
+pub struct Study<'a> {
+    pub system: &'a System,
+    pub logs: &'a [Log],
+    pub sign: Vec<SignForm>,
+    /// Top speed and top torque of each joint.
+    pub top_speed: Vec<f64>,
+    pub top_torque: Vec<f64>,
+    pub shooting: Shooting<'a>,
+    /// Declared parameters that the logs do not determine, held at their declared values.
+    pub held: Vec<usize>,
+}
+
+/// A model fitted to a study's logs.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Values of the declared parameters.
+    pub declared: Vec<f64>,
+    /// Effects with their fitted values.
+    pub effects: Vec<FittedEffect>,
+    pub dynamics: Dynamics,
+    pub fit: Fit,
+}
+
+impl<'a> Study<'a> {
+    pub fn new(system: &'a System, logs: &'a [Log]) -> Self {
+        let audits: Vec<Audit> = logs.iter().map(audit).collect();
+        let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+            (0..system.joints)
+                .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
+                .collect()
+        };
+        let top_speed = top(&|l, j| audits[l].joints[j].fast_rad_s);
+        let top_torque = top(&|l, j| {
+            audits[l].joints[j]
+                .tau
+                .max
+                .max(-audits[l].joints[j].tau.min)
+        });
+        // Encoders that are finer than their noise show it; coarse ones add the error of rounding.
+        let noise = top(&|l, j| {
+            let channel = &audits[l].joints[j].q;
+            channel
+                .noise_std
+                .max(channel.resolution / 12.0_f64.sqrt())
+                .max(1e-9)
+        });
+        let sign = top_speed.iter().map(|speed| SignForm::Smooth {
+            width: SIGN_WIDTH * speed.max(1e-6),
+        });
+        Self {
+            system,
+            logs,
+            sign: sign.collect(),
+            shooting: Shooting::new(logs, cut(logs, WINDOWS_S[1]), &noise),
+            top_speed,
+            top_torque,
+            held: Vec::new(),
+        }
+    }
+
+    /// Fit the declared model, with the effects that its file carries, from its declared values; what the
+    /// logs do not determine is found on the way and held from then on.
+    ///
+    /// # Errors
+    /// No window, or a model that diverges even over short windows.
+    pub fn fit_declared(&mut self) -> Result<Fitted, StudyError> {
+        let short = Shooting::new(
+            self.logs,
+            cut(self.logs, WINDOWS_S[0]),
+            &self.shooting.noise,
+        );
+        let declared: Vec<f64> = self.system.parameters.iter().map(|p| p.value).collect();
+        let effects = &self.system.effects;
+        let first = self.fit_on(&short, effects, &declared, short.initial_locals(0), None)?;
+        let first = self.hold_undetermined(&short, first)?;
+        let locals = self.shooting.initial_locals(0);
+        let second = self.fit_on(
+            &self.shooting,
+            &first.effects,
+            &first.declared,
+            locals,
+            None,
+        )?;
+        let verdict = identifiability(&second.dynamics, &second.fit);
+        if verdict.hold.is_empty() {
+            return Ok(second);
+        }
+        self.held.extend(
+            verdict
+                .hold
+                .iter()
+                .filter(|&&k| k < self.system.parameters.len()),
+        );
+        let locals = self.shooting.initial_locals(0);
+        Ok(self.fit_on(
+            &self.shooting,
+            &first.effects,
+            &self.declared_where_held(&first.declared),
+            locals,
+            None,
+        )?)
+    }
+
+    fn hold_undetermined(
+        &mut self,
+        short: &Shooting<'_>,
+        first: Fitted,
+    ) -> Result<Fitted, StudyError> {
+        let verdict = identifiability(&first.dynamics, &first.fit);
+        self.held.extend(
+            verdict
+                .hold
+                .iter()
+                .filter(|&&k| k < self.system.parameters.len()),
+        );
+        if self.held.is_empty() {
+            return Ok(first);
+        }
+        let values = self.declared_where_held(&first.declared);
+        Ok(self.fit_on(
+            short,
+            &first.effects,
+            &values,
+            short.initial_locals(0),
+            None,
+        )?)
+    }
+
+    fn declared_where_held(&self, values: &[f64]) -> Vec<f64> {
+        let mut values = values.to_vec();
+        for &k in &self.held {
+            values[k] = self.system.parameters[k].value;
+        }
+        values
+    }
+
+    /// Fit a set of effects, starting from the values that they and the declared parameters carry.
+    ///
+    /// # Errors
+    /// As [`Study::fit_declared`].
+    pub fn refit(
+        &self,
+        effects: &[FittedEffect],
+        declared: &[f64],
+        locals: Vec<Vec<f64>>,
+        scale: Option<f64>,
+    ) -> Result<Fitted, FitError> {
+        self.fit_on(&self.shooting, effects, declared, locals, scale)
+    }
+
+    fn fit_on(
+        &self,
+        shooting: &Shooting<'_>,
+        effects: &[FittedEffect],
+        declared: &[f64],
+        locals: Vec<Vec<f64>>,
+        scale: Option<f64>,
+    ) -> Result<Fitted, FitError> {
+        let dynamics = self.system.dynamics_with(effects, &self.sign);
+        let values = joined(declared, effects);
+        let fit = fit(
+            shooting,
+            &dynamics,
+            &self.active(&dynamics),
+            &values,
+            locals,
+            scale,
+        )?;
+        Ok(Fitted::new(dynamics, effects, fit, declared.len()))
+    }
+
+    /// Parameters that a fit may change.
+    pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
+        let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
+        (0..dynamics.parameters.len()).filter(free).collect()
+    }
+
+    /// The unit in which an effect's searched values are given, on this joint.
+    pub fn unit_of(&self, measure: Measure, joint: usize) -> f64 {
+        match measure {
+            Measure::One => 1.0,
+            Measure::Speed => self.top_speed[joint],
+            Measure::Torque => self.top_torque[joint],
+        }
+    }
+}
+
+/// Declared values, then those of the effects: all parameters of the model, in its order.
+pub fn joined(declared: &[f64], effects: &[FittedEffect]) -> Vec<f64> {
+    let of_effects = effects
+        .iter()
+        .flat_map(|effect| effect.values.iter().map(|(value, _)| *value));
+    declared.iter().copied().chain(of_effects).collect()
+}
+
+impl Fitted {
+    fn new(dynamics: Dynamics, effects: &[FittedEffect], fit: Fit, declared: usize) -> Self {
+        let mut effects = effects.to_vec();
+        let mut values = fit.values[declared..].iter();
+        for slot in effects.iter_mut().flat_map(|effect| &mut effect.values) {
+            slot.0 = *values
+                .next()
+                .expect("the model has a value for each parameter");
+        }
+        Self {
+            declared: fit.values[..declared].to_vec(),
+            effects,
+            dynamics,
+            fit,
+        }
+    }
+
+    /// Where the parameters of the k-th effect stand among all parameters.
+    pub fn range_of(&self, k: usize) -> std::ops::Range<usize> {
+        let before: usize = self.effects[..k]
+            .iter()
+            .map(|effect| effect.values.len())
+            .sum();
+        let start = self.declared.len() + before;
+        start..start + self.effects[k].values.len()
+    }
+}

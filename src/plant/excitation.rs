@@ -1,0 +1,58 @@
+use std::f64::consts::TAU;
+
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+/// The torque that drives a rig: a sum of sines of equal amplitude with random phases, different in each log.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Excitation {
+    /// Largest torque, one a joint, in N m (or N).
+    pub amplitude: Vec<f64>,
+    /// Lowest and highest frequency in Hz.
+    pub band_hz: [f64; 2],
+    /// Number of sines.
+    pub tones: usize,
+}
+
+/// One draw of the phases: `[joint][tone]` of amplitude, angular frequency, phase.
+pub(super) struct Tones(Vec<Vec<[f64; 3]>>);
+
+impl Excitation {
+    pub(super) fn draw(&self, rng: &mut impl Rng) -> Tones {
+        let [low, high] = self.band_hz;
+        #[allow(clippy::cast_precision_loss)] // few tones
+        let count = self.tones.max(1) as f64;
+        let mut tones = |amplitude: f64| {
+            (0..self.tones)
+                .map(|k| {
+                    // One tone in each slice of the band, on a scale of octaves, so that draws differ in
+                    // period as well as in phase.
+                    #[allow(clippy::cast_precision_loss)]
+                    let place = (k as f64 + rng.random::<f64>()) / count;
+                    let frequency = low * (high / low).powf(place);
+                    [
+                        amplitude / count.sqrt(),
+                        TAU * frequency,
+                        TAU * rng.random::<f64>(),
+                    ]
+                })
+                .collect()
+        };
+        Tones(
+            self.amplitude
+                .iter()
+                .map(|amplitude| tones(*amplitude))
+                .collect(),
+        )
+    }
+}
+
+impl Tones {
+    /// The torque of each joint at `time` (s).
+    pub fn at(&self, time: f64) -> Vec<f64> {
+        let sum =
+            |tones: &Vec<[f64; 3]>| tones.iter().map(|[a, w, p]| a * (w * time + p).sin()).sum();
+        self.0.iter().map(sum).collect()
+    }
+}

@@ -1,0 +1,232 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Excitation;
+use crate::expr::suggestion;
+use crate::model::{FileError, FittedEffect, Library, System};
+
+/// Why a plant cannot be simulated.
+#[derive(Debug, Error)]
+pub enum PlantError {
+    #[error(transparent)]
+    Model(#[from] FileError),
+    #[error("{path}: {message}", path = .path.display())]
+    File { path: PathBuf, message: String },
+    #[error("{0}")]
+    Effect(String),
+    #[error(
+        "the simulated rig diverges at {time_s:.3} s; give it less torque, or parameters of a real rig"
+    )]
+    Diverged { time_s: f64 },
+}
+
+/// A rig to simulate: a model, its true parameters and hidden effects, how it is driven and measured.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    pub system: System,
+    /// True values of the declared parameters, in their order.
+    pub parameters: Vec<f64>,
+    pub effects: Vec<FittedEffect>,
+    pub sensor: Sensor,
+    pub excitation: Excitation,
+    pub recording: Recording,
+}
+
+/// How the rig is measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// Rows a second.
+    pub rate_hz: f64,
+    /// Standard deviation of the noise on the angles, in rad (or m).
+    pub position_noise: f64,
+    /// Step of the encoder in rad (or m); 0 for none.
+    pub position_step: f64,
+}
+
+/// What is recorded.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recording {
+    pub logs: usize,
+    pub duration_s: f64,
+    /// Angles, then velocities at the start of each log.
+    pub start: Vec<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    model: PathBuf,
+    #[serde(default)]
+    parameters: BTreeMap<String, f64>,
+    #[serde(default)]
+    effect: Vec<EffectEntry>,
+    sensor: Sensor,
+    excitation: Excitation,
+    recording: Recording,
+}
+
+#[derive(Debug, Deserialize)]
+struct EffectEntry {
+    name: String,
+    joint: usize,
+    #[serde(flatten)]
+    values: BTreeMap<String, f64>,
+}
+
+/// Rates, torques and times of a desk-sized rig, for a plant that is given as a model file alone.
+const USUAL_SENSOR: Sensor = Sensor {
+    rate_hz: 100.0,
+    position_noise: 1e-3,
+    position_step: 0.0,
+};
+
+impl Plant {
+    /// Read a plant file or, for a model file (or the name of an embedded system), the rig that it
+    /// declares with a usual sensor and drive.
+    ///
+    /// # Errors
+    /// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
+    pub fn read(path: &Path, library: &Library) -> Result<Self, PlantError> {
+        match std::fs::read_to_string(path) {
+            Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
+            _ => Ok(Self::of_system(library.system(path)?)),
+        }
+    }
+
+    /// The plant in `text`; `path` is for messages, and model files are looked for beside it.
+    ///
+    /// # Errors
+    /// As [`Plant::read`].
+    pub fn from_text(path: &Path, text: &str, library: &Library) -> Result<Self, PlantError> {
+        let wrong = |message: String| PlantError::File {
+            path: path.to_owned(),
+            message,
+        };
+        let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        let beside = path.parent().unwrap_or(Path::new("")).join(&file.model);
+        let model = if beside.exists() {
+            &beside
+        } else {
+            &file.model
+        };
+        let mut plant = Self::of_system(library.system(model)?);
+        for (name, value) in &file.parameters {
+            let known = &plant.system.parameters;
+            let Some(k) = known.iter().position(|p| p.name == *name) else {
+                let near = suggestion(name, known.iter().map(|p| p.name.as_str()));
+                return Err(wrong(format!(
+                    "unknown parameter `{name}` of {}{near}",
+                    plant.system.name
+                )));
+            };
+            plant.parameters[k] = *value;
+        }
+        for entry in file.effect {
+            let values: Vec<(String, f64)> = entry.values.into_iter().collect();
+            plant.add_effect(library, &entry.name, entry.joint, &values)?;
+        }
+        plant.sensor = file.sensor;
+        plant.excitation = file.excitation;
+        plant.recording = file.recording;
+        plant.check().map_err(wrong)?;
+        Ok(plant)
+    }
+
+    fn of_system(system: System) -> Self {
+        let joints = system.joints;
+        Self {
+            parameters: system.parameters.iter().map(|p| p.value).collect(),
+            effects: system.effects.clone(),
+            sensor: USUAL_SENSOR,
+            excitation: Excitation {
+                amplitude: vec![1.0; joints],
+                band_hz: [0.1, 2.0],
+                tones: 8,
+            },
+            recording: Recording {
+                logs: 1,
+                duration_s: 20.0,
+                start: vec![0.0; 2 * joints],
+            },
+            system,
+        }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let n = self.system.joints;
+        let one_each = |what: &str, found: usize, wanted: usize| {
+            if found == wanted {
+                Ok(())
+            } else {
+                Err(format!("`{what}` needs {wanted} numbers, found {found}"))
+            }
+        };
+        one_each("excitation.amplitude", self.excitation.amplitude.len(), n)?;
+        one_each("recording.start", self.recording.start.len(), 2 * n)?;
+        let [low, high] = self.excitation.band_hz;
+        if !(low > 0.0 && high > low) {
+            return Err("`excitation.band_hz` is two rising frequencies above zero".into());
+        }
+        if !(self.sensor.rate_hz > 0.0 && self.recording.duration_s * self.sensor.rate_hz >= 2.0) {
+            return Err(
+                "`sensor.rate_hz` times `recording.duration_s` must give at least two rows".into(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Let an effect act on a joint (counted from 1); parameters that are not given are at their typical value.
+    ///
+    /// # Errors
+    /// Unknown effect, joint or parameter, with what is known.
+    pub fn add_effect(
+        &mut self,
+        library: &Library,
+        name: &str,
+        joint: usize,
+        values: &[(String, f64)],
+    ) -> Result<(), PlantError> {
+        let effect = library.effect(name).map_err(PlantError::Effect)?;
+        if !(1..=self.system.joints).contains(&joint) {
+            let message = format!(
+                "effect `{name}`: `joint` is from 1 to {}, found {joint}",
+                self.system.joints
+            );
+            return Err(PlantError::Effect(message));
+        }
+        let mut own: Vec<(f64, Option<[f64; 2]>)> = effect
+            .parameters
+            .iter()
+            .map(|p| (p.typical, None))
+            .collect();
+        for (key, value) in values {
+            let Some(k) = effect.parameters.iter().position(|p| p.name == *key) else {
+                let near = suggestion(key, effect.parameters.iter().map(|p| p.name.as_str()));
+                let known: Vec<&str> = effect.parameters.iter().map(|p| p.name.as_str()).collect();
+                let known = known.join(", ");
+                let message =
+                    format!("effect `{name}` has no parameter `{key}`{near}; it has {known}");
+                return Err(PlantError::Effect(message));
+            };
+            own[k].0 = *value;
+        }
+        self.effects.push(FittedEffect {
+            effect: effect.clone(),
+            joint: joint - 1,
+            values: own,
+            fixed: false,
+        });
+        Ok(())
+    }
+}
+
+/// A plant file names a model; a model file has a system.
+fn is_plant(text: &str) -> bool {
+    text.parse::<toml::Table>()
+        .is_ok_and(|table| table.contains_key("model"))
+}

@@ -1,0 +1,98 @@
+use std::path::PathBuf;
+
+use rand::Rng;
+use rand_distr::{Distribution, Normal};
+
+use super::file::{Plant, PlantError};
+use crate::closeloop::joined;
+use crate::data::Log;
+use crate::expr::SignForm;
+use crate::model::{Dynamics, Rollout};
+
+/// The rig moves in steps of this length (s), far below what any fit uses.
+const STEP_S: f64 = 1e-4;
+/// Dry friction reverses over this speed (rad/s): many times sharper than in any fit.
+const SIGN_WIDTH: f64 = 1e-3;
+
+impl Plant {
+    /// The true equations of motion.
+    pub fn dynamics(&self) -> Dynamics {
+        let sign = vec![SignForm::Smooth { width: SIGN_WIDTH }; self.system.joints];
+        self.system.dynamics_with(&self.effects, &sign)
+    }
+
+    /// Record one log. Velocities are backward differences of the measured angles, as on many rigs.
+    ///
+    /// # Errors
+    /// A rig that diverges.
+    pub fn record(&self, rng: &mut impl Rng) -> Result<Log, PlantError> {
+        let n = self.system.joints;
+        let tones = self.excitation.draw(rng);
+        let dynamics = self.dynamics();
+        let mut rollout =
+            Rollout::<f64, 1>::new(&dynamics, &joined(&self.parameters, &self.effects));
+        let dt = 1.0 / self.sensor.rate_hz;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // checked to be a few thousand
+        let (rows, substeps) = (
+            (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1,
+            ((dt / STEP_S).ceil() as usize).max(1),
+        );
+        let mut state: Vec<[f64; 1]> = self.recording.start.iter().map(|value| [*value]).collect();
+        let mut log = empty_log(n);
+        for row in 0..rows {
+            #[allow(clippy::cast_precision_loss)] // a few thousand rows
+            let time = row as f64 * dt;
+            let tau = tones.at(time);
+            self.measure(&mut log, time, &state, &tau, rng);
+            let held: Vec<[f64; 1]> = tau.iter().map(|tau| [*tau]).collect();
+            rollout.advance(&mut state, &held, [time], [dt], substeps);
+            if state.iter().any(|value| !value[0].is_finite()) {
+                return Err(PlantError::Diverged { time_s: time });
+            }
+        }
+        Ok(log)
+    }
+
+    fn measure(
+        &self,
+        log: &mut Log,
+        time: f64,
+        state: &[[f64; 1]],
+        tau: &[f64],
+        rng: &mut impl Rng,
+    ) {
+        let noise = Normal::new(0.0, self.sensor.position_noise)
+            .expect("a standard deviation is not negative");
+        let previous = log.time.last().copied();
+        log.time.push(time);
+        for j in 0..tau.len() {
+            let step = self.sensor.position_step;
+            let read = state[j][0] + noise.sample(rng);
+            let q = if step > 0.0 {
+                (read / step).round() * step
+            } else {
+                read
+            };
+            let qd = match (previous, log.q[j].last()) {
+                (Some(before), Some(last)) => (q - last) / (time - before),
+                _ => 0.0,
+            };
+            log.q[j].push(q);
+            log.qd[j].push(qd);
+            log.tau[j].push(tau[j]);
+        }
+    }
+}
+
+fn empty_log(joints: usize) -> Log {
+    Log {
+        path: PathBuf::new(),
+        time: Vec::new(),
+        q: vec![Vec::new(); joints],
+        qd: vec![Vec::new(); joints],
+        tau: vec![Vec::new(); joints],
+        leave_out: Vec::new(),
+        notes: Vec::new(),
+    }
+}
