@@ -10,6 +10,10 @@ use crate::model::{Dynamics, FittedEffect, Measure, System};
 pub enum StudyError {
     #[error(transparent)]
     Fit(#[from] FitError),
+    #[error(transparent)]
+    Train(#[from] crate::train::TrainError),
+    #[error(transparent)]
+    Hybrid(#[from] crate::model::HybridError),
 }
 
 /// Windows over which models are fitted and compared, in s: short ones first, in which even a poor start
@@ -196,6 +200,15 @@ impl<'a> Study<'a> {
     pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
         let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
+    }
+
+    /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
+    pub fn sign_widths(&self) -> Vec<f64> {
+        let width = |sign: &SignForm| match sign {
+            SignForm::Exact => 0.0,
+            SignForm::Smooth { width } => *width,
+        };
+        self.sign.iter().map(width).collect()
     }
 
     /// The unit in which an effect's searched values are given, on this joint.

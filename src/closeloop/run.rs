@@ -1,0 +1,205 @@
+use rand_chacha::ChaCha8Rng;
+
+use super::bootstrap::reduction_interval;
+use super::learn::{learn_residual};
+use super::outcome::{Alternative, Errors, Finding, Outcome, Verdict};
+use super::residual::residual_force;
+use super::select::{Selection, p_value, select};
+use super::split::Split;
+use super::study::{Fitted, Study, StudyError};
+use super::unexplained::{Unexplained, unexplained};
+use crate::data::audit;
+use crate::evaluate::{Assessment, assess};
+use crate::identify::{Identifiability, identifiability, uncertainty};
+use crate::model::{Dynamics, Library, Parameter, System};
+use crate::train::Backend;
+
+/// What closing the loop is asked for.
+pub struct Request<'a> {
+    pub system: &'a System,
+    pub library: &'a Library,
+    pub split: Split,
+    /// Horizons of the reported errors in s; the effect of an effect is reported at the middle one.
+    pub horizons_s: [f64; 3],
+    pub backend: Backend,
+}
+
+/// Where the work stands, for a progress display.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage<'s> {
+    /// Of [`STAGES`].
+    pub number: usize,
+    pub text: &'s str,
+}
+
+/// Number of stages that [`close_loop`] announces.
+pub const STAGES: usize = 6;
+
+/// Fewer windows than this tell nothing.
+const FEWEST_WINDOWS: usize = 8;
+
+/// Fit the declared model, add effects while they help on trajectories left out of the fit, train the residual
+/// network on what is left, and measure before and after on the test logs.
+///
+/// # Errors
+/// Logs without a usable window, or a declared model that diverges from its starting values.
+pub fn close_loop(
+    request: Request<'_>,
+    rng: &mut ChaCha8Rng,
+    progress: &mut dyn FnMut(Stage<'_>),
+) -> Result<Outcome, StudyError> {
+    let Request { system, library, split, horizons_s, backend } = request;
+    let audits = split.train.iter().chain(&split.test).map(audit).collect();
+    progress(Stage { number: 0, text: "fitting the declared model" });
+    let mut study = Study::new(system, &split.train);
+    let before = study.fit_declared()?;
+    let identifiability = identifiability(&before.dynamics, &before.fit);
+    let Selection { model: after, rounds } = select(&study, library.effects(), before.clone(), &mut |text| {
+        progress(Stage { number: 1, text });
+    });
+    progress(Stage { number: 2, text: "asking what is left" });
+    let left = unexplained(&study, library.probes(), &before, &after);
+    progress(Stage { number: 3, text: "residual force" });
+    let residual_before = residual_force(&study, &before);
+    let residual_after = residual_force(&study, &after);
+    let learned = learn_residual(&study, &after, backend, rng, &mut |text| {
+        progress(Stage { number: 4, text });
+    })?;
+    progress(Stage { number: 5, text: "open-loop errors" });
+    let judge = |model: &Fitted| assess(&model.dynamics, |_| &model.fit.values, &split.test, &horizons_s);
+    let hybrid = learned.as_ref().map(|learned| learned.hybrid.clone());
+    let errors = errors(&before, &after, hybrid.as_ref(), judge, &split, &horizons_s, rng);
+    let parameters = with_intervals(&study, &after);
+    let findings = findings(&study, &after, &parameters, &errors.after, judge);
+    let (verdict, reason) = verdict(&study, &after, &left, &identifiability);
+    Ok(Outcome {
+        verdict,
+        reason,
+        how_split: split.how.clone(),
+        audits,
+        held: study.held.clone(),
+        sign_widths: study.sign_widths(),
+        identifiability,
+        alternatives: rounds.iter().flat_map(Alternative::of_round).collect(),
+        before,
+        after,
+        parameters,
+        findings,
+        rounds,
+        unexplained: left,
+        errors,
+        residual_before,
+        residual_after,
+        learned,
+        train: split.train.clone(),
+        test: split.test,
+    })
+}
+
+fn errors(
+    before: &Fitted,
+    after: &Fitted,
+    hybrid: Option<&Dynamics>,
+    judge: impl Fn(&Fitted) -> Assessment,
+    split: &Split,
+    horizons_s: &[f64],
+    rng: &mut ChaCha8Rng,
+) -> Errors {
+    let (before, after) = (judge(before), judge(after));
+    let values = hybrid.map(Dynamics::values).unwrap_or_default();
+    Errors {
+        hybrid: hybrid.map(|model| assess(model, |_| &values, &split.test, horizons_s)),
+        reduction_ci95: reduction_interval(middle(&before), middle(&after), rng),
+        before,
+        after,
+    }
+}
+
+/// The horizon by which effects are compared.
+fn middle(assessment: &Assessment) -> &crate::evaluate::OpenLoop {
+    &assessment.horizons[assessment.horizons.len() / 2]
+}
+
+/// Fitted values with their 95 % intervals; parameters that were not free have none.
+fn with_intervals(study: &Study<'_>, model: &Fitted) -> Vec<Parameter> {
+    let uncertainty = uncertainty(&study.shooting, &model.fit);
+    let mut parameters = model.dynamics.parameters.clone();
+    for (parameter, value) in parameters.iter_mut().zip(&model.fit.values) {
+        parameter.value = *value;
+        parameter.ci95 = None;
+    }
+    for (i, &k) in model.fit.active.iter().enumerate() {
+        let (value, half) = (model.fit.values[k], uncertainty.half_width(i));
+        let [low, high] = parameters[k].bounds;
+        parameters[k].ci95 = Some([(value - half).max(low), (value + half).min(high)]);
+    }
+    parameters
+}
+
+fn findings(
+    study: &Study<'_>,
+    model: &Fitted,
+    parameters: &[Parameter],
+    with: &Assessment,
+    judge: impl Fn(&Fitted) -> Assessment,
+) -> Vec<Finding> {
+    let declared = study.system.effects.len();
+    let finding = |k: usize| {
+        let own = parameters[model.range_of(k)].to_vec();
+        let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
+        let mut effect = model.effects[k].clone();
+        for (slot, parameter) in effect.values.iter_mut().zip(&own) {
+            *slot = (parameter.value, parameter.ci95);
+        }
+        let without = without(study, model, k).map(|model| judge(&model));
+        Finding {
+            expression: effect.expression(&names),
+            effect,
+            parameters: own,
+            p_value: p_value(study, model, k).unwrap_or(0.0),
+            error_reduction: without.map_or(0.0, |w| 1.0 - rms(with) / rms(&w).max(f64::MIN_POSITIVE)),
+        }
+    };
+    (declared..model.effects.len()).map(finding).collect()
+}
+
+/// The model refitted without its k-th effect.
+fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Option<Fitted> {
+    let mut effects = model.effects.clone();
+    effects.remove(k);
+    study.refit(&effects, &model.declared, model.fit.locals.clone(), None).ok()
+}
+
+/// Position error of all joints together at the middle horizon.
+fn rms(assessment: &Assessment) -> f64 {
+    let windows = &middle(assessment).windows;
+    let rows: usize = windows.iter().map(|w| w.rows).sum();
+    #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
+    let rows = rows.max(1) as f64;
+    (windows.iter().flat_map(|w| &w.position).sum::<f64>() / rows).sqrt()
+}
+
+fn verdict(
+    study: &Study<'_>,
+    after: &Fitted,
+    left: &Unexplained,
+    identifiability: &Identifiability,
+) -> (Verdict, String) {
+    let windows = study.shooting.windows.len();
+    if windows < FEWEST_WINDOWS {
+        let reason = format!("the training logs hold only {windows} windows of half a second; record more motion");
+        return (Verdict::Inconclusive, reason);
+    }
+    if identifiability.free > 0 && identifiability.determined == 0 {
+        let reason = "the training logs determine no parameter of the declared model; move the joints more".into();
+        return (Verdict::Inconclusive, reason);
+    }
+    let found = after.effects.len() - study.system.effects.len();
+    let what_is_left = format!("something that depends on {} is left", left.where_);
+    match (found, left.is_significant()) {
+        (0, false) => (Verdict::NoMissingEffect, "no effect of the library helps on left-out stretches".into()),
+        (0, true) => (Verdict::Unexplained, format!("no effect of the library helps, and {what_is_left}")),
+        (_, false) => (Verdict::Explained, "the effects found leave nothing significant".into()),
+        (_, true) => (Verdict::PartlyExplained, format!("effects were found, and {what_is_left}")),
+    }
+}
