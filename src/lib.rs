@@ -6,3 +6,4 @@ pub mod expr;
 pub mod identify;
 pub mod model;
 pub mod plant;
+pub mod train;

@@ -5,14 +5,26 @@ mod assemble;
 mod dynamics;
 mod effect;
 mod effects_in_file;
+mod equations;
+mod hybrid;
+mod integrator;
 mod library;
+mod mlp;
+mod network;
 mod reader;
 mod rollout;
 mod system;
 
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};
+pub use integrator::{Integrator, Step};
 pub use library::Library;
+pub use mlp::Mlp;
+pub use network::{
+    Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, ResidualOn,
+    network_dynamics, with_residual,
+};
 pub use reader::FileError;
 pub use rollout::Rollout;
 pub use system::{FittedEffect, System};

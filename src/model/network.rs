@@ -1,0 +1,358 @@
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+use super::{Dynamics, HybridError};
+use crate::expr::{Binary, Graph, Node, Unary};
+
+/// How the joint positions enter a network. Applies to every joint, so a model with a sliding joint
+/// takes [`Angles::Raw`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Angles {
+    /// As they are, rad or m.
+    #[default]
+    Raw,
+    /// As sine and cosine, so that a full turn changes nothing.
+    SinCos,
+}
+
+/// What the outputs of a network are added to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ResidualOn {
+    /// n outputs, on dqd/dt: what is missing is a force, and positions stay integrals of velocities.
+    #[default]
+    Accelerations,
+    /// 2n outputs, on dq/dt and dqd/dt: the form of the published method.
+    Derivative,
+}
+
+/// How the last layer of a new network begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LastLayer {
+    /// All zero: a residual starts as nothing, and the model as its prior.
+    Zero,
+    /// Random like the others: for a network that is the whole model.
+    Random,
+}
+
+/// The choices that make a network, as a user states them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MlpSettings {
+    /// Neurons of each hidden layer; ReLU follows each of them.
+    pub hidden: Vec<usize>,
+    #[serde(default)]
+    pub angles: Angles,
+    #[serde(default)]
+    pub on: ResidualOn,
+}
+
+impl MlpSettings {
+    /// The published sizes: 16 neurons a layer, 3 layers for one joint, 4 for more.
+    pub fn for_joints(joints: usize) -> Self {
+        Self {
+            hidden: vec![16; if joints == 1 { 3 } else { 4 }],
+            angles: Angles::default(),
+            on: ResidualOn::default(),
+        }
+    }
+}
+
+impl Angles {
+    /// Number of features that `joints` joints make: positions, velocities, inputs.
+    pub fn features(self, joints: usize) -> usize {
+        match self {
+            Self::Raw => 3 * joints,
+            Self::SinCos => 4 * joints,
+        }
+    }
+
+    /// The features of one row, in the order of a network's inputs.
+    pub fn row(self, q: &[f64], qd: &[f64], tau: &[f64]) -> Vec<f64> {
+        let mut row: Vec<f64> = match self {
+            Self::Raw => q.to_vec(),
+            Self::SinCos => (q.iter().map(|x| x.sin()))
+                .chain(q.iter().map(|x| x.cos()))
+                .collect(),
+        };
+        row.extend(qd.iter().chain(tau));
+        row
+    }
+}
+
+impl ResidualOn {
+    /// Number of outputs for `joints` joints.
+    pub fn outputs(self, joints: usize) -> usize {
+        match self {
+            Self::Accelerations => joints,
+            Self::Derivative => 2 * joints,
+        }
+    }
+}
+
+/// Mean and standard deviation by which each feature is brought to order one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InputScaling {
+    pub mean: Vec<f64>,
+    /// Never zero.
+    pub std: Vec<f64>,
+}
+
+impl InputScaling {
+    /// Features enter as they are.
+    pub fn identity(features: usize) -> Self {
+        Self {
+            mean: vec![0.0; features],
+            std: vec![1.0; features],
+        }
+    }
+
+    /// Measured on rows of features. A feature that never changes keeps the factor 1.
+    pub fn from_rows(features: usize, rows: impl Iterator<Item = Vec<f64>> + Clone) -> Self {
+        let count = rows.clone().count().max(1) as f64;
+        let mut mean = vec![0.0; features];
+        for row in rows.clone() {
+            for (sum, x) in mean.iter_mut().zip(&row) {
+                *sum += x / count;
+            }
+        }
+        let mut variance = vec![0.0; features];
+        for row in rows {
+            for ((sum, x), mean) in variance.iter_mut().zip(&row).zip(&mean) {
+                *sum += (x - mean).powi(2) / count;
+            }
+        }
+        let std = (variance.iter().zip(&mean))
+            .map(|(v, mean)| match v.sqrt() {
+                // Below this a spread is the rounding of the sums.
+                std if std > 1e-9 * (1.0 + mean.abs()) => std,
+                _ => 1.0,
+            })
+            .collect();
+        Self { mean, std }
+    }
+}
+
+/// One layer as plain numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LayerWeights {
+    pub inputs: usize,
+    pub outputs: usize,
+    /// `[output][input]`, row after row, as PyTorch stores a linear layer.
+    pub weight: Vec<f64>,
+    pub bias: Vec<f64>,
+}
+
+/// A network as plain numbers: what is saved, exported, and written into programs.
+/// Every number is exactly an f32.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MlpWeights {
+    pub angles: Angles,
+    pub on: ResidualOn,
+    pub scaling: InputScaling,
+    pub layers: Vec<LayerWeights>,
+}
+
+impl MlpWeights {
+    /// A new network. Weights and biases are uniform within 1/sqrt(inputs of the layer), which is what
+    /// Burn's and PyTorch's linear layers do; drawn here so that all backends begin alike.
+    pub fn new(
+        joints: usize,
+        settings: &MlpSettings,
+        scaling: InputScaling,
+        last: LastLayer,
+        rng: &mut impl Rng,
+    ) -> Self {
+        let mut widths = vec![settings.angles.features(joints)];
+        widths.extend(&settings.hidden);
+        widths.push(settings.on.outputs(joints));
+        let count = widths.len() - 1;
+        let layers = (widths.windows(2).enumerate())
+            .map(|(k, pair)| match last {
+                LastLayer::Zero if k + 1 == count => LayerWeights::zero(pair[0], pair[1]),
+                _ => LayerWeights::random(pair[0], pair[1], rng),
+            })
+            .collect();
+        Self {
+            angles: settings.angles,
+            on: settings.on,
+            scaling,
+            layers,
+        }
+    }
+
+    /// Widths from the features to the outputs.
+    pub fn widths(&self) -> Vec<usize> {
+        let first = self.layers.first().map(|layer| layer.inputs);
+        let outputs = self.layers.iter().map(|layer| layer.outputs);
+        first.into_iter().chain(outputs).collect()
+    }
+
+    /// Does this network belong to a system of `joints` joints?
+    ///
+    /// # Errors
+    /// When widths do not follow from each other, from the joints or from the scaling.
+    pub fn check(&self, joints: usize) -> Result<(), HybridError> {
+        let (features, outputs) = (self.angles.features(joints), self.on.outputs(joints));
+        let widths = self.widths();
+        let chained = self
+            .layers
+            .windows(2)
+            .all(|pair| pair[0].outputs == pair[1].inputs);
+        let full = self.layers.iter().all(|layer| {
+            layer.weight.len() == layer.inputs * layer.outputs && layer.bias.len() == layer.outputs
+        });
+        let ends = widths.first() == Some(&features) && widths.last() == Some(&outputs);
+        let scaled = self.scaling.mean.len() == features && self.scaling.std.len() == features;
+        if chained && full && ends && scaled && !widths.contains(&0) {
+            Ok(())
+        } else {
+            Err(HybridError::Network {
+                joints,
+                features,
+                outputs,
+                widths,
+            })
+        }
+    }
+
+    /// Write the network into a graph as operations; ReLU is `max(x, 0)`. Returns its outputs.
+    ///
+    /// # Panics
+    /// When the network is not one for `q.len()` joints, see [`MlpWeights::check`].
+    pub fn write(&self, graph: &mut Graph, q: &[Node], qd: &[Node], tau: &[Node]) -> Vec<Node> {
+        let zero = graph.constant(0.0);
+        let mut values = self.features(graph, q, qd, tau);
+        for (k, layer) in self.layers.iter().enumerate() {
+            values = layer.write(graph, &values);
+            if k + 1 < self.layers.len() {
+                for value in &mut values {
+                    *value = graph.binary(Binary::Max, *value, zero);
+                }
+            }
+        }
+        values
+    }
+
+    fn features(&self, graph: &mut Graph, q: &[Node], qd: &[Node], tau: &[Node]) -> Vec<Node> {
+        let mut features: Vec<Node> = Vec::new();
+        match self.angles {
+            Angles::Raw => features.extend(q),
+            Angles::SinCos => {
+                for op in [Unary::Sin, Unary::Cos] {
+                    features.extend(q.iter().map(|q| graph.unary(op, *q)));
+                }
+            }
+        }
+        features.extend(qd.iter().chain(tau));
+        let scaling = self.scaling.mean.iter().zip(&self.scaling.std);
+        (features.iter().zip(scaling))
+            .map(|(feature, (mean, std))| {
+                let (mean, factor) = (graph.constant(*mean), graph.constant(1.0 / std));
+                let centred = graph.sub(*feature, mean);
+                graph.mul(centred, factor)
+            })
+            .collect()
+    }
+}
+
+impl LayerWeights {
+    fn zero(inputs: usize, outputs: usize) -> Self {
+        Self {
+            inputs,
+            outputs,
+            weight: vec![0.0; inputs * outputs],
+            bias: vec![0.0; outputs],
+        }
+    }
+
+    fn random(inputs: usize, outputs: usize, rng: &mut impl Rng) -> Self {
+        #[allow(clippy::cast_possible_truncation)] // weights are f32 wherever they are trained
+        let bound = (1.0 / (inputs as f64).sqrt()) as f32;
+        let mut draw = |count: usize| -> Vec<f64> {
+            (0..count)
+                .map(|_| f64::from(rng.random_range(-bound..=bound)))
+                .collect()
+        };
+        Self {
+            inputs,
+            outputs,
+            weight: draw(inputs * outputs),
+            bias: draw(outputs),
+        }
+    }
+
+    fn write(&self, graph: &mut Graph, values: &[Node]) -> Vec<Node> {
+        let rows = self.weight.chunks(self.inputs).zip(&self.bias);
+        rows.map(|(row, bias)| {
+            let mut sum = graph.constant(*bias);
+            for (weight, value) in row.iter().zip(values) {
+                let weight = graph.constant(*weight);
+                let part = graph.mul(weight, *value);
+                sum = graph.add(sum, part);
+            }
+            sum
+        })
+        .collect()
+    }
+}
+
+/// The same model with a network's outputs added to its derivative, again as one program.
+///
+/// # Errors
+/// When the network is not one for the joints of `dynamics`.
+pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, HybridError> {
+    let n = dynamics.joints;
+    mlp.check(n)?;
+    let mut graph = Graph::new();
+    let inputs: Vec<Node> = (dynamics.program.inputs().iter())
+        .map(|name| graph.input(name))
+        .collect();
+    let mut outputs = graph.append(&dynamics.program, &inputs);
+    let residual = mlp.write(
+        &mut graph,
+        &inputs[..n],
+        &inputs[n..2 * n],
+        &inputs[2 * n..3 * n],
+    );
+    let first = outputs.len() - residual.len();
+    for (output, part) in outputs[first..].iter_mut().zip(residual) {
+        *output = graph.add(*output, part);
+    }
+    Ok(Dynamics {
+        program: graph.finish(&outputs),
+        ..dynamics.clone()
+    })
+}
+
+/// A model that is a network alone: dq/dt = qd and dqd/dt = network, or both from the network.
+///
+/// # Errors
+/// When the network is not one for `joints` joints.
+pub fn network_dynamics(
+    name: &str,
+    joints: usize,
+    mlp: &MlpWeights,
+) -> Result<Dynamics, HybridError> {
+    mlp.check(joints)?;
+    let mut graph = Graph::new();
+    let group = |graph: &mut Graph, prefix: &str| -> Vec<Node> {
+        (1..=joints)
+            .map(|joint| graph.input(&format!("{prefix}{joint}")))
+            .collect()
+    };
+    let (q, qd) = (group(&mut graph, "q"), group(&mut graph, "qd"));
+    let tau = group(&mut graph, "tau");
+    graph.input("t");
+    let mut outputs = mlp.write(&mut graph, &q, &qd, &tau);
+    if mlp.on == ResidualOn::Accelerations {
+        outputs.splice(..0, qd);
+    }
+    Ok(Dynamics {
+        name: name.to_owned(),
+        joints,
+        parameters: Vec::new(),
+        program: graph.finish(&outputs),
+    })
+}

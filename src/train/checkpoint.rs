@@ -1,0 +1,316 @@
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use burn::optim::OptimizerRecord;
+use burn::tensor::{Bytes, Device};
+
+use super::manifest::{FORMAT, Manifest};
+use super::{Best, CheckpointError, Training, weights};
+use crate::model::{Dynamics, HybridModel, ModelWeights};
+
+const MANIFEST: &str = "checkpoint.json";
+const MODEL: &str = "model.toml";
+/// The model to use.
+const WEIGHTS: &str = "weights.safetensors";
+/// The model to go on from, which differs where an earlier one was the best.
+const LAST: &str = "last.safetensors";
+const OPTIMIZER: &str = "optimizer.bpk";
+
+/// Where a run came from: kept in its checkpoints, so that they explain themselves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// The whole configuration, as resolved.
+    pub config: serde_json::Value,
+    pub seed: u64,
+    /// Text of the model file.
+    pub model_toml: String,
+}
+
+/// A checkpoint as read from its directory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checkpoint {
+    pub manifest: Manifest,
+    /// Text of the model file that the checkpoint belongs to.
+    pub model_toml: String,
+    /// The model to use.
+    pub weights: ModelWeights,
+    last: ModelWeights,
+    optimizer: Vec<u8>,
+    dir: PathBuf,
+}
+
+/// Write a run to `dir`, whole or not at all, in place of any checkpoint that is there.
+///
+/// The files are written to a new directory beside `dir`, which then takes its name. The old one is
+/// meanwhile called `dir.previous`; should the program die between the two renamings, [`Checkpoint::load`]
+/// finds it there.
+///
+/// # Errors
+/// A directory that cannot be written, or that holds something else than a checkpoint.
+pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
+    refuse_other_contents(dir)?;
+    let record = training.optimizer.to_record();
+    let manifest = Manifest::of(training, &origin.config, origin.seed, record.len());
+    let last = training.model.weights();
+    let used = training.best.as_ref().map_or(&last, |best| &best.weights);
+    let optimizer = record.into_bytes().map_err(|error| {
+        let source = std::io::Error::other(error.to_string());
+        io("encode the optimiser's state for", dir)(source)
+    })?;
+    let json = serde_json::to_vec_pretty(&manifest)
+        .map_err(|error| io("encode the description of", dir)(std::io::Error::other(error)))?;
+    let files: [(&str, &[u8]); 5] = [
+        (WEIGHTS, &weights::to_bytes(&manifest, used)),
+        (LAST, &weights::to_bytes(&manifest, &last)),
+        (OPTIMIZER, &optimizer),
+        (MODEL, origin.model_toml.as_bytes()),
+        (MANIFEST, &json),
+    ];
+    let parent = match dir.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(parent).map_err(io("create the directory", parent))?;
+    let fresh = fresh_beside(parent).map_err(io("create a directory in", parent))?;
+    for (name, bytes) in files {
+        let path = fresh.path().join(name);
+        write(&path, bytes).map_err(io("write", &path))?;
+    }
+    replace(dir, fresh)
+}
+
+/// A directory that vanishes unless it is kept; as readable as any other, where temporary ones are private.
+fn fresh_beside(parent: &Path) -> std::io::Result<tempfile::TempDir> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+    builder.prefix(".checkpoint-").tempdir_in(parent)
+}
+
+/// Write and wait until it is on the disk: a renaming must not overtake the contents.
+fn write(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = fs::File::create_new(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+fn refuse_other_contents(dir: &Path) -> Result<(), CheckpointError> {
+    if !dir.exists() || dir.join(MANIFEST).is_file() {
+        return Ok(());
+    }
+    let mut entries = fs::read_dir(dir).map_err(io("look into", dir))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(io("replace by a checkpoint", dir)(std::io::Error::other(
+            "it holds other files; choose a new directory or empty it",
+        ))),
+    }
+}
+
+fn replace(dir: &Path, fresh: tempfile::TempDir) -> Result<(), CheckpointError> {
+    let previous = previous(dir);
+    if dir.exists() {
+        if previous.exists() {
+            fs::remove_dir_all(&previous).map_err(io("remove", &previous))?;
+        }
+        fs::rename(dir, &previous).map_err(io("set aside", dir))?;
+    }
+    if let Err(error) = fs::rename(fresh.path(), dir) {
+        if previous.exists() {
+            fs::rename(&previous, dir).map_err(io("put back", dir))?;
+        }
+        return Err(io("move the checkpoint to", dir)(error));
+    }
+    // The directory has moved: there is nothing left to clean up under its first name.
+    let _ = fresh.keep();
+    if previous.exists() {
+        fs::remove_dir_all(&previous).map_err(io("remove", &previous))?;
+    }
+    Ok(())
+}
+
+/// Where the older checkpoint waits while a new one takes its place.
+fn previous(dir: &Path) -> PathBuf {
+    let mut name = dir.as_os_str().to_owned();
+    name.push(".previous");
+    PathBuf::from(name)
+}
+
+fn io<'a>(action: &'static str, path: &'a Path) -> impl Fn(std::io::Error) -> CheckpointError + 'a {
+    move |source| CheckpointError::Io {
+        action,
+        source,
+        path: path.to_owned(),
+    }
+}
+
+impl Checkpoint {
+    /// Read a checkpoint and check that its files belong together.
+    ///
+    /// # Errors
+    /// A missing or damaged file, or another format.
+    pub fn load(dir: &Path) -> Result<Self, CheckpointError> {
+        let set_aside = previous(dir);
+        let dir = if !dir.exists() && set_aside.exists() {
+            set_aside
+        } else {
+            dir.to_owned()
+        };
+        let manifest = read_manifest(&dir)?;
+        let numbers = |file: &str| weights::from_bytes(&manifest, &read(&dir, file)?, file, &dir);
+        let model_toml = String::from_utf8(read(&dir, MODEL)?)
+            .map_err(|error| corrupt(MODEL, error.to_string(), &dir))?;
+        Ok(Self {
+            weights: numbers(WEIGHTS)?,
+            last: numbers(LAST)?,
+            optimizer: read(&dir, OPTIMIZER)?,
+            model_toml,
+            manifest,
+            dir,
+        })
+    }
+
+    /// The trained model, on `device`. `dynamics` is what the checkpoint's model file says.
+    ///
+    /// # Errors
+    /// When `dynamics` is another model.
+    pub fn model(
+        &self,
+        dynamics: &Dynamics,
+        device: &Device,
+    ) -> Result<HybridModel, CheckpointError> {
+        self.build(&self.weights, dynamics, device)
+    }
+
+    /// The run, ready to go on.
+    ///
+    /// # Errors
+    /// When `dynamics` is another model, or the optimiser's state is damaged.
+    pub fn training(
+        &self,
+        dynamics: &Dynamics,
+        device: &Device,
+    ) -> Result<Training, CheckpointError> {
+        let model = self.build(&self.last, dynamics, device)?;
+        let manifest = &self.manifest;
+        let mut training = Training::new(model, manifest.settings.clone(), manifest.rng.clone())?;
+        let damaged = |reason: String| corrupt(OPTIMIZER, reason, &self.dir);
+        let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(self.optimizer.clone()))
+            .map_err(|error| damaged(error.to_string()))?;
+        training.optimizer = training.optimizer.load_record(record);
+        // Burn leaves out what it cannot restore, which would silently change the run.
+        let found = training.optimizer.to_record().len();
+        if found != manifest.optimizer_tensors {
+            let expected = manifest.optimizer_tensors;
+            return Err(damaged(format!("{found} of {expected} tensors")));
+        }
+        training.epoch = manifest.epoch;
+        training.penalty_weight = manifest.penalty_weight;
+        training.history.clone_from(&manifest.history);
+        training.best = manifest.best.as_ref().map(|best| Best {
+            epoch: best.epoch,
+            validation: best.validation.unwrap_or(f64::INFINITY),
+            weights: self.weights.clone(),
+        });
+        Ok(training)
+    }
+
+    fn build(
+        &self,
+        weights: &ModelWeights,
+        dynamics: &Dynamics,
+        device: &Device,
+    ) -> Result<HybridModel, CheckpointError> {
+        self.check(dynamics)?;
+        let manifest = &self.manifest;
+        let model = match &weights.prior {
+            Some(prior) => HybridModel::network(&manifest.system, manifest.joints, prior, device)?,
+            None => {
+                let saved = manifest.parameters.iter().zip(&weights.parameters);
+                let trained = Dynamics {
+                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
+                    ..dynamics.clone()
+                };
+                HybridModel::physics(&trained, device)?
+            }
+        };
+        Ok(match &weights.residual {
+            Some(residual) => model.with_residual(residual)?,
+            None => model,
+        })
+    }
+
+    fn check(&self, dynamics: &Dynamics) -> Result<(), CheckpointError> {
+        let foreign = |what, saved: String, given: String| CheckpointError::Foreign {
+            what,
+            saved,
+            given,
+            dir: self.dir.clone(),
+        };
+        let saved = &self.manifest;
+        if saved.system != dynamics.name {
+            let (saved, given) = (saved.system.clone(), dynamics.name.clone());
+            return Err(foreign("system", saved, given));
+        }
+        if saved.joints != dynamics.joints {
+            let (saved, given) = (saved.joints.to_string(), dynamics.joints.to_string());
+            return Err(foreign("number of joints", saved, given));
+        }
+        let list = |names: Vec<&str>| match names.len() {
+            0 => "none".to_owned(),
+            _ => names.join(", "),
+        };
+        let known = list(saved.parameters.iter().map(|p| p.name.as_str()).collect());
+        let given = list(
+            dynamics
+                .parameters
+                .iter()
+                .map(|p| p.name.as_str())
+                .collect(),
+        );
+        // A network needs no equations, so those of the model file may be any.
+        if saved.prior.is_none() && known != given {
+            return Err(foreign("list of parameters", known, given));
+        }
+        Ok(())
+    }
+}
+
+fn read(dir: &Path, file: &str) -> Result<Vec<u8>, CheckpointError> {
+    let path = dir.join(file);
+    match fs::read(&path) {
+        Ok(bytes) => Ok(bytes),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            Err(CheckpointError::Missing {
+                missing: file.to_owned(),
+                dir: dir.to_owned(),
+            })
+        }
+        Err(error) => Err(io("read", &path)(error)),
+    }
+}
+
+/// The format is looked at first: another one may describe anything else differently.
+fn read_manifest(dir: &Path) -> Result<Manifest, CheckpointError> {
+    let damaged = |error: serde_json::Error| corrupt(MANIFEST, error.to_string(), dir);
+    let json: serde_json::Value = serde_json::from_slice(&read(dir, MANIFEST)?).map_err(damaged)?;
+    match json["format"].as_u64() {
+        Some(FORMAT) => serde_json::from_value(json).map_err(damaged),
+        Some(found) => Err(CheckpointError::Format {
+            found,
+            expected: FORMAT,
+            written_by: format!("version {}", json["residyn"].as_str().unwrap_or("unknown")),
+            dir: dir.to_owned(),
+        }),
+        None => Err(corrupt(MANIFEST, "it has no number `format`".into(), dir)),
+    }
+}
+
+fn corrupt(file: &str, reason: String, dir: &Path) -> CheckpointError {
+    CheckpointError::Corrupt {
+        file: file.to_owned(),
+        reason,
+        dir: dir.to_owned(),
+    }
+}

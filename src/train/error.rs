@@ -1,0 +1,95 @@
+use std::path::PathBuf;
+
+use super::segments::SegmentsError;
+use crate::model::HybridError;
+
+/// Why a training run cannot start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    #[error("no device `{name}`; this build has {known} (cuda: build with `--features cuda`)")]
+    Device { name: String, known: String },
+    #[error(transparent)]
+    Model(#[from] HybridError),
+    #[error(transparent)]
+    Segments(#[from] SegmentsError),
+    #[error("{role} segments have {found} joints, but the model of `{system}` has {expected}")]
+    Joints {
+        role: &'static str,
+        system: String,
+        expected: usize,
+        found: usize,
+    },
+    #[error(
+        "`error_scale` needs {states} finite numbers above zero, one for each state (positions, then \
+         velocities); it is {scale:?}"
+    )]
+    ErrorScale { states: usize, scale: Vec<f64> },
+    #[error("setting `{name}` is {value}; it must be finite and not negative")]
+    Setting { name: &'static str, value: f64 },
+    #[error(
+        "the loss became {loss} in epoch {epoch}, with {parameters}; look for outliers or wrong units \
+         in the data, lower the learning rates, or take shorter segments or a finer integrator"
+    )]
+    Diverged {
+        epoch: usize,
+        loss: f64,
+        parameters: String,
+    },
+}
+
+/// Why a checkpoint cannot be written, read or used.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    #[error("not a checkpoint: there is no {missing:?} in {dir:?}")]
+    Missing { missing: String, dir: PathBuf },
+    #[error(
+        "the checkpoint's file {file:?} is damaged ({reason}); take another copy or train again, in \
+         {dir:?}"
+    )]
+    Corrupt {
+        file: String,
+        reason: String,
+        dir: PathBuf,
+    },
+    #[error(
+        "the checkpoint has format {found}, this program reads format {expected}; use the residyn that \
+         wrote it ({written_by}) or train again, in {dir:?}"
+    )]
+    Format {
+        found: u64,
+        expected: u64,
+        written_by: String,
+        dir: PathBuf,
+    },
+    #[error(
+        "the checkpoint is of another model: its {what} is {saved}, the model's is {given}; use the \
+         model file saved beside it (model.toml), in {dir:?}"
+    )]
+    Foreign {
+        what: &'static str,
+        saved: String,
+        given: String,
+        dir: PathBuf,
+    },
+    #[error(
+        "tensor `{tensor}` in {file:?} has shape {found:?}, but checkpoint.json describes {expected:?}; \
+         the files belong to different checkpoints, in {dir:?}"
+    )]
+    Shape {
+        tensor: String,
+        file: String,
+        expected: Vec<usize>,
+        found: Vec<usize>,
+        dir: PathBuf,
+    },
+    #[error("cannot {action}: {source}, at {path:?}")]
+    Io {
+        action: &'static str,
+        source: std::io::Error,
+        path: PathBuf,
+    },
+    #[error(transparent)]
+    Model(#[from] HybridError),
+    #[error(transparent)]
+    Train(#[from] TrainError),
+}

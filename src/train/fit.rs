@@ -1,0 +1,287 @@
+use std::ops::ControlFlow;
+
+use burn::lr_scheduler::module_lr_scheduler::{ModuleLearningRate, ModuleLrScheduler};
+use burn::module::{Module, ParamGroup};
+use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
+use burn::tensor::Tensor;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Batch, Batching, Best, FitSettings, Record, Segments, StateScale, TrainError, loss};
+use crate::model::HybridModel;
+
+// PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
+// and would stop them short of it.
+const ADAM_EPSILON: f32 = 1e-8;
+
+/// A training run: a value that can be held, saved ([`save`](super::save)), loaded and continued. Where
+/// it was interrupted does not change its result by a bit on the same backend and machine.
+#[derive(Clone)]
+pub struct Training {
+    pub(super) model: HybridModel,
+    pub(super) settings: FitSettings,
+    pub(super) optimizer: ModuleOptimizer,
+    pub(super) rng: ChaCha8Rng,
+    pub(super) epoch: usize,
+    pub(super) penalty_weight: f64,
+    pub(super) history: Vec<Record>,
+    pub(super) best: Option<Best>,
+    scale: StateScale,
+    rates: ModuleLearningRate,
+}
+
+/// What an observer sees after each epoch.
+pub struct Progress<'a> {
+    /// Epochs done.
+    pub epoch: usize,
+    /// Epochs of the whole run.
+    pub epochs: usize,
+    /// What was minimised in this epoch, mean over its batches, before their steps.
+    pub loss: f64,
+    /// The prediction error in it.
+    pub error: f64,
+    /// The run itself, for its history and to save it.
+    pub training: &'a Training,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// All epochs are done.
+    Finished,
+    /// The observer asked to stop; the run can go on.
+    Stopped,
+}
+
+/// Means over an epoch.
+#[derive(Clone, Copy, Default)]
+struct Epoch {
+    loss: f64,
+    error: f64,
+}
+
+impl Training {
+    /// A run that has not begun. `model` must be on a device with gradients
+    /// ([`Backend::device`](super::Backend::device)); `rng` orders the minibatches.
+    ///
+    /// # Errors
+    /// Settings that are out of range.
+    pub fn new(
+        model: HybridModel,
+        settings: FitSettings,
+        rng: ChaCha8Rng,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        Ok(Self {
+            scale: StateScale::new(settings.error_scale.as_deref(), model.joints())?,
+            rates: learning_rates(&model, &settings),
+            optimizer: AdamConfig::new().with_epsilon(ADAM_EPSILON).init(),
+            epoch: 0,
+            penalty_weight: settings.penalty.initial(),
+            history: Vec::new(),
+            best: None,
+            model,
+            settings,
+            rng,
+        })
+    }
+
+    /// Train until all epochs are done or `observer`, called after each, breaks off. Call it again to
+    /// go on. With `validation` the best model by its error is kept, the one before training included.
+    ///
+    /// # Errors
+    /// Segments that do not fit the model, or a loss that is no longer finite: numbers are never repaired.
+    pub fn run(
+        &mut self,
+        segments: &Segments,
+        validation: Option<&Segments>,
+        observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Ended, TrainError> {
+        self.check(segments, "training")?;
+        let device = self.model.device();
+        let plain = device.clone().without_autodiff();
+        if let Some(validation) = validation {
+            self.check(validation, "validation")?;
+        }
+        let validation = validation.map(|segments| segments.all(&plain));
+        let (trained, judged) = (segments.all(&device), segments.all(&plain));
+        if self.history.is_empty() {
+            self.record(&judged, validation.as_ref())?;
+        }
+        while self.epoch < self.settings.epochs {
+            let Epoch { loss, error } = self.run_epoch(segments, &trained)?;
+            self.epoch += 1;
+            self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);
+            let every = self.settings.record_every.get();
+            if self.epoch.is_multiple_of(every) || self.epoch == self.settings.epochs {
+                self.record(&judged, validation.as_ref())?;
+            }
+            let progress = Progress {
+                epoch: self.epoch,
+                epochs: self.settings.epochs,
+                loss,
+                error,
+                training: self,
+            };
+            if observer(&progress).is_break() {
+                return Ok(Ended::Stopped);
+            }
+        }
+        Ok(Ended::Finished)
+    }
+
+    /// The model as it is now.
+    pub fn model(&self) -> &HybridModel {
+        &self.model
+    }
+
+    /// The model to use: the best by validation error, or the present one where there is no validation.
+    ///
+    /// # Errors
+    /// None for a run made or loaded by this module.
+    pub fn result(&self) -> Result<HybridModel, TrainError> {
+        match &self.best {
+            Some(best) => Ok(self.model.with_weights(&best.weights)?),
+            None => Ok(self.model.clone()),
+        }
+    }
+
+    /// Epochs done.
+    pub fn epoch(&self) -> usize {
+        self.epoch
+    }
+
+    /// The settings of the run.
+    pub fn settings(&self) -> &FitSettings {
+        &self.settings
+    }
+
+    /// What was recorded so far, oldest first.
+    pub fn history(&self) -> &[Record] {
+        &self.history
+    }
+
+    /// The best model by validation error, where there is validation.
+    pub fn best(&self) -> Option<&Best> {
+        self.best.as_ref()
+    }
+
+    fn check(&self, segments: &Segments, role: &'static str) -> Result<(), TrainError> {
+        if segments.is_empty() {
+            return Err(super::SegmentsError::Empty.into());
+        }
+        if segments.joints() != self.model.joints() {
+            return Err(TrainError::Joints {
+                role,
+                system: self.model.system().to_owned(),
+                expected: self.model.joints(),
+                found: segments.joints(),
+            });
+        }
+        Ok(())
+    }
+
+    fn run_epoch(&mut self, segments: &Segments, all: &Batch) -> Result<Epoch, TrainError> {
+        let Batching::Mini { size } = self.settings.batching else {
+            return self.step(all);
+        };
+        let mut order: Vec<usize> = (0..segments.len()).collect();
+        order.shuffle(&mut self.rng);
+        let device = self.model.device();
+        let mut mean = Epoch::default();
+        for chosen in order.chunks(size.get()) {
+            let part = self.step(&segments.batch(chosen, &device))?;
+            let share = chosen.len() as f64 / order.len() as f64;
+            mean.loss += share * part.loss;
+            mean.error += share * part.error;
+        }
+        Ok(mean)
+    }
+
+    /// One step of the optimiser on one batch.
+    fn step(&mut self, batch: &Batch) -> Result<Epoch, TrainError> {
+        let parts = loss(&self.model, batch, self.settings.integrator, &self.scale);
+        let error = number(&parts.error);
+        let penalty = self.settings.penalty;
+        let total = penalty.total(self.penalty_weight, parts.error, parts.residual_norm);
+        let loss = self.finite(number(&total))?;
+        let gradients = GradientsParams::from_grads(total.backward(), &self.model);
+        let stepped = self
+            .optimizer
+            .step(self.rates.clone(), self.model.clone(), gradients);
+        self.model = stepped.project();
+        Ok(Epoch { loss, error })
+    }
+
+    /// Judge the present model on all training segments and on validation.
+    fn record(&mut self, judged: &Batch, validation: Option<&Batch>) -> Result<(), TrainError> {
+        let model = self.model.clone().valid();
+        let judge = |batch| loss(&model, batch, self.settings.integrator, &self.scale);
+        let parts = judge(judged);
+        let (error, norm) = (
+            number(&parts.error),
+            parts.residual_norm.as_ref().map(number),
+        );
+        let penalty = self.settings.penalty;
+        let total = penalty.total(self.penalty_weight, parts.error, parts.residual_norm);
+        let loss = self.finite(number(&total))?;
+        let validation = validation.map(|batch| match number(&judge(batch).error) {
+            error if error.is_finite() => error,
+            _ => f64::INFINITY,
+        });
+        let weights = self.model.weights();
+        self.history.push(Record {
+            epoch: self.epoch,
+            loss,
+            error,
+            residual_norm: norm.unwrap_or(0.0),
+            validation,
+            penalty_weight: self.penalty_weight,
+            parameters: weights.parameters.clone(),
+        });
+        if let Some(validation) = validation
+            && self
+                .best
+                .as_ref()
+                .is_none_or(|best| validation < best.validation)
+        {
+            self.best = Some(Best {
+                epoch: self.epoch,
+                validation,
+                weights,
+            });
+        }
+        Ok(())
+    }
+
+    fn finite(&self, loss: f64) -> Result<f64, TrainError> {
+        if loss.is_finite() {
+            return Ok(loss);
+        }
+        let named = self.model.parameters().into_iter();
+        let list: Vec<String> = named.map(|(name, v)| format!("{name} = {v:.6}")).collect();
+        Err(TrainError::Diverged {
+            epoch: self.epoch,
+            loss,
+            parameters: if list.is_empty() {
+                "no physical parameters".to_owned()
+            } else {
+                list.join(", ")
+            },
+        })
+    }
+}
+
+fn learning_rates(model: &HybridModel, settings: &FitSettings) -> ModuleLearningRate {
+    let rates = settings.learning_rates;
+    let [equations, prior, residual] = model.ids();
+    ModuleLrScheduler::new(rates.residual)
+        .with_group(ParamGroup::from_ids(equations), rates.physics)
+        .with_group(ParamGroup::from_ids(prior), rates.prior)
+        .with_group(ParamGroup::from_ids(residual), rates.residual)
+        .step()
+}
+
+fn number(tensor: &Tensor<1>) -> f64 {
+    f64::from(tensor.clone().into_scalar::<f32>())
+}

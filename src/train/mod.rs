@@ -1,0 +1,28 @@
+//! Training: segments of trajectories, the loss through the unrolled integrator, the one fit loop, and
+//! checkpoints from which it goes on bit for bit.
+
+mod backend;
+mod checkpoint;
+mod error;
+mod fit;
+mod history;
+mod loss;
+mod manifest;
+mod penalty;
+mod segments;
+mod settings;
+mod weights;
+
+#[cfg(test)]
+mod tests;
+
+pub use backend::Backend;
+pub use checkpoint::{Checkpoint, Origin, save};
+pub use error::{CheckpointError, TrainError};
+pub use fit::{Ended, Progress, Training};
+pub use history::{Best, Record};
+pub use loss::{Loss, StateScale, loss};
+pub use manifest::{FORMAT, Manifest};
+pub use penalty::Penalty;
+pub use segments::{Batch, Segments, SegmentsError};
+pub use settings::{Batching, FitSettings, LearningRates};

@@ -1,0 +1,67 @@
+use burn::tensor::Tensor;
+use serde::{Deserialize, Serialize};
+
+use super::TrainError;
+
+/// How the size of the residual F_r is weighed against the prediction error E. Without it the split of
+/// F into F_p + F_r is not unique: the network could take over what the physics can express.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Penalty {
+    /// Minimise E + alpha ||F_r||.
+    Fixed { alpha: f64 },
+    /// Minimise ||F_r|| subject to E = 0 by ascent on the dual variable lambda: minimise
+    /// ||F_r|| + lambda E, and after each epoch lambda <- lambda + rate E, where E is the epoch's mean
+    /// error. Algorithm 1 of Yin et al. 2021, "Augmenting physical models with deep networks for complex
+    /// dynamics forecasting", arXiv:2010.04456, with one epoch as its outer iteration. E of the epoch is
+    /// measured while it runs rather than by a second pass after it.
+    Adaptive { initial: f64, rate: f64 },
+}
+
+impl Default for Penalty {
+    fn default() -> Self {
+        Self::Fixed { alpha: 1e-4 }
+    }
+}
+
+impl Penalty {
+    /// alpha or the first lambda: the number that [`Penalty::next`] carries on.
+    pub fn initial(self) -> f64 {
+        match self {
+            Self::Fixed { alpha } => alpha,
+            Self::Adaptive { initial, .. } => initial,
+        }
+    }
+
+    /// The weight for the next epoch.
+    pub fn next(self, weight: f64, epoch_error: f64) -> f64 {
+        match self {
+            Self::Fixed { alpha } => alpha,
+            Self::Adaptive { rate, .. } => weight + rate * epoch_error,
+        }
+    }
+
+    /// What is minimised, `[1]`.
+    pub(super) fn total(self, weight: f64, error: Tensor<1>, norm: Option<Tensor<1>>) -> Tensor<1> {
+        match (self, norm) {
+            (_, None) => error,
+            // The term is left out, not multiplied by zero: it would still cost its gradient.
+            (Self::Fixed { .. }, Some(_)) if weight == 0.0 => error,
+            (Self::Fixed { .. }, Some(norm)) => error + norm * weight,
+            (Self::Adaptive { .. }, Some(norm)) => norm + error * weight,
+        }
+    }
+
+    pub(super) fn check(self) -> Result<(), TrainError> {
+        let numbers = match self {
+            Self::Fixed { alpha } => vec![("alpha", alpha)],
+            Self::Adaptive { initial, rate } => vec![("initial", initial), ("rate", rate)],
+        };
+        for (name, value) in numbers {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(TrainError::Setting { name, value });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,281 @@
+use burn::tensor::{Device, Tensor, TensorData};
+
+use crate::model::{Angles, InputScaling};
+
+/// Why rows of numbers are no segments.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SegmentsError {
+    #[error(
+        "{what} has {found} numbers, {expected} are needed for {rows} rows and {joints} joints"
+    )]
+    Length {
+        what: &'static str,
+        expected: usize,
+        found: usize,
+        rows: usize,
+        joints: usize,
+    },
+    #[error("{what} of row {row} is {value}; leave such rows out before training")]
+    NotFinite {
+        what: &'static str,
+        row: usize,
+        value: f64,
+    },
+    #[error("time goes from {before} s to {after} s at row {row}; it must grow")]
+    Time { row: usize, before: f64, after: f64 },
+    #[error(
+        "a trajectory of {rows} rows has no segment of {steps} steps; give longer logs or lower the number of steps"
+    )]
+    TooShort { rows: usize, steps: usize },
+    #[error("there is nothing to train on; give at least one trajectory")]
+    Empty,
+}
+
+/// Pieces of trajectories of k steps each, the training data. k = 1 gives transitions (s, a, s').
+///
+/// Numbers are f32. Sampling may be irregular, since every step has its own length.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Segments {
+    joints: usize,
+    steps: usize,
+    /// `[segment][k + 1][2n]`: positions, then velocities.
+    states: Vec<f32>,
+    /// `[segment][k][n]`, each held over its step.
+    inputs: Vec<f32>,
+    /// `[segment][k]`, s
+    dt: Vec<f32>,
+    /// `[segment]`, s
+    start: Vec<f32>,
+}
+
+/// Segments as columns on a device.
+#[derive(Debug, Clone)]
+pub struct Batch {
+    /// `[step][joint]`, each `[batch]`
+    pub inputs: Vec<Vec<Tensor<1>>>,
+    /// `[k + 1][state]`, each `[batch]`
+    pub states: Vec<Vec<Tensor<1>>>,
+    /// `[step]`, each `[batch]`, s
+    pub dt: Vec<Tensor<1>>,
+    /// `[step]`, each `[batch]`: when the step begins, s
+    pub time: Vec<Tensor<1>>,
+    /// Number of segments.
+    pub size: usize,
+}
+
+impl Segments {
+    /// No segments yet, for `joints` joints and `steps` steps each.
+    ///
+    /// # Panics
+    /// When either is zero.
+    pub fn new(joints: usize, steps: usize) -> Self {
+        assert!(joints > 0 && steps > 0, "segments have joints and steps");
+        Self {
+            joints,
+            steps,
+            states: Vec::new(),
+            inputs: Vec::new(),
+            dt: Vec::new(),
+            start: Vec::new(),
+        }
+    }
+
+    /// Cut a trajectory into segments, a new one beginning every `stride` rows.
+    ///
+    /// `time` has one number a row (s), `states` `2n` (positions, velocities), `inputs` `n` (held until
+    /// the next row; the last row's is not used).
+    ///
+    /// # Errors
+    /// Lengths that disagree, numbers that are not finite, time that does not grow, too few rows. The
+    /// segments are then unchanged.
+    ///
+    /// # Panics
+    /// When `stride` is zero.
+    pub fn push_trajectory(
+        &mut self,
+        time: &[f64],
+        states: &[f64],
+        inputs: &[f64],
+        stride: usize,
+    ) -> Result<(), SegmentsError> {
+        let (rows, n) = (time.len(), self.joints);
+        self.check(time, states, inputs)?;
+        if rows <= self.steps {
+            return Err(SegmentsError::TooShort {
+                rows,
+                steps: self.steps,
+            });
+        }
+        for first in (0..rows - self.steps).step_by(stride) {
+            let last = first + self.steps;
+            push(&mut self.states, &states[2 * n * first..2 * n * (last + 1)]);
+            push(&mut self.inputs, &inputs[n * first..n * last]);
+            let steps = time[first..=last].windows(2).map(|pair| pair[1] - pair[0]);
+            push(&mut self.dt, &steps.collect::<Vec<_>>());
+            push(&mut self.start, &time[first..=first]);
+        }
+        Ok(())
+    }
+
+    fn check(&self, time: &[f64], states: &[f64], inputs: &[f64]) -> Result<(), SegmentsError> {
+        let (rows, n) = (time.len(), self.joints);
+        let parts = [
+            ("time", time, 1),
+            ("states", states, 2 * n),
+            ("inputs", inputs, n),
+        ];
+        for (what, numbers, width) in parts {
+            if numbers.len() != rows * width {
+                return Err(SegmentsError::Length {
+                    what,
+                    expected: rows * width,
+                    found: numbers.len(),
+                    rows,
+                    joints: n,
+                });
+            }
+            if let Some(k) = numbers.iter().position(|x| !x.is_finite()) {
+                return Err(SegmentsError::NotFinite {
+                    what,
+                    row: k / width,
+                    value: numbers[k],
+                });
+            }
+        }
+        match time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            Some(row) => Err(SegmentsError::Time {
+                row: row + 1,
+                before: time[row],
+                after: time[row + 1],
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// Number of segments.
+    pub fn len(&self) -> usize {
+        self.start.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.start.is_empty()
+    }
+
+    /// Number of joints n.
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// Number of steps k in each segment.
+    pub fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Mean and spread of the features that a network sees, over all steps.
+    pub fn scaling(&self, angles: Angles) -> InputScaling {
+        let n = self.joints;
+        let rows = (0..self.len() * self.steps).map(|k| {
+            let (segment, step) = (k / self.steps, k % self.steps);
+            let state = 2 * n * (segment * (self.steps + 1) + step);
+            let wide = |numbers: &[f32]| numbers.iter().copied().map(f64::from).collect::<Vec<_>>();
+            angles.row(
+                &wide(&self.states[state..state + n]),
+                &wide(&self.states[state + n..state + 2 * n]),
+                &wide(&self.inputs[n * k..n * (k + 1)]),
+            )
+        });
+        InputScaling::from_rows(angles.features(n), rows)
+    }
+
+    /// The chosen segments on a device.
+    pub fn batch(&self, chosen: &[usize], device: &Device) -> Batch {
+        let (n, k) = (self.joints, self.steps);
+        let column = |from: &[f32], width: usize, offset: usize| {
+            let values: Vec<f32> = chosen.iter().map(|i| from[i * width + offset]).collect();
+            Tensor::<1>::from_data(TensorData::new(values, [chosen.len()]), device)
+        };
+        let group = |from: &[f32], rows: usize, width: usize| -> Vec<Vec<Tensor<1>>> {
+            let row = |row: usize| (0..width).map(move |c| row * width + c);
+            (0..rows)
+                .map(|r| {
+                    row(r)
+                        .map(|offset| column(from, rows * width, offset))
+                        .collect()
+                })
+                .collect()
+        };
+        let dt: Vec<Tensor<1>> = (0..k).map(|step| column(&self.dt, k, step)).collect();
+        let mut time = vec![column(&self.start, 1, 0)];
+        for step in 1..k {
+            time.push(time[step - 1].clone() + dt[step - 1].clone());
+        }
+        Batch {
+            inputs: group(&self.inputs, k, n),
+            states: group(&self.states, k + 1, 2 * n),
+            dt,
+            time,
+            size: chosen.len(),
+        }
+    }
+
+    /// All segments on a device.
+    pub fn all(&self, device: &Device) -> Batch {
+        self.batch(&(0..self.len()).collect::<Vec<_>>(), device)
+    }
+}
+
+#[allow(clippy::cast_possible_truncation)] // training runs in f32
+fn push(to: &mut Vec<f32>, from: &[f64]) {
+    to.extend(from.iter().map(|x| *x as f32));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Segments, SegmentsError};
+    use crate::train::Backend;
+
+    #[test]
+    fn a_trajectory_is_cut_into_overlapping_segments() {
+        let time = [0.0, 0.5, 0.75, 1.0];
+        let states: Vec<f64> = (0..8).map(f64::from).collect();
+        let mut segments = Segments::new(1, 2);
+        segments
+            .push_trajectory(&time, &states, &[10.0, 11.0, 12.0, 13.0], 1)
+            .unwrap();
+        assert_eq!(segments.len(), 2);
+        let batch = segments.all(&Backend::Flex.device());
+        let numbers = |t: &burn::tensor::Tensor<1>| t.to_data().iter::<f32>().collect::<Vec<_>>();
+        assert_eq!(numbers(&batch.states[0][1]), [1.0, 3.0]);
+        assert_eq!(numbers(&batch.states[2][0]), [4.0, 6.0]);
+        assert_eq!(numbers(&batch.inputs[1][0]), [11.0, 12.0]);
+        assert_eq!(numbers(&batch.dt[0]), [0.5, 0.25]);
+        assert_eq!(numbers(&batch.time[1]), [0.5, 0.75]);
+    }
+
+    #[test]
+    fn bad_rows_are_refused_with_their_place() {
+        let mut segments = Segments::new(1, 1);
+        let refused = |s: &mut Segments, time: &[f64], states: &[f64]| {
+            s.push_trajectory(time, states, &vec![0.0; time.len()], 1)
+                .unwrap_err()
+                .to_string()
+        };
+        assert_eq!(
+            refused(&mut segments, &[0.0, 0.1], &[0.0, 0.0, f64::NAN, 0.0]),
+            "states of row 1 is NaN; leave such rows out before training"
+        );
+        assert_eq!(
+            refused(&mut segments, &[0.0, 0.0], &[0.0; 4]),
+            "time goes from 0 s to 0 s at row 1; it must grow"
+        );
+        assert_eq!(
+            refused(&mut segments, &[0.0, 0.1], &[0.0; 3]),
+            "states has 3 numbers, 4 are needed for 2 rows and 1 joints"
+        );
+        assert_eq!(
+            segments.push_trajectory(&[0.0], &[0.0; 2], &[0.0], 1),
+            Err(SegmentsError::TooShort { rows: 1, steps: 1 })
+        );
+        assert!(segments.is_empty());
+    }
+}

@@ -1,0 +1,89 @@
+use std::num::NonZeroUsize;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Penalty, TrainError};
+use crate::model::Integrator;
+
+/// Everything that decides how a fit runs. Defaults are the published ones.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FitSettings {
+    pub epochs: usize,
+    pub learning_rates: LearningRates,
+    pub batching: Batching,
+    pub penalty: Penalty,
+    pub integrator: Integrator,
+    /// What an error of 1 is in each state (positions, then velocities); 1 where not given.
+    pub error_scale: Option<Vec<f64>>,
+    /// Epochs between two entries of the history, at which the validation error is also taken.
+    pub record_every: NonZeroUsize,
+}
+
+/// Adam's learning rates of the parts. Zero freezes a part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LearningRates {
+    /// Of the physical parameters, relative to each parameter's scale.
+    pub physics: f64,
+    /// Of a network that is the prior.
+    pub prior: f64,
+    /// Of the residual network.
+    pub residual: f64,
+}
+
+/// How an epoch goes through the segments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Batching {
+    /// One step on all segments.
+    #[default]
+    Full,
+    /// A step on each part of a new random order; the last part may be smaller.
+    Mini { size: NonZeroUsize },
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self {
+            epochs: 4000,
+            learning_rates: LearningRates::default(),
+            batching: Batching::default(),
+            penalty: Penalty::default(),
+            integrator: Integrator::default(),
+            error_scale: None,
+            record_every: NonZeroUsize::new(100).expect("not zero"),
+        }
+    }
+}
+
+impl Default for LearningRates {
+    fn default() -> Self {
+        Self {
+            physics: 0.01,
+            prior: 0.01,
+            residual: 0.01,
+        }
+    }
+}
+
+impl FitSettings {
+    pub(super) fn check(&self) -> Result<(), TrainError> {
+        let LearningRates {
+            physics,
+            prior,
+            residual,
+        } = self.learning_rates;
+        let rates = [
+            ("learning_rates.physics", physics),
+            ("learning_rates.prior", prior),
+            ("learning_rates.residual", residual),
+        ];
+        for (name, value) in rates {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(TrainError::Setting { name, value });
+            }
+        }
+        self.penalty.check()
+    }
+}

@@ -1,0 +1,106 @@
+use burn::module::Module;
+use burn::optim::GradientsParams;
+
+use super::{hybrid, rng, transitions};
+use crate::model::{HybridModel, Integrator, LastLayer, MlpWeights, ModelWeights};
+use crate::train::{Backend, Segments, StateScale, loss};
+
+/// A trajectory with irregular steps, cut into segments of three.
+fn segments() -> Segments {
+    use rand::RngExt;
+    let mut rng = rng(5);
+    let mut time = vec![0.0];
+    let (mut states, mut inputs) = (vec![0.3, -1.0], vec![0.5]);
+    for k in 0..40 {
+        time.push(time[k] + rng.random_range(0.01..0.05));
+        states.extend([rng.random_range(-3.0..3.0), rng.random_range(-4.0..4.0)]);
+        inputs.push(rng.random_range(-3.0..3.0));
+    }
+    let mut segments = Segments::new(1, 3);
+    segments
+        .push_trajectory(&time, &states, &inputs, 2)
+        .unwrap();
+    segments
+}
+
+fn total(model: &HybridModel, segments: &Segments, integrator: Integrator) -> burn::Tensor<1> {
+    let scale = StateScale::new(Some(&[0.5, 2.0]), 1).unwrap();
+    let batch = segments.all(&model.device());
+    let parts = loss(model, &batch, integrator, &scale);
+    parts.error + parts.residual_norm.unwrap() * 0.3
+}
+
+/// The k-th weight of the first hidden layer or the k-th physical parameter, moved by `by`.
+fn moved(weights: &ModelWeights, physical: bool, k: usize, by: f64) -> ModelWeights {
+    let mut weights = weights.clone();
+    let value = match (&mut weights.residual, physical) {
+        (Some(MlpWeights { layers, .. }), false) => &mut layers[1].weight[k],
+        _ => &mut weights.parameters[k],
+    };
+    *value += by;
+    weights
+}
+
+#[test]
+fn gradients_match_central_differences() {
+    let integrators = [
+        Integrator::SemiImplicitEuler,
+        Integrator::Rk4,
+        Integrator::Fine {
+            steps: 2.try_into().unwrap(),
+        },
+    ];
+    for (backend, integrator) in Backend::ALL
+        .iter()
+        .flat_map(|b| integrators.map(|i| (*b, i)))
+    {
+        let segments = segments();
+        let model = hybrid((8.0, 2.0), &segments, backend, LastLayer::Random);
+        let gradients = total(&model, &segments, integrator).backward();
+        let gradients = GradientsParams::from_grads(gradients, &model);
+        let [equations, _, residual] = model.ids();
+        let physics = gradients.get::<1>(equations[0]).unwrap().into_data();
+        // Burn keeps [input, output]: transposed, the order is that of the plain numbers.
+        let hidden = gradients
+            .get::<2>(residual[2])
+            .unwrap()
+            .transpose()
+            .into_data();
+        let (physics, hidden): (Vec<f32>, Vec<f32>) =
+            (physics.iter().collect(), hidden.iter().collect());
+
+        let value = |weights: &ModelWeights| {
+            let model = model.with_weights(weights).unwrap().valid();
+            f64::from(total(&model, &segments, integrator).into_scalar::<f32>())
+        };
+        let weights = model.weights();
+        // The loss is an f32 near 30, so differences over 2 h carry about 2e-6 / h.
+        let check = |found: f32, physical, k, scale: f64| {
+            let h = 0.01;
+            let slope = |by: f64| value(&moved(&weights, physical, k, by));
+            let wanted = (slope(h * scale) - slope(-h * scale)) / (2.0 * h);
+            let off = (f64::from(found) - wanted).abs();
+            assert!(
+                off < 2e-3 + 1e-2 * wanted.abs(),
+                "{found} or {wanted}, {backend} {integrator:?}"
+            );
+        };
+        check(physics[0], true, 0, 8.0);
+        check(physics[1], true, 1, 2.0);
+        for k in [0, 17, 100, 255] {
+            check(hidden[k], false, k, 1.0);
+        }
+    }
+}
+
+#[test]
+fn a_residual_of_zero_has_a_finite_gradient() {
+    let segments = transitions(20, -0.5, 1);
+    let model = hybrid((15.0, 3.0), &segments, Backend::Flex, LastLayer::Zero);
+    let gradients = total(&model, &segments, Integrator::default()).backward();
+    let gradients = GradientsParams::from_grads(gradients, &model);
+    let [.., residual] = model.ids();
+    let last = gradients.get::<2>(residual[6]).unwrap().into_data();
+    let last: Vec<f32> = last.iter().collect();
+    assert!(last.iter().all(|g| g.is_finite()) && last.iter().any(|g| *g != 0.0));
+}

@@ -1,0 +1,95 @@
+//! Tests of training on a simulated pendulum, whose parts they share.
+
+mod checkpoints;
+mod gradients;
+mod parity;
+mod recovery;
+mod resume;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Backend, Segments};
+use crate::expr::{Graph, Scope, SignForm, parse};
+use crate::model::{Dynamics, HybridModel, LastLayer, MlpSettings, MlpWeights, Parameter};
+
+pub(super) const DT: f64 = 0.02;
+
+pub(super) fn rng(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+pub(super) fn parameter(name: &str, value: f64) -> Parameter {
+    Parameter {
+        name: name.to_owned(),
+        value,
+        unit: String::new(),
+        bounds: [f64::NEG_INFINITY, f64::INFINITY],
+        fixed: false,
+        ci95: None,
+        scale: value.abs(),
+    }
+}
+
+/// qdd1 = `formula` of q1, qd1, tau1, t and the parameters.
+pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
+    let mut graph = Graph::new();
+    let mut scope = Scope::new(SignForm::Exact);
+    let states = ["q1", "qd1", "tau1", "t"].into_iter();
+    for name in states.chain(parameters.iter().map(|p| p.name.as_str())) {
+        let node = graph.input(name);
+        scope.bind(name, node);
+    }
+    let acceleration = scope.lower(&mut graph, &parse(formula).unwrap()).unwrap();
+    let velocity = scope.get("qd1").unwrap();
+    Dynamics {
+        name: "pendulum".to_owned(),
+        joints: 1,
+        parameters,
+        program: graph.finish(&[velocity, acceleration]),
+    }
+}
+
+/// The frictionless pendulum.
+pub(super) fn pendulum(c_g: f64, c_i: f64) -> Dynamics {
+    one_joint(
+        "C_g * sin(q1) + C_i * tau1",
+        vec![parameter("C_g", c_g), parameter("C_i", c_i)],
+    )
+}
+
+/// `count` transitions from random states of the pendulum C_g = 15, C_i = 3 with this viscous friction,
+/// by semi-implicit Euler in f64.
+pub(super) fn transitions(count: usize, friction: f64, seed: u64) -> Segments {
+    let plant = one_joint(
+        "15 * sin(q1) + 3 * tau1 + C_fr * qd1",
+        vec![parameter("C_fr", friction)],
+    );
+    let mut rng = rng(seed);
+    let mut segments = Segments::new(1, 1);
+    let pi = std::f64::consts::PI;
+    for _ in 0..count {
+        let (q, v) = (rng.random_range(-pi..pi), rng.random_range(-8.0..8.0));
+        let tau = rng.random_range(-3.0..3.0);
+        let next = v + DT * plant.program.eval(&[q, v, tau, 0.0, friction])[1];
+        segments
+            .push_trajectory(&[0.0, DT], &[q, v, q + DT * next, next], &[tau, 0.0], 1)
+            .unwrap();
+    }
+    segments
+}
+
+/// A pendulum with a residual of the published size, scaled to the segments.
+pub(super) fn hybrid(
+    (c_g, c_i): (f64, f64),
+    segments: &Segments,
+    backend: Backend,
+    last: LastLayer,
+) -> HybridModel {
+    let settings = MlpSettings::for_joints(1);
+    let scaling = segments.scaling(settings.angles);
+    let residual = MlpWeights::new(1, &settings, scaling, last, &mut rng(7));
+    HybridModel::physics(&pendulum(c_g, c_i), &backend.device())
+        .and_then(|model| model.with_residual(&residual))
+        .unwrap()
+}

@@ -1,0 +1,166 @@
+//! Learnable numbers as a safetensors file: `parameters.NAME` (f64, in the parameter's unit),
+//! `layers.K.weight` (f32, `[output, input]`) and `layers.K.bias` of the residual, the same under `prior.`
+//! for a prior that is a network. PyTorch's linear layers have these names and this layout.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+
+use super::CheckpointError;
+use super::manifest::{Manifest, SavedNetwork};
+use crate::model::{LayerWeights, MlpWeights, ModelWeights};
+
+/// A tensor on its way into a file.
+struct Entry {
+    name: String,
+    dtype: Dtype,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+/// The bytes of the file.
+pub(super) fn to_bytes(manifest: &Manifest, weights: &ModelWeights) -> Vec<u8> {
+    let mut entries: Vec<Entry> = (manifest.parameters.iter().zip(&weights.parameters))
+        .map(|(parameter, value)| Entry {
+            name: format!("parameters.{}", parameter.name),
+            dtype: Dtype::F64,
+            shape: vec![1],
+            bytes: value.to_le_bytes().to_vec(),
+        })
+        .collect();
+    for (prefix, network) in [("prior.", &weights.prior), ("", &weights.residual)] {
+        for (k, layer) in network.iter().flat_map(|n| n.layers.iter()).enumerate() {
+            entries.extend(layer_entries(prefix, k, layer));
+        }
+    }
+    let views = entries.iter().map(|entry| {
+        let view = TensorView::new(entry.dtype, entry.shape.clone(), &entry.bytes)
+            .expect("bytes are written for the shape");
+        (entry.name.as_str(), view)
+    });
+    let about = HashMap::from([("system".to_owned(), manifest.system.clone())]);
+    safetensors::serialize(views, Some(about)).expect("names and shapes are plain")
+}
+
+fn layer_entries(prefix: &str, k: usize, layer: &LayerWeights) -> [Entry; 2] {
+    #[allow(clippy::cast_possible_truncation)]
+    // they are f32 in training, widened for other readers
+    let bytes = |values: &[f64]| {
+        values
+            .iter()
+            .flat_map(|v| (*v as f32).to_le_bytes())
+            .collect()
+    };
+    [
+        Entry {
+            name: format!("{prefix}layers.{k}.weight"),
+            dtype: Dtype::F32,
+            shape: vec![layer.outputs, layer.inputs],
+            bytes: bytes(&layer.weight),
+        },
+        Entry {
+            name: format!("{prefix}layers.{k}.bias"),
+            dtype: Dtype::F32,
+            shape: vec![layer.outputs],
+            bytes: bytes(&layer.bias),
+        },
+    ]
+}
+
+/// Read the file back; `manifest` says what must be in it.
+pub(super) fn from_bytes(
+    manifest: &Manifest,
+    bytes: &[u8],
+    file: &str,
+    dir: &Path,
+) -> Result<ModelWeights, CheckpointError> {
+    let corrupt = |reason: String| CheckpointError::Corrupt {
+        file: file.to_owned(),
+        reason,
+        dir: dir.to_owned(),
+    };
+    let tensors = SafeTensors::deserialize(bytes).map_err(|error| corrupt(error.to_string()))?;
+    let reader = Reader { tensors, file, dir };
+    let parameters = (manifest.parameters.iter())
+        .map(|p| Ok(reader.read(&format!("parameters.{}", p.name), Dtype::F64, &[1])?[0]))
+        .collect::<Result<_, CheckpointError>>()?;
+    let network = |prefix: &str, saved: &Option<SavedNetwork>| {
+        let saved = saved.as_ref();
+        saved.map(|saved| reader.network(prefix, saved)).transpose()
+    };
+    Ok(ModelWeights {
+        parameters,
+        prior: network("prior.", &manifest.prior)?,
+        residual: network("", &manifest.residual)?,
+    })
+}
+
+struct Reader<'a> {
+    tensors: SafeTensors<'a>,
+    file: &'a str,
+    dir: &'a Path,
+}
+
+impl Reader<'_> {
+    fn network(&self, prefix: &str, saved: &SavedNetwork) -> Result<MlpWeights, CheckpointError> {
+        let pairs = saved.widths.windows(2).enumerate();
+        let layers = pairs.map(|(k, pair)| {
+            let (inputs, outputs) = (pair[0], pair[1]);
+            let name = |part| format!("{prefix}layers.{k}.{part}");
+            Ok(LayerWeights {
+                inputs,
+                outputs,
+                weight: self.read(&name("weight"), Dtype::F32, &[outputs, inputs])?,
+                bias: self.read(&name("bias"), Dtype::F32, &[outputs])?,
+            })
+        });
+        Ok(MlpWeights {
+            angles: saved.angles,
+            on: saved.on,
+            scaling: saved.scaling.clone(),
+            layers: layers.collect::<Result<_, CheckpointError>>()?,
+        })
+    }
+
+    fn read(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<Vec<f64>, CheckpointError> {
+        let corrupt = |reason| CheckpointError::Corrupt {
+            file: self.file.to_owned(),
+            reason,
+            dir: self.dir.to_owned(),
+        };
+        let tensor = (self.tensors.tensor(name))
+            .map_err(|_| corrupt(format!("there is no tensor `{name}`")))?;
+        if tensor.dtype() != dtype {
+            let found = tensor.dtype();
+            return Err(corrupt(format!(
+                "`{name}` is of type {found:?}, not {dtype:?}"
+            )));
+        }
+        if tensor.shape() != shape {
+            return Err(CheckpointError::Shape {
+                tensor: name.to_owned(),
+                file: self.file.to_owned(),
+                expected: shape.to_vec(),
+                found: tensor.shape().to_vec(),
+                dir: self.dir.to_owned(),
+            });
+        }
+        let values: Vec<f64> = match dtype {
+            Dtype::F64 => chunks(tensor.data()).map(f64::from_le_bytes).collect(),
+            _ => (chunks(tensor.data()).map(f32::from_le_bytes))
+                .map(f64::from)
+                .collect(),
+        };
+        match values.iter().find(|value| !value.is_finite()) {
+            Some(value) => Err(corrupt(format!("`{name}` holds {value}"))),
+            None => Ok(values),
+        }
+    }
+}
+
+/// The bytes in groups of `N`, which safetensors has checked to come out even.
+fn chunks<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [u8; N]> {
+    bytes.as_chunks::<N>().0.iter().copied()
+}
