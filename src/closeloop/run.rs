@@ -195,7 +195,7 @@ fn verdict(
         return (Verdict::Inconclusive, reason);
     }
     let found = after.effects.len() - study.system.effects.len();
-    let what_is_left = format!("something that depends on {} is left", left.where_);
+    let what_is_left = format!("something that depends on {} is left", left.place);
     match (found, left.is_significant()) {
         (0, false) => (Verdict::NoMissingEffect, "no effect of the library helps on left-out stretches".into()),
         (0, true) => (Verdict::Unexplained, format!("no effect of the library helps, and {what_is_left}")),

@@ -122,7 +122,7 @@ impl<'a> Study<'a> {
         Ok(self.fit_on(
             &self.shooting,
             &first.effects,
-            &self.declared_where_held(&first.declared),
+            &self.declared_placeheld(&first.declared),
             locals,
             None,
         )?)
@@ -143,7 +143,7 @@ impl<'a> Study<'a> {
         if self.held.is_empty() {
             return Ok(first);
         }
-        let values = self.declared_where_held(&first.declared);
+        let values = self.declared_placeheld(&first.declared);
         Ok(self.fit_on(
             short,
             &first.effects,
@@ -153,7 +153,7 @@ impl<'a> Study<'a> {
         )?)
     }
 
-    fn declared_where_held(&self, values: &[f64]) -> Vec<f64> {
+    fn declared_placeheld(&self, values: &[f64]) -> Vec<f64> {
         let mut values = values.to_vec();
         for &k in &self.held {
             values[k] = self.system.parameters[k].value;

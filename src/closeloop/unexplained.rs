@@ -13,7 +13,7 @@ pub struct Unexplained {
     /// Probability of so much structure in noise alone: the smallest over the probes, times their number.
     pub p_value: f64,
     /// The variable over which most of it lives: `q1`, `qd2`, `tau1`, `t`, or `none`.
-    pub where_: String,
+    pub place: String,
 }
 
 /// Below this probability what is left is no accident.
@@ -23,7 +23,7 @@ const NOTEWORTHY: f64 = 0.05;
 
 impl Unexplained {
     pub fn is_significant(&self) -> bool {
-        self.where_ != "none"
+        self.place != "none"
     }
 }
 
@@ -64,7 +64,7 @@ pub fn unexplained(
     Unexplained {
         fraction: fraction(before.fit.scale, after.fit.scale),
         p_value: (least * asked).min(1.0),
-        where_: most.map_or_else(|| "none".to_owned(), |most| most.2.clone()),
+        place: most.map_or_else(|| "none".to_owned(), |most| most.2.clone()),
     }
 }
 

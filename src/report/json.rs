@@ -1,0 +1,295 @@
+use serde::Serialize;
+
+use crate::closeloop::{Alternative, Finding, How, Outcome, Unexplained, Verdict, norm};
+use crate::data::Finding as AuditFinding;
+use crate::evaluate::{Assessment, Summary, summarise};
+use crate::model::Parameter;
+
+/// `report.json`: the outcome with fixed names, for other programs.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Version of these names.
+    schema: u32,
+    /// Version of the program.
+    version: &'static str,
+    seed: u64,
+    system: String,
+    joints: usize,
+    verdict: Verdict,
+    reason: String,
+    effects: Vec<EffectEntry>,
+    alternatives: Vec<AlternativeEntry>,
+    unexplained: UnexplainedEntry,
+    parameters: Vec<ParameterEntry>,
+    identifiability: IdentifiabilityEntry,
+    error: ErrorEntry,
+    residual_norm: NormEntry,
+    logs: LogsEntry,
+    audit: Vec<AuditEntry>,
+    tried: Vec<Vec<TriedEntry>>,
+    files: FilesEntry,
+}
+
+#[derive(Debug, Serialize)]
+struct EffectEntry {
+    name: String,
+    joint: usize,
+    expression: String,
+    parameters: Vec<ParameterEntry>,
+    p_value: f64,
+    error_reduction: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct ParameterEntry {
+    name: String,
+    value: f64,
+    ci95: Option<[f64; 2]>,
+    unit: String,
+    identifiable: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct EffectName {
+    name: String,
+    joint: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct AlternativeEntry {
+    effects: Vec<EffectName>,
+    reason: String,
+    experiment: String,
+}
+
+#[derive(Debug, Serialize)]
+struct UnexplainedEntry {
+    fraction: f64,
+    p_value: f64,
+    #[serde(rename = "where")]
+    place: String,
+}
+
+#[derive(Debug, Serialize)]
+struct IdentifiabilityEntry {
+    free: usize,
+    determined: usize,
+    /// Combinations that the logs do not determine, as (parameter, weight).
+    undetermined: Vec<Vec<(String, f64)>>,
+    /// Parameters held at their declared values for that reason.
+    held: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct ErrorEntry {
+    logs: &'static str,
+    horizons_s: Vec<f64>,
+    before: ModelError,
+    after: ModelError,
+    hybrid: Option<ModelError>,
+    reduction_ci95: Option<[f64; 2]>,
+    integrator_step_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct ModelError {
+    position_rmse: Vec<Vec<f64>>,
+    position_median: Vec<Vec<f64>>,
+    velocity_rmse: Vec<Vec<f64>>,
+    windows: Vec<usize>,
+    diverged: Vec<usize>,
+}
+
+#[derive(Debug, Serialize)]
+struct NormEntry {
+    before: f64,
+    after: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct LogsEntry {
+    train: Vec<LogEntry>,
+    test: Vec<LogEntry>,
+    split: How,
+}
+
+#[derive(Debug, Serialize)]
+struct LogEntry {
+    name: String,
+    rows: usize,
+    start_s: f64,
+    end_s: f64,
+    leave_out: Vec<[f64; 2]>,
+}
+
+#[derive(Debug, Serialize)]
+struct AuditEntry {
+    log: String,
+    findings: Vec<AuditFinding>,
+}
+
+#[derive(Debug, Serialize)]
+struct TriedEntry {
+    name: String,
+    joint: usize,
+    /// Fall of the loss on left-out stretches, as a share.
+    gain: f64,
+    p_value: f64,
+    chosen: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct FilesEntry {
+    model: &'static str,
+    report: &'static str,
+    checkpoint: Option<&'static str>,
+    plots: Vec<&'static str>,
+}
+
+/// Names of the files in the folder of a report.
+pub(super) const MODEL: &str = "model.toml";
+pub(super) const TEXT: &str = "report.md";
+pub(super) const CHECKPOINT: &str = "checkpoint";
+pub(super) const PLOTS: [&str; 3] = ["predictions.svg", "residual.svg", "errors.svg"];
+
+impl Report {
+    /// The outcome of a run with this seed.
+    pub fn new(outcome: &Outcome, seed: u64) -> Self {
+        let system = &outcome.after.dynamics;
+        let declared = outcome.before.declared.len();
+        Self {
+            schema: 1,
+            version: env!("CARGO_PKG_VERSION"),
+            seed,
+            system: system.name.clone(),
+            joints: system.joints,
+            verdict: outcome.verdict,
+            reason: outcome.reason.clone(),
+            effects: outcome.findings.iter().map(effect).collect(),
+            alternatives: outcome.alternatives.iter().map(alternative).collect(),
+            unexplained: left(&outcome.unexplained),
+            parameters: outcome.parameters[..declared].iter().map(parameter).collect(),
+            identifiability: identifiability(outcome),
+            error: errors(outcome),
+            residual_norm: NormEntry {
+                before: norm(&outcome.residual_before),
+                after: norm(&outcome.residual_after),
+            },
+            logs: logs(outcome),
+            audit: outcome
+                .audits
+                .iter()
+                .map(|audit| AuditEntry { log: audit.log.clone(), findings: audit.findings.clone() })
+                .collect(),
+            tried: tried(outcome),
+            files: FilesEntry {
+                model: MODEL,
+                report: TEXT,
+                checkpoint: outcome.learned.as_ref().map(|_| CHECKPOINT),
+                plots: PLOTS.to_vec(),
+            },
+        }
+    }
+}
+
+fn effect(finding: &Finding) -> EffectEntry {
+    EffectEntry {
+        name: finding.effect.effect.name.clone(),
+        joint: finding.effect.joint + 1,
+        expression: finding.expression.clone(),
+        parameters: finding.parameters.iter().map(parameter).collect(),
+        p_value: finding.p_value,
+        error_reduction: finding.error_reduction,
+    }
+}
+
+/// A parameter is identifiable where the logs give it an interval narrower than its own magnitude.
+fn parameter(parameter: &Parameter) -> ParameterEntry {
+    let narrow = |[low, high]: [f64; 2]| high - low < 2.0 * parameter.value.abs().max(1e-12);
+    ParameterEntry {
+        name: parameter.name.clone(),
+        value: parameter.value,
+        ci95: parameter.ci95,
+        unit: parameter.unit.clone(),
+        identifiable: parameter.ci95.is_some_and(narrow),
+    }
+}
+
+fn alternative(alternative: &Alternative) -> AlternativeEntry {
+    AlternativeEntry {
+        effects: vec![EffectName {
+            name: alternative.effect.effect.name.clone(),
+            joint: alternative.effect.joint + 1,
+        }],
+        reason: alternative.reason.clone(),
+        experiment: alternative.experiment.clone(),
+    }
+}
+
+fn left(unexplained: &Unexplained) -> UnexplainedEntry {
+    UnexplainedEntry {
+        fraction: unexplained.fraction,
+        p_value: unexplained.p_value,
+        place: unexplained.place.clone(),
+    }
+}
+
+fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
+    let verdict = &outcome.identifiability;
+    let name = |k: &usize| outcome.before.dynamics.parameters[*k].name.clone();
+    IdentifiabilityEntry {
+        free: verdict.free,
+        determined: verdict.determined,
+        undetermined: verdict.undetermined.clone(),
+        held: outcome.held.iter().map(name).collect(),
+    }
+}
+
+fn errors(outcome: &Outcome) -> ErrorEntry {
+    let joints = outcome.after.dynamics.joints;
+    let model = |assessment: &Assessment| model_error(summarise(&assessment.horizons, joints));
+    let errors = &outcome.errors;
+    ErrorEntry {
+        logs: "test",
+        horizons_s: errors.before.horizons.iter().map(|h| h.horizon_s).collect(),
+        before: model(&errors.before),
+        after: model(&errors.after),
+        hybrid: errors.hybrid.as_ref().map(model),
+        reduction_ci95: errors.reduction_ci95,
+        integrator_step_s: errors.before.step_s.min(errors.after.step_s),
+    }
+}
+
+fn model_error(summary: Summary) -> ModelError {
+    let Summary { horizons_s: _, position_rmse, position_median, velocity_rmse, windows, diverged } = summary;
+    ModelError { position_rmse, position_median, velocity_rmse, windows, diverged }
+}
+
+fn logs(outcome: &Outcome) -> LogsEntry {
+    let entry = |log: &crate::data::Log| LogEntry {
+        name: log.name(),
+        rows: log.rows(),
+        start_s: log.time.first().copied().unwrap_or(0.0),
+        end_s: log.time.last().copied().unwrap_or(0.0),
+        leave_out: log.leave_out.iter().map(|span| [span.start_s, span.end_s]).collect(),
+    };
+    LogsEntry {
+        train: outcome.train.iter().map(entry).collect(),
+        test: outcome.test.iter().map(entry).collect(),
+        split: outcome.how_split.clone(),
+    }
+}
+
+fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
+    let round = |round: &crate::closeloop::Round| {
+        let entry = |(i, evidence): (usize, &crate::closeloop::Evidence)| TriedEntry {
+            name: evidence.effect.effect.name.clone(),
+            joint: evidence.effect.joint + 1,
+            gain: evidence.gain,
+            p_value: evidence.p_value,
+            chosen: round.chosen == Some(i),
+        };
+        round.evidence.iter().enumerate().map(entry).collect()
+    };
+    outcome.rounds.iter().map(round).collect()
+}

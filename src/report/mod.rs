@@ -1,0 +1,13 @@
+//! What closing the loop found, for people and for programs.
+
+mod folder;
+mod json;
+mod model_file;
+pub mod plot;
+mod picture;
+mod text;
+
+pub use folder::{WriteError, write, write_whole};
+pub use json::Report;
+pub use model_file::model_file;
+pub use text::text;

@@ -1,0 +1,250 @@
+use std::fmt::Write;
+
+use crate::closeloop::{Finding, How, Outcome, Verdict, norm};
+use crate::data::Severity;
+use crate::evaluate::{Summary, summarise};
+use crate::model::Parameter;
+
+/// The report in Markdown: the answer first, then the evidence, then what to be careful about.
+pub fn text(outcome: &Outcome, seed: u64) -> String {
+    let sections = [
+        answer(outcome),
+        effects(&outcome.findings),
+        errors(outcome),
+        parameters(outcome),
+        alternatives(outcome),
+        left(outcome),
+        tried(outcome),
+        logs(outcome),
+        footer(outcome, seed),
+    ];
+    sections.concat()
+}
+
+fn answer(outcome: &Outcome) -> String {
+    let found: Vec<String> = outcome
+        .findings
+        .iter()
+        .map(|f| format!("**{}** on joint {}", f.effect.effect.name, f.effect.joint + 1))
+        .collect();
+    let headline = match (outcome.verdict, found.is_empty()) {
+        (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
+        (_, false) => format!("The model lacks {}", found.join(" and ")),
+        (Verdict::Unexplained, true) => "Something is missing that no known effect names".to_owned(),
+        (_, true) => "Nothing is missing that these logs could show".to_owned(),
+    };
+    format!(
+        "# {}: {headline}\n\n{}.\n\n",
+        outcome.after.dynamics.name,
+        capitalised(&outcome.reason)
+    )
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+fn effects(findings: &[Finding]) -> String {
+    if findings.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("## Effects\n\n| effect | joint | adds | value (95 % interval) | p | cuts the error by |\n|---|---|---|---|---|---|\n");
+    for finding in findings {
+        let values: Vec<String> = finding.parameters.iter().map(value).collect();
+        let _ = writeln!(
+            out,
+            "| {} | {} | `{}` | {} | {} | {:.0} % |",
+            finding.effect.effect.name,
+            finding.effect.joint + 1,
+            finding.expression,
+            values.join("<br>"),
+            probability(finding.p_value),
+            100.0 * finding.error_reduction
+        );
+    }
+    out + "\n\"Cuts the error by\" compares the position error on the test logs at the middle horizon with that of a refit without this effect.\n\n"
+}
+
+/// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
+fn value(parameter: &Parameter) -> String {
+    let digits = parameter.ci95.map_or(1e-4 * parameter.value.abs(), |[low, high]| 0.05 * (high - low));
+    let number = |x: f64| rounded(x, digits);
+    let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
+    let interval = parameter
+        .ci95
+        .map_or_else(|| " (held)".to_owned(), |[low, high]| format!(" ({} to {})", number(low), number(high)));
+    format!("{} = {}{unit}{interval}", parameter.name, number(parameter.value))
+}
+
+/// As many digits as the resolution is worth.
+fn rounded(x: f64, resolution: f64) -> String {
+    let resolution = resolution.max(1e-9 * x.abs()).max(1e-12);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12
+    let digits = (-resolution.log10()).ceil().clamp(0.0, 12.0) as usize;
+    format!("{x:.digits$}")
+}
+
+fn probability(p: f64) -> String {
+    if p < 1e-12 { "< 1e-12".to_owned() } else if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
+}
+
+fn errors(outcome: &Outcome) -> String {
+    let joints = outcome.after.dynamics.joints;
+    let (before, after) = (
+        summarise(&outcome.errors.before.horizons, joints),
+        summarise(&outcome.errors.after.horizons, joints),
+    );
+    let hybrid = outcome.errors.hybrid.as_ref().map(|h| summarise(&h.horizons, joints));
+    let mut out = String::from(
+        "## Open-loop error on the test logs\n\nRoot mean square of the position error; in brackets the median over windows.\n\n\
+         | horizon | joint | windows | declared model, fitted | with effects | with effects and network | after / before |\n|---|---|---|---|---|---|---|\n",
+    );
+    for (h, horizon) in before.horizons_s.iter().enumerate() {
+        for j in 0..joints {
+            let cell = |s: &Summary| format!("{} ({})", small(s.position_rmse[h][j]), small(s.position_median[h][j]));
+            let ratio = after.position_rmse[h][j] / before.position_rmse[h][j].max(f64::MIN_POSITIVE);
+            let _ = writeln!(
+                out,
+                "| {horizon} s | {} | {} | {} | {} | {} | {ratio:.2} |",
+                j + 1,
+                before.windows[h],
+                cell(&before),
+                cell(&after),
+                hybrid.as_ref().map_or_else(|| "-".to_owned(), cell)
+            );
+        }
+    }
+    let diverged: usize = before.diverged.iter().chain(&after.diverged).sum();
+    if diverged > 0 {
+        let _ = writeln!(out, "\n{diverged} windows diverged; they count with the error they had reached.");
+    }
+    if let Some([low, high]) = outcome.errors.reduction_ci95 {
+        let _ = writeln!(
+            out,
+            "\nThe effects take away {:.0} to {:.0} % of the error at {} s (95 % interval, by resampling stretches of the test logs).",
+            100.0 * low,
+            100.0 * high,
+            before.horizons_s[before.horizons_s.len() / 2]
+        );
+    }
+    out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
+}
+
+/// A position error in rad (or m), thousandths where it is small.
+fn small(x: f64) -> String {
+    if x < 0.1 { format!("{:.2}e-3", 1e3 * x) } else { format!("{x:.3}") }
+}
+
+fn parameters(outcome: &Outcome) -> String {
+    let declared = outcome.before.declared.len();
+    let mut out = String::from("## Parameters of the declared equations\n\n");
+    for (parameter, before) in outcome.parameters[..declared].iter().zip(&outcome.before.declared) {
+        let _ = writeln!(out, "- {}; without the effects {before:.5}", value(parameter));
+    }
+    let verdict = &outcome.identifiability;
+    let _ = writeln!(out, "\nThe logs determine {} of {} free parameters.", verdict.determined, verdict.free);
+    for &k in &outcome.held {
+        let name = &outcome.before.dynamics.parameters[k].name;
+        let _ = writeln!(
+            out,
+            "- `{name}` is held at its declared value: the logs determine it only in combination with others. \
+             Fitted values of the others, and of effects, are relative to it."
+        );
+    }
+    out + "\n"
+}
+
+fn alternatives(outcome: &Outcome) -> String {
+    if outcome.alternatives.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("## Other explanations that these logs do not rule out\n\n");
+    for alternative in &outcome.alternatives {
+        let _ = writeln!(
+            out,
+            "- **{}** on joint {}: {}. To tell: {}.",
+            alternative.effect.effect.name,
+            alternative.effect.joint + 1,
+            alternative.reason,
+            alternative.experiment
+        );
+    }
+    out + "\n"
+}
+
+fn left(outcome: &Outcome) -> String {
+    let left = &outcome.unexplained;
+    let place = if left.is_significant() {
+        format!("It follows {}.", left.place)
+    } else {
+        "No dependence on angle, speed, torque or time that would matter was found in it.".to_owned()
+    };
+    format!(
+        "## What is left\n\n{:.1} % of the residual variance above the sensor's noise is left (p = {} for structure in it). {place}\n\
+         Residual generalised force: {:.4} before, {:.4} after (root mean square over stretches of 0.15 s, N m or N).\n\n![residual](residual.svg)\n\n",
+        100.0 * left.fraction,
+        probability(left.p_value),
+        norm(&outcome.residual_before),
+        norm(&outcome.residual_after)
+    )
+}
+
+fn tried(outcome: &Outcome) -> String {
+    let mut out = String::from("## What was tried\n\nGain: fall of the loss on stretches left out of the fit.\n\n");
+    for (number, round) in outcome.rounds.iter().enumerate() {
+        let _ = writeln!(
+            out,
+            "Round {} ({} candidates; the most promising ones were fitted):\n\n| effect | joint | gain | p | |\n|---|---|---|---|---|",
+            number + 1,
+            round.candidates
+        );
+        for (i, evidence) in round.evidence.iter().enumerate() {
+            let _ = writeln!(
+                out,
+                "| {} | {} | {:.1} % | {} | {} |",
+                evidence.effect.effect.name,
+                evidence.effect.joint + 1,
+                100.0 * evidence.gain,
+                probability(evidence.p_value),
+                if round.chosen == Some(i) { "added" } else { "" }
+            );
+        }
+        out.push('\n');
+    }
+    out
+}
+
+fn logs(outcome: &Outcome) -> String {
+    let how = match &outcome.how_split {
+        How::Given => "as given".to_owned(),
+        How::LastLogs { count } => format!("the last {count} of the logs were kept for the test"),
+        How::EndOfEachLog { share, gap_s } => {
+            format!("the last {:.0} % of each log, after a gap of {gap_s} s, were kept for the test", 100.0 * share)
+        }
+    };
+    let mut out = format!("## Logs\n\nSplit: {how}.\n\n");
+    let roles = outcome.train.iter().map(|_| "fitted").chain(outcome.test.iter().map(|_| "test"));
+    let all = outcome.train.iter().chain(&outcome.test);
+    for ((log, audit), role) in all.zip(&outcome.audits).zip(roles) {
+        let _ = writeln!(out, "- **{}** ({role}): {} rows, {:.2} s", log.name(), log.rows(), log.duration());
+        for span in &log.leave_out {
+            let _ = writeln!(out, "  - left out: {span}");
+        }
+        for finding in audit.findings.iter().filter(|f| f.severity != Severity::Info) {
+            let _ = writeln!(out, "  - {}", finding.text);
+        }
+    }
+    out + "\n"
+}
+
+fn footer(outcome: &Outcome, seed: u64) -> String {
+    let widths: Vec<String> = outcome.sign_widths.iter().map(|w| format!("{w:.3}")).collect();
+    format!(
+        "---\nresidyn {}, seed {seed}. In fits and predictions the sign of a velocity is smoothed over {} rad/s (or m/s); \
+         integrator: Runge-Kutta 4, steps of {:.2} ms.\n",
+        env!("CARGO_PKG_VERSION"),
+        widths.join(", "),
+        1e3 * outcome.errors.after.step_s
+    )
+}
