@@ -1,12 +1,14 @@
+use std::path::Path;
+
 use burn::module::Module;
 use burn::tensor::{Tensor, TensorData};
 use rand::RngExt;
 
 use super::{pendulum, rng, transitions};
-use crate::expr::Program;
+use crate::expr::{Program, SignForm};
 use crate::model::{
-    Angles, Dynamics, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-    network_dynamics, with_residual,
+    Angles, Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
+    ResidualOn, network_dynamics, with_residual,
 };
 use crate::train::Backend;
 
@@ -109,6 +111,43 @@ fn tensors_and_the_written_out_program_agree() {
             assert_close(&tensors(&model.clone().valid()), &exact, 1e-5);
             assert_close(&lanes(&dynamics.program, &dynamics.values()), &exact, 1e-5);
         }
+    }
+}
+
+#[test]
+fn two_joints_agree_too() {
+    let acrobot = Library::built_in().system(Path::new("acrobot")).unwrap();
+    let acrobot = acrobot.dynamics(&[SignForm::Exact; 2]);
+    let mut rng = rng(12);
+    // Positions, velocities, inputs of each row.
+    let rows: Vec<[f32; 6]> = (0..ROWS)
+        .map(|_| [0; 6].map(|_| rng.random_range(-3.0..3.0)))
+        .collect();
+    for on in [ResidualOn::Accelerations, ResidualOn::Derivative] {
+        let settings = MlpSettings {
+            on,
+            angles: Angles::SinCos,
+            ..MlpSettings::for_joints(2)
+        };
+        let scaling = InputScaling::identity(8);
+        let mlp = MlpWeights::new(2, &settings, scaling, LastLayer::Random, &mut rng);
+        let device = Backend::Flex.device();
+        let model = HybridModel::physics(&acrobot, &device)
+            .and_then(|model| model.with_residual(&mlp))
+            .unwrap();
+        let data = TensorData::new(rows.concat(), [ROWS, 6]);
+        let all: Tensor<2> = Tensor::from_data(data, &device);
+        let (state, input) = (all.clone().narrow(1, 0, 4), all.narrow(1, 4, 2));
+        let (rates, residual) = model.derivative(state, input, &Tensor::zeros([ROWS], &device));
+        assert_eq!(residual.unwrap().dims(), [ROWS, on.outputs(2)]);
+        let found: Vec<f64> = rates.into_data().iter::<f32>().map(f64::from).collect();
+        let written = model.to_dynamics().unwrap();
+        let exact = rows.iter().flat_map(|row| {
+            let point = row.iter().copied().map(f64::from).chain([0.0]);
+            let inputs: Vec<f64> = point.chain(written.values()).collect();
+            written.program.eval(&inputs)
+        });
+        assert_close(&found, &exact.collect::<Vec<_>>(), 1e-4);
     }
 }
 

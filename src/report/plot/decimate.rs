@@ -1,0 +1,79 @@
+//! Fewer points, the same picture.
+
+/// Thins a curve to at most `limit` points (at least two) and keeps its spikes.
+///
+/// The points are cut into runs of equal number; each run keeps its lowest and its highest point, in their order.
+/// The first and the last point always stay. `limit` below four keeps just these two.
+pub fn decimate(points: &[(f64, f64)], limit: usize) -> Vec<(f64, f64)> {
+    let [first, inner @ .., last] = points else {
+        return points.to_vec();
+    };
+    if points.len() <= limit {
+        return points.to_vec();
+    }
+    let mut kept = vec![*first];
+    let runs = limit.saturating_sub(2) / 2;
+    for run in 0..runs {
+        let bounds = run * inner.len() / runs..(run + 1) * inner.len() / runs;
+        kept.extend(extremes(&inner[bounds]));
+    }
+    kept.push(*last);
+    kept
+}
+
+fn extremes(run: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+    let by_height = |a: &usize, b: &usize| run[*a].1.total_cmp(&run[*b].1);
+    let lowest = (0..run.len()).min_by(by_height);
+    let highest = (0..run.len()).max_by(by_height);
+    let mut kept: Vec<usize> = lowest.into_iter().chain(highest).collect();
+    kept.sort_unstable();
+    kept.dedup();
+    kept.into_iter().map(|index| run[index])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::decimate;
+
+    fn sine_with_spike() -> Vec<(f64, f64)> {
+        let mut points: Vec<_> = (0..100_000)
+            .map(|i| f64::from(i) * 1e-3)
+            .map(|t| (t, t.sin()))
+            .collect();
+        points[54_321].1 = 9.0;
+        points[54_400].1 = -7.0;
+        points
+    }
+
+    #[test]
+    fn spikes_and_ends_survive() {
+        let points = sine_with_spike();
+        let kept = decimate(&points, 4000);
+        assert!(kept.len() <= 4000 && kept.len() > 3900);
+        assert!(kept.contains(&points[54_321]) && kept.contains(&points[54_400]));
+        assert_eq!((kept.first(), kept.last()), (points.first(), points.last()));
+    }
+
+    #[test]
+    fn order_in_time_stays() {
+        let kept = decimate(&sine_with_spike(), 777);
+        assert!(kept.is_sorted_by(|a, b| a.0 < b.0));
+    }
+
+    #[test]
+    fn short_curves_are_left_alone() {
+        for length in 0..6 {
+            let points: Vec<_> = (0..length).map(|i| (f64::from(i), 1.0)).collect();
+            assert_eq!(decimate(&points, 6), points);
+        }
+    }
+
+    #[test]
+    fn small_limits_keep_the_ends() {
+        let points = sine_with_spike();
+        for limit in 0..4 {
+            let kept = decimate(&points, limit);
+            assert_eq!(kept, [points[0], points[99_999]]);
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! How far predictions are off, model by model.
+
+use std::f64::consts::TAU;
+
+use svg::node::element::Rectangle;
+
+use super::axes::{Axis, FOOT, Frame, HEAD, heading};
+use super::canvas::{Anchor, Area, Canvas, TO_BASELINE, curves, text};
+use super::legend::{Entry, Sample, legend};
+use super::scale::{Range, three_digits};
+use super::style::{MARGIN, Role, Stroke, TEXT_SIZE, WIDTH};
+use super::{JointKind, PlotError};
+
+const BAR_PX: f64 = 15.0;
+const BAR_PITCH_PX: f64 = 18.0;
+const GROUP_GAP_PX: f64 = 14.0;
+/// An axis ends here at the latest: an error beyond a turn only says that the prediction is lost.
+const LONGEST_BAR: f64 = TAU;
+/// Room for the horizons, left of the bars.
+const LEFT_PX: f64 = 92.0;
+/// Room for the number at the end of the longest bar.
+const NUMBER_PX: f64 = 104.0;
+const MIDDLE_PX: f64 = BAR_PX / 2.0 + TO_BASELINE;
+const QUANTITY: &str = "position error, RMS";
+
+/// Position errors of one joint at one horizon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorRow {
+    /// Number of the joint, from 1.
+    pub joint: usize,
+    /// How the joint moves.
+    pub kind: JointKind,
+    /// How far ahead the models predict.
+    pub horizon_s: f64,
+    /// Error of the declared model.
+    pub before: Option<f64>,
+    /// Error of the model with the effects.
+    pub after: Option<f64>,
+    /// Error of the model with a network.
+    pub hybrid: Option<f64>,
+}
+
+impl ErrorRow {
+    fn bars(&self) -> impl Iterator<Item = (Role, f64)> {
+        let Self {
+            joint: _,
+            kind: _,
+            horizon_s: _,
+            before,
+            after,
+            hybrid,
+        } = *self;
+        let errors = [
+            (Role::Before, before),
+            (Role::After, after),
+            (Role::Hybrid, hybrid),
+        ];
+        errors
+            .into_iter()
+            .filter_map(|(role, error)| Some((role, error?)))
+    }
+}
+
+/// Draws one panel a joint, in the order of the rows: for each horizon a bar a model, with its number at the end.
+///
+/// Joints have an axis each: what compares is the models, and the error of one joint can be many times another's.
+/// An error that is not finite is written out as diverged.
+pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
+    if rows.is_empty() {
+        return Err(PlotError::Empty {
+            title: title.to_owned(),
+        });
+    }
+    let mut canvas = Canvas::new(title);
+    let (key, mut top) = legend(&entries(rows), canvas.top);
+    canvas.add(key);
+    let mut joints: Vec<usize> = Vec::new();
+    for row in rows {
+        if !joints.contains(&row.joint) {
+            joints.push(row.joint);
+        }
+    }
+    for joint in joints {
+        let rows: Vec<&ErrorRow> = rows.iter().filter(|row| row.joint == joint).collect();
+        top = draw_panel(&mut canvas, &rows, top + HEAD) + FOOT;
+    }
+    Ok(canvas.finish(top + 6.0))
+}
+
+fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
+    let named = [
+        (Role::Before, "before: declared model"),
+        (Role::After, "after: with the effects found"),
+        (Role::Hybrid, "hybrid: with a network for the rest"),
+    ];
+    let is_shown = |role| {
+        rows.iter()
+            .flat_map(ErrorRow::bars)
+            .any(|bar| bar.0 == role)
+    };
+    let shown = named.into_iter().filter(|(role, _)| is_shown(*role));
+    shown
+        .map(|(role, label)| Entry::new(Sample::Bar(role), label))
+        .collect()
+}
+
+/// Draws the rows of one joint from `top` on, and says where their frame ends.
+fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
+    let Some(ErrorRow { joint, kind, .. }) = rows.first() else {
+        return top;
+    };
+    let bars: usize = rows.iter().map(|row| row.bars().count()).sum();
+    let area = Area {
+        x: MARGIN + LEFT_PX,
+        y: top,
+        width: WIDTH - 2.0 * MARGIN - LEFT_PX - NUMBER_PX,
+        height: GROUP_GAP_PX * (rows.len() + 1) as f64 + BAR_PITCH_PX * bars as f64,
+    };
+    let errors = rows.iter().flat_map(|row| row.bars());
+    let longest = Range::spanning(errors.map(|bar| bar.1)).map_or(0.0, |range| range.hi);
+    let longest = if longest > 0.0 {
+        longest.min(LONGEST_BAR)
+    } else {
+        1.0
+    };
+    let (factor, unit) = readable(longest, kind.position_unit());
+    let x = Axis::horizontal(
+        Range {
+            lo: 0.0,
+            hi: factor * longest,
+        },
+        area.width,
+        QUANTITY,
+        &unit,
+    );
+    let y = Axis::unmarked(Range { lo: 0.0, hi: 1.0 });
+    let frame = Frame { area, x: &x, y: &y };
+    canvas.add(frame.grid());
+    canvas.add(frame.x_labels());
+    canvas.add(heading(area, &format!("Joint {joint}")));
+    let mut next = top + GROUP_GAP_PX;
+    for row in rows {
+        next = draw_group(canvas, &frame, row, factor, next) + GROUP_GAP_PX;
+    }
+    area.bottom()
+}
+
+/// Draws the bars of one horizon from `top` on, and says where they end. The axis counts errors times `factor`.
+fn draw_group(canvas: &mut Canvas, frame: &Frame, row: &ErrorRow, factor: f64, top: f64) -> f64 {
+    let left = frame.area.x;
+    let mut next = top;
+    for (role, error) in row.bars() {
+        let length = frame.x_px(factor * drawable(error));
+        let end = if error > LONGEST_BAR {
+            length + 10.0
+        } else {
+            length + 6.0
+        };
+        let number = text(
+            &written(error, row.kind),
+            left + end,
+            next + MIDDLE_PX,
+            Anchor::Start,
+            TEXT_SIZE,
+        );
+        canvas.add(bar(left, next, length).set("fill", role.colour()));
+        canvas.add(number);
+        if error.is_finite() && error > LONGEST_BAR {
+            canvas.add(break_mark(left + length - 14.0, next));
+        }
+        next += BAR_PITCH_PX;
+    }
+    let middle = (top + next) / 2.0 + TO_BASELINE - (BAR_PITCH_PX - BAR_PX) / 2.0;
+    canvas.add(text(
+        &format!("{} s ahead", row.horizon_s),
+        left - 10.0,
+        middle,
+        Anchor::End,
+        TEXT_SIZE,
+    ));
+    next
+}
+
+fn bar(x: f64, y: f64, length: f64) -> Rectangle {
+    Rectangle::new()
+        .set("x", x)
+        .set("y", y)
+        .set("width", (10.0 * length).round() / 10.0)
+        .set("height", BAR_PX)
+}
+
+/// A slanted gap in a bar that is longer than the axis.
+fn break_mark(x: f64, y: f64) -> svg::node::element::Path {
+    let gap = Stroke {
+        colour: "white",
+        width: 3.0,
+        dash: "none",
+    };
+    curves([&[(x, y + BAR_PX + 1.0), (x + 6.0, y - 1.0)][..]], &gap)
+}
+
+/// What of an error a bar can show.
+fn drawable(error: f64) -> f64 {
+    if error.is_finite() {
+        error.clamp(0.0, LONGEST_BAR)
+    } else {
+        0.0
+    }
+}
+
+fn written(error: f64, kind: JointKind) -> String {
+    if !error.is_finite() {
+        return "diverged".to_owned();
+    }
+    let (factor, unit) = readable(error, kind.position_unit());
+    format!("{} {unit}", three_digits(factor * error))
+}
+
+/// Thousandths below one: their number, and the unit's name.
+fn readable(error: f64, unit: &str) -> (f64, String) {
+    if error < 1.0 {
+        (1e3, format!("m{unit}"))
+    } else {
+        (1.0, unit.to_owned())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ErrorRow, error_bars};
+    use crate::report::plot::{JointKind, PlotError};
+
+    fn row(before: f64, after: Option<f64>) -> ErrorRow {
+        let kind = JointKind::Revolute;
+        ErrorRow {
+            joint: 1,
+            kind,
+            horizon_s: 0.5,
+            before: Some(before),
+            after,
+            hybrid: None,
+        }
+    }
+
+    #[test]
+    fn numbers_stand_at_the_bars() {
+        let figure = error_bars(&[row(2.104, Some(0.0213))], "errors").unwrap();
+        assert!(figure.contains("2.10 rad") && figure.contains("21.3 mrad"));
+        assert!(figure.contains("0.5 s") && !figure.contains("hybrid"));
+    }
+
+    #[test]
+    fn a_lost_prediction_is_named_and_leaves_room_for_the_others() {
+        for (lost, name) in [
+            (f64::INFINITY, "diverged"),
+            (f64::NAN, "diverged"),
+            (1e9, "1.00·10⁹ rad"),
+        ] {
+            let figure = error_bars(&[row(lost, Some(0.5))], "lost").unwrap();
+            assert!(
+                figure.contains(name) && figure.contains("500 mrad"),
+                "{figure}"
+            );
+        }
+    }
+
+    #[test]
+    fn zero_errors_are_drawn() {
+        let figure = error_bars(&[row(0.0, None)], "zero").unwrap();
+        assert!(figure.contains("0 mrad") && !figure.contains("NaN"));
+    }
+
+    #[test]
+    fn no_row_is_an_error() {
+        let error = error_bars(&[], "none").unwrap_err();
+        assert_eq!(
+            error,
+            PlotError::Empty {
+                title: "none".to_owned()
+            }
+        );
+    }
+}

@@ -1,0 +1,84 @@
+//! The key to a figure, in rows above its frames.
+
+use svg::node::element::{Group, Rectangle};
+
+use super::canvas::{Anchor, TO_BASELINE, curves, dots, marker, rule, text, text_width};
+use super::style::{INK, MARGIN, MEAN_MARK_PX, Role, START_MARK_PX, TEXT_SIZE, WIDTH};
+
+const SAMPLE_PX: f64 = 30.0;
+const ROW_PX: f64 = 21.0;
+const ENTRY_GAP_PX: f64 = 26.0;
+
+/// What stands beside a name.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Sample {
+    /// The line of a role.
+    Line(Role),
+    /// A faint point of a role.
+    Point(Role),
+    /// A filled bar of a role.
+    Bar(Role),
+    /// The mark at the start of a piece of a curve.
+    Start,
+    /// A marker with an upright interval.
+    Interval,
+}
+
+/// An entry of a legend.
+#[derive(Clone, PartialEq)]
+pub(super) struct Entry {
+    pub sample: Sample,
+    pub label: String,
+}
+
+impl Entry {
+    pub fn new(sample: Sample, label: &str) -> Self {
+        let label = label.to_owned();
+        Self { sample, label }
+    }
+}
+
+/// Draws the entries from `top` on, and says where they end.
+pub(super) fn legend(entries: &[Entry], top: f64) -> (Group, f64) {
+    let mut drawn = Group::new();
+    let (mut x, mut middle) = (MARGIN, top + ROW_PX / 2.0);
+    for entry in entries {
+        let width = SAMPLE_PX + 8.0 + text_width(&entry.label, TEXT_SIZE);
+        if x > MARGIN && x + width > WIDTH - MARGIN {
+            (x, middle) = (MARGIN, middle + ROW_PX);
+        }
+        let label = text(
+            &entry.label,
+            x + SAMPLE_PX + 8.0,
+            middle + TO_BASELINE,
+            Anchor::Start,
+            TEXT_SIZE,
+        );
+        drawn = drawn.add(sample(entry.sample, x, middle)).add(label);
+        x += width + ENTRY_GAP_PX;
+    }
+    (drawn, middle + ROW_PX / 2.0 + 4.0)
+}
+
+fn sample(sample: Sample, x: f64, y: f64) -> Group {
+    let centre = (x + SAMPLE_PX / 2.0, y);
+    let group = Group::new();
+    match sample {
+        Sample::Line(role) => {
+            group.add(curves([&[(x, y), (x + SAMPLE_PX, y)][..]], &role.stroke()))
+        }
+        Sample::Point(role) => group.add(dots([centre], 7.0, role.colour()).set("opacity", 0.6)),
+        Sample::Bar(role) => group.add(
+            Rectangle::new()
+                .set("x", x)
+                .set("y", y - 5.5)
+                .set("width", SAMPLE_PX)
+                .set("height", 11)
+                .set("fill", role.colour()),
+        ),
+        Sample::Start => group.add(marker(centre, START_MARK_PX, INK)),
+        Sample::Interval => group
+            .add(rule((centre.0, y - 8.0), (centre.0, y + 8.0), INK).set("stroke-width", 1.4))
+            .add(marker(centre, MEAN_MARK_PX, INK)),
+    }
+}

@@ -1,0 +1,80 @@
+//! The report's figures, as SVG text.
+//!
+//! Three figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
+//! unexplained ([`residual_shape`]), and how far off it is ([`error_bars`]). They take plain numbers and return a
+//! complete SVG document; the caller writes it. A [`Role`] has the same colour and line in every figure.
+//!
+//! The documents carry no identifiers and no style sheets, so that several can stand in one HTML page, and name
+//! only the generic font `sans-serif`.
+
+mod axes;
+mod binned;
+mod canvas;
+mod decimate;
+mod error_bars;
+mod legend;
+mod predictions;
+mod residual_shape;
+mod scale;
+mod style;
+
+pub use binned::{Bin, binned_mean};
+pub use decimate::decimate;
+pub use error_bars::{ErrorRow, error_bars};
+pub use predictions::{Panel, Track, predictions};
+pub use residual_shape::{ShapePanel, ShapeSample, residual_shape};
+pub use style::Role;
+
+/// A figure that cannot be drawn.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PlotError {
+    /// The figure was asked for without a single panel or row.
+    #[error("figure {title:?} has nothing to show; give it at least one panel or row")]
+    Empty {
+        /// The title that the figure would have had.
+        title: String,
+    },
+}
+
+/// How a joint moves: fixes the units on the axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns: rad, rad/s, N m.
+    Revolute,
+    /// Slides: m, m/s, N.
+    Prismatic,
+}
+
+impl JointKind {
+    /// Unit of the joint's position.
+    pub fn position_unit(self) -> &'static str {
+        match self {
+            Self::Revolute => "rad",
+            Self::Prismatic => "m",
+        }
+    }
+
+    /// Unit of the joint's velocity.
+    pub fn velocity_unit(self) -> &'static str {
+        match self {
+            Self::Revolute => "rad/s",
+            Self::Prismatic => "m/s",
+        }
+    }
+
+    /// What the generalised force on the joint is called.
+    pub fn force_name(self) -> &'static str {
+        match self {
+            Self::Revolute => "torque",
+            Self::Prismatic => "force",
+        }
+    }
+
+    /// Unit of the generalised force on the joint.
+    pub fn force_unit(self) -> &'static str {
+        match self {
+            Self::Revolute => "N m",
+            Self::Prismatic => "N",
+        }
+    }
+}

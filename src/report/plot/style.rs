@@ -1,0 +1,67 @@
+//! Colours, line styles and sizes, the same in every figure.
+
+/// What a curve, a cloud of points or a bar stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// The log.
+    Measured,
+    /// The declared model, fitted.
+    Before,
+    /// The model with the effects that were found.
+    After,
+    /// The model with a network for what is left.
+    Hybrid,
+}
+
+/// How a line is drawn.
+pub(super) struct Stroke {
+    pub colour: &'static str,
+    pub width: f64,
+    /// SVG `stroke-dasharray`; `none` for a full line.
+    pub dash: &'static str,
+}
+
+impl Role {
+    /// Colours of Okabe and Ito (2008), told apart by colour-blind readers; their vermilion in place of their
+    /// orange, which is too pale for a thin line on white.
+    pub(super) fn colour(self) -> &'static str {
+        match self {
+            Self::Measured => "#2b2b2b",
+            Self::Before => "#d55e00",
+            Self::After => "#0072b2",
+            Self::Hybrid => "#009e73",
+        }
+    }
+
+    /// Dashes too differ, for print without colour. The log is a broad grey band that good predictions run on, so
+    /// that neither hides the other; the hybrid is dotted, to show the line that it mostly lies on.
+    pub(super) fn stroke(self) -> Stroke {
+        let (colour, width, dash) = match self {
+            Self::Measured => ("#8c8c8c", 4.5, "none"),
+            Self::Before => (self.colour(), 1.9, "6 3.5"),
+            Self::After => (self.colour(), 1.9, "none"),
+            Self::Hybrid => (self.colour(), 2.4, "2.5 5"),
+        };
+        Stroke {
+            colour,
+            width,
+            dash,
+        }
+    }
+}
+
+pub(super) const WIDTH: f64 = 900.0;
+pub(super) const MARGIN: f64 = 18.0;
+pub(super) const TITLE_SIZE: f64 = 17.0;
+pub(super) const TEXT_SIZE: f64 = 13.0;
+pub(super) const SMALL_SIZE: f64 = 11.5;
+
+/// Radius of the mark at the start of a piece of a curve.
+pub(super) const START_MARK_PX: f64 = 3.4;
+/// Radius of the mark at the mean of a bin.
+pub(super) const MEAN_MARK_PX: f64 = 3.0;
+
+pub(super) const INK: &str = "#2b2b2b";
+pub(super) const FAINT_INK: &str = "#666666";
+pub(super) const GRID: &str = "#e4e4e4";
+pub(super) const SPINE: &str = "#8a8a8a";
