@@ -1,4 +1,5 @@
 //! Residyn: from a rig's log to the physical effect that its model lacks.
+pub mod cli;
 pub mod closeloop;
 pub mod data;
 pub mod evaluate;
@@ -6,4 +7,5 @@ pub mod expr;
 pub mod identify;
 pub mod model;
 pub mod plant;
+pub mod report;
 pub mod train;

@@ -51,21 +51,37 @@ pub fn learn_residual(
         ..MlpSettings::for_joints(study.system.joints)
     };
     let scaling = training.scaling(settings.angles);
-    let weights = MlpWeights::new(study.system.joints, &settings, scaling, LastLayer::Zero, rng);
+    let weights = MlpWeights::new(
+        study.system.joints,
+        &settings,
+        scaling,
+        LastLayer::Zero,
+        rng,
+    );
     let hybrid = HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?;
     let mut run = Training::new(hybrid, fit_settings(), rng.clone())?;
     run.run(&training, Some(&validation), &mut |at| {
-        progress(&format!("training the residual network, epoch {} of {}", at.epoch, at.epochs));
+        progress(&format!(
+            "training the residual network, epoch {} of {}",
+            at.epoch, at.epochs
+        ));
         ControlFlow::Continue(())
     })?;
     let hybrid = run.result()?.to_dynamics()?;
-    Ok(Some(Learned { training: run, hybrid }))
+    Ok(Some(Learned {
+        training: run,
+        hybrid,
+    }))
 }
 
 fn fit_settings() -> FitSettings {
     FitSettings {
         epochs: EPOCHS,
-        learning_rates: LearningRates { physics: 0.0, residual: 0.003, ..LearningRates::default() },
+        learning_rates: LearningRates {
+            physics: 0.0,
+            residual: 0.003,
+            ..LearningRates::default()
+        },
         penalty: Penalty::Fixed { alpha: ALPHA },
         integrator: Integrator::Rk4,
         record_every: NonZeroUsize::new(10).expect("not zero"),
@@ -78,7 +94,10 @@ fn segments(study: &Study<'_>) -> Option<(Segments, Segments)> {
     let stretches: Vec<Smooth> = study.logs.iter().flat_map(stretches).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
     let stride = (rows / SEGMENTS).max(1);
-    let mut sets = [Segments::new(study.system.joints, STEPS), Segments::new(study.system.joints, STEPS)];
+    let mut sets = [
+        Segments::new(study.system.joints, STEPS),
+        Segments::new(study.system.joints, STEPS),
+    ];
     for (index, stretch) in stretches.iter().enumerate() {
         let set = &mut sets[usize::from(index % EVERY == EVERY - 1)];
         // A stretch that is too short holds no segment; that is no error here.
@@ -107,18 +126,28 @@ fn stretches(log: &Log) -> Vec<Smooth> {
     for first in (0..log.rows().saturating_sub(merged)).step_by(merged) {
         let (from, to) = (log.time[first], log.time[first + merged]);
         let broken = to - from > 2.0 * step * merged as f64
-            || log.leave_out.iter().any(|span| span.start_s <= to && span.end_s >= from);
-        let states: Option<Vec<_>> =
-            log.q.iter().map(|q| local_cubic(&log.time, q, first, half_width)).collect();
+            || log
+                .leave_out
+                .iter()
+                .any(|span| span.start_s <= to && span.end_s >= from);
+        let states: Option<Vec<_>> = log
+            .q
+            .iter()
+            .map(|q| local_cubic(&log.time, q, first, half_width))
+            .collect();
         let current = all.last_mut().expect("there is always one");
-        let full = current.time.first().is_some_and(|start| from - start >= STRETCH_S);
+        let full = current
+            .time
+            .first()
+            .is_some_and(|start| from - start >= STRETCH_S);
         match states {
             Some(states) if !broken => {
                 current.time.push(from);
                 current.states.extend(states.iter().map(|s| s.value));
                 current.states.extend(states.iter().map(|s| s.slope));
                 #[allow(clippy::cast_precision_loss)] // few rows
-                let mean = |tau: &Vec<f64>| tau[first..first + merged].iter().sum::<f64>() / merged as f64;
+                let mean =
+                    |tau: &Vec<f64>| tau[first..first + merged].iter().sum::<f64>() / merged as f64;
                 current.inputs.extend(log.tau.iter().map(mean));
                 if full {
                     all.push(Smooth::default());

@@ -51,6 +51,8 @@ pub struct Outcome {
     pub residual_after: Vec<ForceSample>,
     /// The residual network trained on what is left, where the logs give enough to train it.
     pub learned: Option<Learned>,
+    /// For each joint whether it slides rather than turns.
+    pub prismatic: Vec<bool>,
     /// Widths of the smoothed sign of each joint, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
 }
@@ -91,7 +93,10 @@ impl Alternative {
             return Vec::new();
         };
         let others = round.evidence.iter().filter(|e| !std::ptr::eq(*e, chosen));
-        others.filter(|e| e.is_as_good_as(chosen)).map(|e| Self::to(chosen, e)).collect()
+        others
+            .filter(|e| e.is_as_good_as(chosen))
+            .map(|e| Self::to(chosen, e))
+            .collect()
     }
 
     fn to(chosen: &Evidence, other: &Evidence) -> Self {

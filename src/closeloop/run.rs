@@ -1,7 +1,7 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::bootstrap::reduction_interval;
-use super::learn::{learn_residual};
+use super::learn::learn_residual;
 use super::outcome::{Alternative, Errors, Finding, Outcome, Verdict};
 use super::residual::residual_force;
 use super::select::{Selection, p_value, select};
@@ -48,27 +48,63 @@ pub fn close_loop(
     rng: &mut ChaCha8Rng,
     progress: &mut dyn FnMut(Stage<'_>),
 ) -> Result<Outcome, StudyError> {
-    let Request { system, library, split, horizons_s, backend } = request;
+    let Request {
+        system,
+        library,
+        split,
+        horizons_s,
+        backend,
+    } = request;
     let audits = split.train.iter().chain(&split.test).map(audit).collect();
-    progress(Stage { number: 0, text: "fitting the declared model" });
+    progress(Stage {
+        number: 0,
+        text: "fitting the declared model",
+    });
     let mut study = Study::new(system, &split.train);
     let before = study.fit_declared()?;
     let identifiability = identifiability(&before.dynamics, &before.fit);
-    let Selection { model: after, rounds } = select(&study, library.effects(), before.clone(), &mut |text| {
+    let Selection {
+        model: after,
+        rounds,
+    } = select(&study, library.effects(), before.clone(), &mut |text| {
         progress(Stage { number: 1, text });
     });
-    progress(Stage { number: 2, text: "asking what is left" });
+    progress(Stage {
+        number: 2,
+        text: "asking what is left",
+    });
     let left = unexplained(&study, library.probes(), &before, &after);
-    progress(Stage { number: 3, text: "residual force" });
+    progress(Stage {
+        number: 3,
+        text: "residual force",
+    });
     let residual_before = residual_force(&study, &before);
     let residual_after = residual_force(&study, &after);
     let learned = learn_residual(&study, &after, backend, rng, &mut |text| {
         progress(Stage { number: 4, text });
     })?;
-    progress(Stage { number: 5, text: "open-loop errors" });
-    let judge = |model: &Fitted| assess(&model.dynamics, |_| &model.fit.values, &split.test, &horizons_s);
+    progress(Stage {
+        number: 5,
+        text: "open-loop errors",
+    });
+    let judge = |model: &Fitted| {
+        assess(
+            &model.dynamics,
+            |_| &model.fit.values,
+            &split.test,
+            &horizons_s,
+        )
+    };
     let hybrid = learned.as_ref().map(|learned| learned.hybrid.clone());
-    let errors = errors(&before, &after, hybrid.as_ref(), judge, &split, &horizons_s, rng);
+    let errors = errors(
+        &before,
+        &after,
+        hybrid.as_ref(),
+        judge,
+        &split,
+        &horizons_s,
+        rng,
+    );
     let parameters = with_intervals(&study, &after);
     let findings = findings(&study, &after, &parameters, &errors.after, judge);
     let (verdict, reason) = verdict(&study, &after, &left, &identifiability);
@@ -79,6 +115,7 @@ pub fn close_loop(
         audits,
         held: study.held.clone(),
         sign_widths: study.sign_widths(),
+        prismatic: system.prismatic.clone(),
         identifiability,
         alternatives: rounds.iter().flat_map(Alternative::of_round).collect(),
         before,
@@ -157,7 +194,8 @@ fn findings(
             effect,
             parameters: own,
             p_value: p_value(study, model, k).unwrap_or(0.0),
-            error_reduction: without.map_or(0.0, |w| 1.0 - rms(with) / rms(&w).max(f64::MIN_POSITIVE)),
+            error_reduction: without
+                .map_or(0.0, |w| 1.0 - rms(with) / rms(&w).max(f64::MIN_POSITIVE)),
         }
     };
     (declared..model.effects.len()).map(finding).collect()
@@ -167,7 +205,9 @@ fn findings(
 fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Option<Fitted> {
     let mut effects = model.effects.clone();
     effects.remove(k);
-    study.refit(&effects, &model.declared, model.fit.locals.clone(), None).ok()
+    study
+        .refit(&effects, &model.declared, model.fit.locals.clone(), None)
+        .ok()
 }
 
 /// Position error of all joints together at the middle horizon.
@@ -187,19 +227,35 @@ fn verdict(
 ) -> (Verdict, String) {
     let windows = study.shooting.windows.len();
     if windows < FEWEST_WINDOWS {
-        let reason = format!("the training logs hold only {windows} windows of half a second; record more motion");
+        let reason = format!(
+            "the training logs hold only {windows} windows of half a second; record more motion"
+        );
         return (Verdict::Inconclusive, reason);
     }
     if identifiability.free > 0 && identifiability.determined == 0 {
-        let reason = "the training logs determine no parameter of the declared model; move the joints more".into();
+        let reason =
+            "the training logs determine no parameter of the declared model; move the joints more"
+                .into();
         return (Verdict::Inconclusive, reason);
     }
     let found = after.effects.len() - study.system.effects.len();
     let what_is_left = format!("something that depends on {} is left", left.place);
     match (found, left.is_significant()) {
-        (0, false) => (Verdict::NoMissingEffect, "no effect of the library helps on left-out stretches".into()),
-        (0, true) => (Verdict::Unexplained, format!("no effect of the library helps, and {what_is_left}")),
-        (_, false) => (Verdict::Explained, "the effects found leave nothing significant".into()),
-        (_, true) => (Verdict::PartlyExplained, format!("effects were found, and {what_is_left}")),
+        (0, false) => (
+            Verdict::NoMissingEffect,
+            "no effect of the library helps on left-out stretches".into(),
+        ),
+        (0, true) => (
+            Verdict::Unexplained,
+            format!("no effect of the library helps, and {what_is_left}"),
+        ),
+        (_, false) => (
+            Verdict::Explained,
+            "the effects found leave nothing significant".into(),
+        ),
+        (_, true) => (
+            Verdict::PartlyExplained,
+            format!("effects were found, and {what_is_left}"),
+        ),
     }
 }

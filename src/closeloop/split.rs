@@ -32,16 +32,28 @@ const GAP_S: f64 = 0.5;
 impl Split {
     /// The split that the user asks for.
     pub fn given(train: Vec<Log>, test: Vec<Log>) -> Self {
-        Self { train, test, how: How::Given }
+        Self {
+            train,
+            test,
+            how: How::Given,
+        }
     }
 
     /// Set whole trajectories apart where there are three or more, else the end of each.
     pub fn of(mut logs: Vec<Log>) -> Self {
         if logs.len() >= ENOUGH_LOGS {
-            #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            #[allow(
+                clippy::cast_precision_loss,
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss
+            )]
             let count = ((logs.len() as f64 * TEST_SHARE).round() as usize).max(1);
             let test = logs.split_off(logs.len() - count);
-            return Self { train: logs, test, how: How::LastLogs { count } };
+            return Self {
+                train: logs,
+                test,
+                how: How::LastLogs { count },
+            };
         }
         let (mut train, mut test) = (Vec::new(), Vec::new());
         for log in logs {
@@ -51,13 +63,21 @@ impl Split {
         }
         // A log too short for a rest gives no test.
         test.retain(|log| log.rows() > 1);
-        Self { train, test, how: How::EndOfEachLog { share: TEST_SHARE, gap_s: GAP_S } }
+        Self {
+            train,
+            test,
+            how: How::EndOfEachLog {
+                share: TEST_SHARE,
+                gap_s: GAP_S,
+            },
+        }
     }
 }
 
 /// The rows of a log from `start_s` to `end_s`.
 fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
-    let rows = log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
+    let rows =
+        log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
     let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();
     Log {
         path: log.path.clone(),

@@ -47,7 +47,7 @@ const SENSIBLE: f64 = 1e4;
 /// Halving the step may change no number by more than this share.
 const STEP_TOLERANCE: f64 = 1e-3;
 /// First and last length of the integrator's steps in s.
-const LONGEST_STEP_S: f64 = 1e-3;
+pub(super) const LONGEST_STEP_S: f64 = 1e-3;
 const SHORTEST_STEP_S: f64 = 1e-3 / 64.0;
 
 /// The open-loop error of `dynamics` with parameters `values` on `logs`. `values` may differ by log (own

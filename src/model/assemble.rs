@@ -111,7 +111,7 @@ impl<'a> Assembly<'a> {
         let mut parameters = system.parameters.clone();
         let mut with_nodes = Vec::new();
         for effect in effects {
-            let own = effect_parameters(effect, &parameters);
+            let own = effect_parameters(effect, &parameters, system.prismatic[effect.joint]);
             with_nodes.push((effect, own.iter().map(|p| graph.input(&p.name)).collect()));
             parameters.extend(own);
         }
@@ -257,7 +257,22 @@ fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
         .expect("formulas were checked when the file was read")
 }
 
-fn effect_parameters(effect: &FittedEffect, taken: &[Parameter]) -> Vec<Parameter> {
+/// Effect files speak of turning joints; on a sliding one forces stand for torques and metres for radians.
+fn unit_on(prismatic: bool, unit: &str) -> String {
+    if prismatic {
+        unit.replace("kg m^2", "kg")
+            .replace("N m", "N")
+            .replace("rad", "m")
+    } else {
+        unit.to_owned()
+    }
+}
+
+fn effect_parameters(
+    effect: &FittedEffect,
+    taken: &[Parameter],
+    prismatic: bool,
+) -> Vec<Parameter> {
     let names = effect.parameter_names(taken);
     let declared = effect.effect.parameters.iter().zip(&effect.values);
     declared
@@ -265,7 +280,7 @@ fn effect_parameters(effect: &FittedEffect, taken: &[Parameter]) -> Vec<Paramete
         .map(|((parameter, (value, ci95)), name)| Parameter {
             name,
             value: *value,
-            unit: parameter.unit.clone(),
+            unit: unit_on(prismatic, &parameter.unit),
             bounds: parameter.bounds,
             fixed: effect.fixed || parameter.whole,
             ci95: *ci95,

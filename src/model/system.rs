@@ -43,6 +43,8 @@ pub struct System {
     pub name: String,
     pub about: String,
     pub joints: usize,
+    /// For each joint whether it slides (m, N) rather than turns (rad, N m).
+    pub prismatic: Vec<bool>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
     pub effects: Vec<FittedEffect>,
@@ -55,7 +57,7 @@ pub struct System {
     pub(super) energy: Option<Energy>,
 }
 
-const SYSTEM_KEYS: &[&str] = &["name", "about", "joints"];
+const SYSTEM_KEYS: &[&str] = &["name", "about", "joints", "prismatic"];
 const PARAMETER_KEYS: &[&str] = &[
     "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
 ];
@@ -102,6 +104,7 @@ impl System {
             name: section.required_text("name")?.value,
             about: section.text_or_empty("about")?,
             joints,
+            prismatic: prismatic(&section, joints)?,
             columns: columns(top.section("columns")?, joints)?,
             parameters: parameters(top.section("parameters")?)?,
             effects: super::effects_in_file::read(&top, joints, library)?,
@@ -208,6 +211,17 @@ fn joints(section: &Section<'_>) -> Result<usize, FileError> {
         }
         None => Err(section.error("`joints` is missing in [system]; give their number")),
     }
+}
+
+/// `prismatic = [1]` lists the joints that slide.
+fn prismatic(section: &Section<'_>, joints: usize) -> Result<Vec<bool>, FileError> {
+    let listed = section.numbers("prismatic")?.unwrap_or_default();
+    let numbers: Vec<f64> = (1..=joints).map(|j| j as f64).collect();
+    if let Some(stranger) = listed.iter().find(|j| !numbers.contains(j)) {
+        let message = format!("`prismatic` lists joints from 1 to {joints}, found {stranger}");
+        return Err(section.error_at("prismatic", message));
+    }
+    Ok(numbers.iter().map(|j| listed.contains(j)).collect())
 }
 
 fn columns(section: Option<Section<'_>>, joints: usize) -> Result<Columns, FileError> {

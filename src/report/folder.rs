@@ -14,7 +14,10 @@ use crate::train::{CheckpointError, Origin};
 #[derive(Debug, Error)]
 pub enum WriteError {
     #[error("{path} cannot be written: {source}; free some space or give another folder with --out", path = .path.display())]
-    File { path: PathBuf, source: std::io::Error },
+    File {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
@@ -26,8 +29,14 @@ pub enum WriteError {
 /// # Errors
 /// A folder that does not exist or cannot be written, or a full disk; nothing is left behind.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
-    let failed = |source| WriteError::File { path: path.to_owned(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let failed = |source| WriteError::File {
+        path: path.to_owned(),
+        source,
+    };
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
     file.write_all(contents).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
@@ -50,21 +59,33 @@ pub fn write(
         let path = path.to_owned();
         move |source| WriteError::File { path, source }
     };
-    let parent = folder.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = folder
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     std::fs::create_dir_all(parent).map_err(failed(parent))?;
     let staging = tempfile::TempDir::new_in(parent).map_err(failed(folder))?;
     let report = Report::new(outcome, origin.seed);
-    let put = |name: &str, contents: &str| write_whole(&staging.path().join(name), contents.as_bytes());
-    let json = serde_json::to_string_pretty(&report).expect("a report has only finite numbers and texts");
+    let put =
+        |name: &str, contents: &str| write_whole(&staging.path().join(name), contents.as_bytes());
+    let json =
+        serde_json::to_string_pretty(&report).expect("a report has only finite numbers and texts");
     put("report.json", &(json + "\n"))?;
     put(MODEL, &model_file(system, outcome))?;
     put(TEXT, &text(outcome, origin.seed))?;
-    let pictures = [picture::predictions(outcome)?, picture::residual(outcome)?, picture::errors(outcome)?];
+    let pictures = [
+        picture::predictions(outcome)?,
+        picture::residual(outcome)?,
+        picture::errors(outcome)?,
+    ];
     for (name, picture) in PLOTS.iter().zip(&pictures) {
         put(name, picture)?;
     }
     if let Some(learned) = &outcome.learned {
-        let origin = Origin { model_toml: model_file(system, outcome), ..origin.clone() };
+        let origin = Origin {
+            model_toml: model_file(system, outcome),
+            ..origin.clone()
+        };
         crate::train::save(&staging.path().join(CHECKPOINT), &learned.training, &origin)?;
     }
     std::fs::create_dir_all(folder).map_err(failed(folder))?;

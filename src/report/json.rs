@@ -168,7 +168,10 @@ impl Report {
             effects: outcome.findings.iter().map(effect).collect(),
             alternatives: outcome.alternatives.iter().map(alternative).collect(),
             unexplained: left(&outcome.unexplained),
-            parameters: outcome.parameters[..declared].iter().map(parameter).collect(),
+            parameters: outcome.parameters[..declared]
+                .iter()
+                .map(parameter)
+                .collect(),
             identifiability: identifiability(outcome),
             error: errors(outcome),
             residual_norm: NormEntry {
@@ -179,7 +182,10 @@ impl Report {
             audit: outcome
                 .audits
                 .iter()
-                .map(|audit| AuditEntry { log: audit.log.clone(), findings: audit.findings.clone() })
+                .map(|audit| AuditEntry {
+                    log: audit.log.clone(),
+                    findings: audit.findings.clone(),
+                })
                 .collect(),
             tried: tried(outcome),
             files: FilesEntry {
@@ -261,8 +267,21 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
 }
 
 fn model_error(summary: Summary) -> ModelError {
-    let Summary { horizons_s: _, position_rmse, position_median, velocity_rmse, windows, diverged } = summary;
-    ModelError { position_rmse, position_median, velocity_rmse, windows, diverged }
+    let Summary {
+        horizons_s: _,
+        position_rmse,
+        position_median,
+        velocity_rmse,
+        windows,
+        diverged,
+    } = summary;
+    ModelError {
+        position_rmse,
+        position_median,
+        velocity_rmse,
+        windows,
+        diverged,
+    }
 }
 
 fn logs(outcome: &Outcome) -> LogsEntry {
@@ -271,7 +290,11 @@ fn logs(outcome: &Outcome) -> LogsEntry {
         rows: log.rows(),
         start_s: log.time.first().copied().unwrap_or(0.0),
         end_s: log.time.last().copied().unwrap_or(0.0),
-        leave_out: log.leave_out.iter().map(|span| [span.start_s, span.end_s]).collect(),
+        leave_out: log
+            .leave_out
+            .iter()
+            .map(|span| [span.start_s, span.end_s])
+            .collect(),
     };
     LogsEntry {
         train: outcome.train.iter().map(entry).collect(),

@@ -3,11 +3,11 @@
 mod folder;
 mod json;
 mod model_file;
-pub mod plot;
 mod picture;
+pub mod plot;
 mod text;
 
 pub use folder::{WriteError, write, write_whole};
 pub use json::Report;
 pub use model_file::model_file;
-pub use text::text;
+pub use text::{summary, text};

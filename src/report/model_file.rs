@@ -25,8 +25,14 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
             effect.joint + 1
         );
         for (parameter, (value, ci95)) in effect.effect.parameters.iter().zip(&effect.values) {
-            let interval = ci95.map_or_else(String::new, |[low, high]| format!(", ci95 = [{low:?}, {high:?}]"));
-            let _ = writeln!(text, "{} = {{ value = {value:?}{interval} }}", parameter.name);
+            let interval = ci95.map_or_else(String::new, |[low, high]| {
+                format!(", ci95 = [{low:?}, {high:?}]")
+            });
+            let _ = writeln!(
+                text,
+                "{} = {{ value = {value:?}{interval} }}",
+                parameter.name
+            );
         }
     }
     text
@@ -34,8 +40,9 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
 
 /// The declaration with new numbers in place of the declared ones.
 fn with_values(declaration: &str, parameters: &[Parameter]) -> String {
-    let mut document: toml_edit::DocumentMut =
-        declaration.parse().expect("the declaration was read as TOML before");
+    let mut document: toml_edit::DocumentMut = declaration
+        .parse()
+        .expect("the declaration was read as TOML before");
     for parameter in parameters {
         let entry = &mut document["parameters"][&parameter.name];
         if let Some(table) = entry.as_table_like_mut() {

@@ -21,35 +21,83 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
     sections.concat()
 }
 
+/// The answer for a terminal: a few lines, and where the rest is.
+pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
+    let joints = outcome.after.dynamics.joints;
+    let middle = outcome.errors.before.horizons.len() / 2;
+    let rmse = |assessment| summarise(assessment, joints).position_rmse[middle].clone();
+    let (before, after) = (
+        rmse(&outcome.errors.before.horizons),
+        rmse(&outcome.errors.after.horizons),
+    );
+    let mut out = format!(
+        "{}: {}\n",
+        headline(outcome).replace("**", ""),
+        outcome.reason
+    );
+    for finding in &outcome.findings {
+        let values: Vec<String> = finding.parameters.iter().map(value).collect();
+        let _ = writeln!(out, "  {}   {}", finding.expression, values.join("   "));
+    }
+    for j in 0..joints {
+        let _ = writeln!(
+            out,
+            "  joint {}: open-loop error at {} s on the test logs {} before, {} after",
+            j + 1,
+            outcome.errors.before.horizons[middle].horizon_s,
+            small(before[j]),
+            small(after[j])
+        );
+    }
+    let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
+    out
+}
+
 fn answer(outcome: &Outcome) -> String {
-    let found: Vec<String> = outcome
-        .findings
-        .iter()
-        .map(|f| format!("**{}** on joint {}", f.effect.effect.name, f.effect.joint + 1))
-        .collect();
-    let headline = match (outcome.verdict, found.is_empty()) {
-        (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
-        (_, false) => format!("The model lacks {}", found.join(" and ")),
-        (Verdict::Unexplained, true) => "Something is missing that no known effect names".to_owned(),
-        (_, true) => "Nothing is missing that these logs could show".to_owned(),
-    };
     format!(
-        "# {}: {headline}\n\n{}.\n\n",
+        "# {}: {}\n\n{}.\n\n",
         outcome.after.dynamics.name,
+        headline(outcome),
         capitalised(&outcome.reason)
     )
 }
 
+fn headline(outcome: &Outcome) -> String {
+    let found: Vec<String> = outcome
+        .findings
+        .iter()
+        .map(|f| {
+            format!(
+                "**{}** on joint {}",
+                f.effect.effect.name,
+                f.effect.joint + 1
+            )
+        })
+        .collect();
+    match (outcome.verdict, found.is_empty()) {
+        (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
+        (_, false) => format!("The model lacks {}", found.join(" and ")),
+        (Verdict::Unexplained, true) => {
+            "Something is missing that no known effect names".to_owned()
+        }
+        (_, true) => "Nothing is missing that these logs could show".to_owned(),
+    }
+}
+
 fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().collect::<String>() + letters.as_str()
+    })
 }
 
 fn effects(findings: &[Finding]) -> String {
     if findings.is_empty() {
         return String::new();
     }
-    let mut out = String::from("## Effects\n\n| effect | joint | adds | value (95 % interval) | p | cuts the error by |\n|---|---|---|---|---|---|\n");
+    let mut out = String::from(
+        "## Effects\n\n| effect | joint | adds | value (95 % interval) | p | cuts the error by |\n|---|---|---|---|---|---|\n",
+    );
     for finding in findings {
         let values: Vec<String> = finding.parameters.iter().map(value).collect();
         let _ = writeln!(
@@ -68,13 +116,26 @@ fn effects(findings: &[Finding]) -> String {
 
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
 fn value(parameter: &Parameter) -> String {
-    let digits = parameter.ci95.map_or(1e-4 * parameter.value.abs(), |[low, high]| 0.05 * (high - low));
-    let number = |x: f64| rounded(x, digits);
-    let unit = if parameter.unit == "1" { String::new() } else { format!(" {}", parameter.unit) };
-    let interval = parameter
+    let digits = parameter
         .ci95
-        .map_or_else(|| " (held)".to_owned(), |[low, high]| format!(" ({} to {})", number(low), number(high)));
-    format!("{} = {}{unit}{interval}", parameter.name, number(parameter.value))
+        .map_or(1e-4 * parameter.value.abs(), |[low, high]| {
+            0.05 * (high - low)
+        });
+    let number = |x: f64| rounded(x, digits);
+    let unit = if parameter.unit == "1" {
+        String::new()
+    } else {
+        format!(" {}", parameter.unit)
+    };
+    let interval = parameter.ci95.map_or_else(
+        || " (held)".to_owned(),
+        |[low, high]| format!(" ({} to {})", number(low), number(high)),
+    );
+    format!(
+        "{} = {}{unit}{interval}",
+        parameter.name,
+        number(parameter.value)
+    )
 }
 
 /// As many digits as the resolution is worth.
@@ -86,7 +147,13 @@ fn rounded(x: f64, resolution: f64) -> String {
 }
 
 fn probability(p: f64) -> String {
-    if p < 1e-12 { "< 1e-12".to_owned() } else if p < 1e-3 { format!("{p:.0e}") } else { format!("{p:.3}") }
+    if p < 1e-12 {
+        "< 1e-12".to_owned()
+    } else if p < 1e-3 {
+        format!("{p:.0e}")
+    } else {
+        format!("{p:.3}")
+    }
 }
 
 fn errors(outcome: &Outcome) -> String {
@@ -95,15 +162,26 @@ fn errors(outcome: &Outcome) -> String {
         summarise(&outcome.errors.before.horizons, joints),
         summarise(&outcome.errors.after.horizons, joints),
     );
-    let hybrid = outcome.errors.hybrid.as_ref().map(|h| summarise(&h.horizons, joints));
+    let hybrid = outcome
+        .errors
+        .hybrid
+        .as_ref()
+        .map(|h| summarise(&h.horizons, joints));
     let mut out = String::from(
         "## Open-loop error on the test logs\n\nRoot mean square of the position error; in brackets the median over windows.\n\n\
          | horizon | joint | windows | declared model, fitted | with effects | with effects and network | after / before |\n|---|---|---|---|---|---|---|\n",
     );
     for (h, horizon) in before.horizons_s.iter().enumerate() {
         for j in 0..joints {
-            let cell = |s: &Summary| format!("{} ({})", small(s.position_rmse[h][j]), small(s.position_median[h][j]));
-            let ratio = after.position_rmse[h][j] / before.position_rmse[h][j].max(f64::MIN_POSITIVE);
+            let cell = |s: &Summary| {
+                format!(
+                    "{} ({})",
+                    small(s.position_rmse[h][j]),
+                    small(s.position_median[h][j])
+                )
+            };
+            let ratio =
+                after.position_rmse[h][j] / before.position_rmse[h][j].max(f64::MIN_POSITIVE);
             let _ = writeln!(
                 out,
                 "| {horizon} s | {} | {} | {} | {} | {} | {ratio:.2} |",
@@ -117,7 +195,10 @@ fn errors(outcome: &Outcome) -> String {
     }
     let diverged: usize = before.diverged.iter().chain(&after.diverged).sum();
     if diverged > 0 {
-        let _ = writeln!(out, "\n{diverged} windows diverged; they count with the error they had reached.");
+        let _ = writeln!(
+            out,
+            "\n{diverged} windows diverged; they count with the error they had reached."
+        );
     }
     if let Some([low, high]) = outcome.errors.reduction_ci95 {
         let _ = writeln!(
@@ -133,17 +214,32 @@ fn errors(outcome: &Outcome) -> String {
 
 /// A position error in rad (or m), thousandths where it is small.
 fn small(x: f64) -> String {
-    if x < 0.1 { format!("{:.2}e-3", 1e3 * x) } else { format!("{x:.3}") }
+    if x < 0.1 {
+        format!("{:.2}e-3", 1e3 * x)
+    } else {
+        format!("{x:.3}")
+    }
 }
 
 fn parameters(outcome: &Outcome) -> String {
     let declared = outcome.before.declared.len();
     let mut out = String::from("## Parameters of the declared equations\n\n");
-    for (parameter, before) in outcome.parameters[..declared].iter().zip(&outcome.before.declared) {
-        let _ = writeln!(out, "- {}; without the effects {before:.5}", value(parameter));
+    for (parameter, before) in outcome.parameters[..declared]
+        .iter()
+        .zip(&outcome.before.declared)
+    {
+        let _ = writeln!(
+            out,
+            "- {}; without the effects {before:.5}",
+            value(parameter)
+        );
     }
     let verdict = &outcome.identifiability;
-    let _ = writeln!(out, "\nThe logs determine {} of {} free parameters.", verdict.determined, verdict.free);
+    let _ = writeln!(
+        out,
+        "\nThe logs determine {} of {} free parameters.",
+        verdict.determined, verdict.free
+    );
     for &k in &outcome.held {
         let name = &outcome.before.dynamics.parameters[k].name;
         let _ = writeln!(
@@ -178,7 +274,8 @@ fn left(outcome: &Outcome) -> String {
     let place = if left.is_significant() {
         format!("It follows {}.", left.place)
     } else {
-        "No dependence on angle, speed, torque or time that would matter was found in it.".to_owned()
+        "No dependence on angle, speed, torque or time that would matter was found in it."
+            .to_owned()
     };
     format!(
         "## What is left\n\n{:.1} % of the residual variance above the sensor's noise is left (p = {} for structure in it). {place}\n\
@@ -191,7 +288,9 @@ fn left(outcome: &Outcome) -> String {
 }
 
 fn tried(outcome: &Outcome) -> String {
-    let mut out = String::from("## What was tried\n\nGain: fall of the loss on stretches left out of the fit.\n\n");
+    let mut out = String::from(
+        "## What was tried\n\nGain: fall of the loss on stretches left out of the fit.\n\n",
+    );
     for (number, round) in outcome.rounds.iter().enumerate() {
         let _ = writeln!(
             out,
@@ -220,18 +319,35 @@ fn logs(outcome: &Outcome) -> String {
         How::Given => "as given".to_owned(),
         How::LastLogs { count } => format!("the last {count} of the logs were kept for the test"),
         How::EndOfEachLog { share, gap_s } => {
-            format!("the last {:.0} % of each log, after a gap of {gap_s} s, were kept for the test", 100.0 * share)
+            format!(
+                "the last {:.0} % of each log, after a gap of {gap_s} s, were kept for the test",
+                100.0 * share
+            )
         }
     };
     let mut out = format!("## Logs\n\nSplit: {how}.\n\n");
-    let roles = outcome.train.iter().map(|_| "fitted").chain(outcome.test.iter().map(|_| "test"));
+    let roles = outcome
+        .train
+        .iter()
+        .map(|_| "fitted")
+        .chain(outcome.test.iter().map(|_| "test"));
     let all = outcome.train.iter().chain(&outcome.test);
     for ((log, audit), role) in all.zip(&outcome.audits).zip(roles) {
-        let _ = writeln!(out, "- **{}** ({role}): {} rows, {:.2} s", log.name(), log.rows(), log.duration());
+        let _ = writeln!(
+            out,
+            "- **{}** ({role}): {} rows, {:.2} s",
+            log.name(),
+            log.rows(),
+            log.duration()
+        );
         for span in &log.leave_out {
             let _ = writeln!(out, "  - left out: {span}");
         }
-        for finding in audit.findings.iter().filter(|f| f.severity != Severity::Info) {
+        for finding in audit
+            .findings
+            .iter()
+            .filter(|f| f.severity != Severity::Info)
+        {
             let _ = writeln!(out, "  - {}", finding.text);
         }
     }
@@ -239,7 +355,11 @@ fn logs(outcome: &Outcome) -> String {
 }
 
 fn footer(outcome: &Outcome, seed: u64) -> String {
-    let widths: Vec<String> = outcome.sign_widths.iter().map(|w| format!("{w:.3}")).collect();
+    let widths: Vec<String> = outcome
+        .sign_widths
+        .iter()
+        .map(|w| format!("{w:.3}"))
+        .collect();
     format!(
         "---\nresidyn {}, seed {seed}. In fits and predictions the sign of a velocity is smoothed over {} rad/s (or m/s); \
          integrator: Runge-Kutta 4, steps of {:.2} ms.\n",

@@ -1,0 +1,144 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use clap::Args;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Answer, Common, inputs, progress};
+use crate::closeloop::{Outcome, Request, STAGES, Split, Verdict, close_loop};
+use crate::data::{LeaveOut, Log};
+use crate::model::{Library, System};
+use crate::plant::Plant;
+use crate::report;
+use crate::train::Origin;
+
+/// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
+///
+/// Without arguments: a simulated demo rig whose logs carry an effect that its model does not declare.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report"
+)]
+pub(super) struct Arguments {
+    /// Model file, or the name of a built-in system
+    #[arg(long, requires = "train")]
+    model: Option<PathBuf>,
+    /// Logs to learn from
+    #[arg(long, num_args = 1.., value_name = "LOG", requires = "model")]
+    train: Vec<PathBuf>,
+    /// Logs to judge by; without them, the last logs or the end of each are set apart
+    #[arg(long, num_args = 1.., value_name = "LOG", requires = "train")]
+    test: Vec<PathBuf>,
+    /// Folder for report.json, report.md, model.toml, plots and checkpoint
+    #[arg(long, default_value = "closeloop-report", value_name = "DIR")]
+    out: PathBuf,
+    /// Intervals to leave out, in the time of the log
+    #[arg(long, num_args = 1.., value_name = "LOG@T0-T1")]
+    leave_out: Vec<LeaveOut>,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// The demo rig: its plant file is embedded, so that the program needs nothing but itself.
+const DEMO: &str = include_str!("../../configs/demo.toml");
+const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let library = inputs::library(&arguments.effects)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let (system, split) = match &arguments.model {
+        Some(model) => measured(arguments, model, &library)?,
+        None => demo(&library, &mut rng)?,
+    };
+    if split.test.is_empty() {
+        bail!("the logs are too short to set any of them apart for the test; give --test");
+    }
+    inputs::check_writable(&arguments.out)?;
+    let bar = progress::bar(STAGES);
+    let request = Request {
+        system: &system,
+        library: &library,
+        split,
+        horizons_s: HORIZONS_S,
+        backend: arguments.common.device,
+    };
+    let outcome = close_loop(request, &mut rng, &mut |stage| {
+        bar.set_position(stage.number as u64);
+        bar.set_message(stage.text.to_owned());
+    })?;
+    bar.finish_and_clear();
+    let origin = origin(arguments, &system);
+    let report = report::write(&arguments.out, &system, &outcome, &origin)?;
+    if arguments.common.json {
+        inputs::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+    } else {
+        inputs::print(&report::summary(&outcome, &arguments.out))?;
+    }
+    Ok(answer(&outcome))
+}
+
+fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(System, Split)> {
+    let system = library.system(model)?;
+    let mut train = inputs::logs(&arguments.train, &system)?;
+    let mut test = inputs::logs(&arguments.test, &system)?;
+    inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
+    inputs::print_notes(train.iter().chain(&test));
+    let split = if test.is_empty() {
+        Split::of(train)
+    } else {
+        Split::given(train, test)
+    };
+    Ok((system, split))
+}
+
+fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
+    let plant = Plant::from_text(Path::new("configs/demo.toml"), DEMO, library)?;
+    let record = |k: usize| -> Result<Log> {
+        let mut log = plant.record(rng)?;
+        log.path = format!("demo{}.csv", k + 1).into();
+        Ok(log)
+    };
+    let logs = (0..plant.recording.logs)
+        .map(record)
+        .collect::<Result<Vec<_>>>()?;
+    // What the plant knows stays with the plant: the loop gets the declared model and the logs.
+    Ok((library.system(Path::new("pendulum"))?, Split::of(logs)))
+}
+
+fn origin(arguments: &Arguments, system: &System) -> Origin {
+    let paths = |paths: &[PathBuf]| {
+        paths
+            .iter()
+            .map(|p| p.display().to_string())
+            .collect::<Vec<_>>()
+    };
+    let spans = arguments
+        .leave_out
+        .iter()
+        .map(|l| format!("{}@{}-{}", l.log, l.interval.start_s, l.interval.end_s));
+    Origin {
+        config: serde_json::json!({
+            "command": "closeloop",
+            "model": arguments.model.as_ref().map(|p| p.display().to_string()),
+            "train": paths(&arguments.train),
+            "test": paths(&arguments.test),
+            "leave_out": spans.collect::<Vec<_>>(),
+            "effects": paths(&arguments.effects),
+            "device": arguments.common.device.name(),
+        }),
+        seed: arguments.common.seed,
+        model_toml: system.declaration.clone(),
+    }
+}
+
+/// "No" where nothing could be named although something is missing, or nothing could be said.
+fn answer(outcome: &Outcome) -> Answer {
+    match outcome.verdict {
+        Verdict::Explained | Verdict::PartlyExplained | Verdict::NoMissingEffect => Answer::Yes,
+        Verdict::Unexplained | Verdict::Inconclusive => Answer::No,
+    }
+}

@@ -1,0 +1,169 @@
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use serde::Serialize;
+
+use super::{Answer, Common, inputs};
+use crate::data::{LeaveOut, Log};
+use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
+use crate::expr::SignForm;
+use crate::model::{Dynamics, System};
+use crate::train::Checkpoint;
+
+/// Open-loop prediction error of a model or a checkpoint on logs
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  residyn evaluate --model report/model.toml --test run3.csv --horizon 0.5 1.0"
+)]
+pub(super) struct Arguments {
+    /// Model file, or the name of a built-in system
+    #[arg(
+        long,
+        required_unless_present = "checkpoint",
+        conflicts_with = "checkpoint"
+    )]
+    model: Option<PathBuf>,
+    /// Checkpoint of a trained model
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Logs to predict
+    #[arg(long, num_args = 1.., required = true, value_name = "LOG")]
+    test: Vec<PathBuf>,
+    /// Horizons in s
+    #[arg(long, num_args = 1.., default_values_t = [0.1, 0.5, 1.0], value_name = "S")]
+    horizon: Vec<f64>,
+    /// Estimate each log's own sensor offsets on this fraction of it and score the rest
+    #[arg(long, value_name = "F")]
+    calibrate: Option<f64>,
+    /// Intervals to leave out, in the time of the log
+    #[arg(long, num_args = 1.., value_name = "LOG@T0-T1")]
+    leave_out: Vec<LeaveOut>,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed {
+    #[serde(flatten)]
+    summary: Summary,
+    logs: Vec<LogEntry>,
+    /// Sensor offsets that were estimated, one list a log.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offsets: Option<Vec<Vec<f64>>>,
+    integrator_step_s: f64,
+    integrator_error: f64,
+}
+
+#[derive(Serialize)]
+struct LogEntry {
+    name: String,
+    leave_out: Vec<[f64; 2]>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    if let Some(bad) = arguments
+        .horizon
+        .iter()
+        .find(|h| !(**h > 0.0 && h.is_finite()))
+    {
+        bail!("--horizon {bad}: a horizon is a number of seconds above zero");
+    }
+    let (system, dynamics) = model(arguments)?;
+    let mut logs = inputs::logs(&arguments.test, &system)?;
+    inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
+    inputs::print_notes(&logs);
+    let values = dynamics.values();
+    let offsets = arguments
+        .calibrate
+        .map(|share| calibrate(&dynamics, &values, &mut logs, share))
+        .transpose()?;
+    let assessment = match &offsets {
+        Some(Offsets {
+            dynamics, values, ..
+        }) => assess(dynamics, |log| &values[log], &logs, &arguments.horizon),
+        None => assess(&dynamics, |_| &values, &logs, &arguments.horizon),
+    };
+    let summary = summarise(&assessment.horizons, system.joints);
+    if let Some(h) = summary.windows.iter().position(|count| *count == 0) {
+        bail!(
+            "no window of {} s fits into the logs; give longer logs or a shorter --horizon",
+            summary.horizons_s[h]
+        );
+    }
+    if arguments.common.json {
+        let entry = |log: &Log| LogEntry {
+            name: log.name(),
+            leave_out: log
+                .leave_out
+                .iter()
+                .map(|span| [span.start_s, span.end_s])
+                .collect(),
+        };
+        let printed = Printed {
+            summary,
+            logs: logs.iter().map(entry).collect(),
+            offsets: offsets.map(|offsets| offsets.offsets),
+            integrator_step_s: assessment.step_s,
+            integrator_error: assessment.step_error,
+        };
+        inputs::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
+    } else {
+        inputs::print(&table(&summary))?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// The system, for its columns, and what is integrated. Dry friction is smoothed as in fits, over 0.01 rad/s.
+fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
+    let library = inputs::library(&arguments.effects)?;
+    if let Some(model) = &arguments.model {
+        let system = library.system(model)?;
+        let dynamics = system.dynamics(&sign(&system));
+        return Ok((system, dynamics));
+    }
+    let dir = arguments
+        .checkpoint
+        .as_ref()
+        .expect("clap asks for one of both");
+    let checkpoint = Checkpoint::load(dir)?;
+    let system = System::from_text(
+        &dir.join("model.toml"),
+        &checkpoint.model_toml,
+        library.effects(),
+    )?;
+    let physics = system.dynamics(&sign(&system));
+    let dynamics = checkpoint
+        .model(&physics, &arguments.common.device.device())?
+        .to_dynamics()?;
+    Ok((system, dynamics))
+}
+
+fn sign(system: &System) -> Vec<SignForm> {
+    vec![SignForm::DEFAULT; system.joints]
+}
+
+fn table(summary: &Summary) -> String {
+    let mut out =
+        String::from("horizon  joint  windows  position rmse    median  velocity rmse  diverged\n");
+    for (h, horizon) in summary.horizons_s.iter().enumerate() {
+        for j in 0..summary.position_rmse[h].len() {
+            let _ = writeln!(
+                out,
+                "{horizon:>5} s  {:>5}  {:>7}  {:>13.6}  {:>8.6}  {:>13.6}  {:>8}",
+                j + 1,
+                summary.windows[h],
+                summary.position_rmse[h][j],
+                summary.position_median[h][j],
+                summary.velocity_rmse[h][j],
+                summary.diverged[h]
+            );
+        }
+    }
+    out
+}

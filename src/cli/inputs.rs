@@ -1,0 +1,74 @@
+//! What several commands read: libraries, systems, logs.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::data::{LeaveOut, Log, leave_out};
+use crate::model::{Library, System};
+
+/// The built-in effects and those of the user's folders.
+pub(super) fn library(folders: &[PathBuf]) -> Result<Library> {
+    let mut library = Library::built_in();
+    for folder in folders {
+        library = library.with_folder(folder)?;
+    }
+    Ok(library)
+}
+
+/// Read logs for a system and leave out what the user asks for; notes go to standard error.
+pub(super) fn logs(paths: &[PathBuf], system: &System) -> Result<Vec<Log>> {
+    let read = |path: &PathBuf| Ok(Log::read(path, system.joints, &system.columns)?);
+    paths.iter().map(read).collect()
+}
+
+/// Apply `--leave-out` to two sets of logs at once: an entry may name a log of either.
+pub(super) fn leave_out(
+    train: &mut Vec<Log>,
+    test: &mut Vec<Log>,
+    entries: &[LeaveOut],
+) -> Result<()> {
+    let boundary = train.len();
+    let mut all: Vec<Log> = train.drain(..).chain(test.drain(..)).collect();
+    leave_out::apply(&mut all, entries)?;
+    test.extend(all.drain(boundary..));
+    train.extend(all);
+    Ok(())
+}
+
+/// Say on standard error what a reader of the logs should know.
+pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
+    for log in logs {
+        for note in &log.notes {
+            eprintln!("note: {}: {note}", log.name());
+        }
+    }
+}
+
+/// Print to standard output; a reader that has gone away is no error.
+pub(super) fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(error).context("cannot write to standard output")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Check early that results can be written, before long work is done for nothing.
+pub(super) fn check_writable(folder: &Path) -> Result<()> {
+    let parent = folder
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let remedy = "give a folder that can be written with --out";
+    if folder.exists() && !folder.is_dir() {
+        anyhow::bail!("{} is a file; {remedy}", folder.display());
+    }
+    std::fs::create_dir_all(parent)
+        .with_context(|| format!("{} cannot be made; {remedy}", parent.display()))?;
+    tempfile::tempfile_in(parent)
+        .map(drop)
+        .with_context(|| format!("{} cannot be written; {remedy}", parent.display()))
+}

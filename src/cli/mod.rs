@@ -1,0 +1,74 @@
+//! The command line: parse, call, print; nothing else.
+
+mod closeloop;
+mod evaluate;
+mod inputs;
+mod list;
+mod progress;
+mod simulate;
+
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::train::Backend;
+
+/// From a rig's log to the physical effect that its model lacks.
+#[derive(Debug, Parser)]
+#[command(
+    name = "residyn",
+    version,
+    propagate_version = true,
+    arg_required_else_help = true
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Closeloop(closeloop::Arguments),
+    Evaluate(evaluate::Arguments),
+    Simulate(simulate::Arguments),
+    List(list::Arguments),
+}
+
+/// What every command takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Common {
+    /// Print the result as JSON on standard output
+    #[arg(long)]
+    json: bool,
+    /// Seed of everything random; the same seed gives the same result on the same machine
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// What carries out tensor operations: flex or ndarray
+    #[arg(long, default_value_t)]
+    device: Backend,
+}
+
+/// How a command ended that could run.
+enum Answer {
+    Yes,
+    No,
+}
+
+/// Run the program on the arguments of this process: exit status 0 done, 1 ran and the answer is no, 2 could
+/// not run.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Closeloop(arguments) => closeloop::run(&arguments),
+        Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::List(arguments) => list::run(&arguments),
+    };
+    match result {
+        Ok(Answer::Yes) => ExitCode::SUCCESS,
+        Ok(Answer::No) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

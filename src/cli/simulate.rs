@@ -1,0 +1,135 @@
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+
+use super::{Answer, Common, inputs};
+use crate::model::Library;
+use crate::plant::Plant;
+
+/// Write the log of a simulated rig, with chosen effects and sensor noise
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  residyn simulate --plant pendulum --effect coulomb_friction=0.16 --out run1.csv --seed 1"
+)]
+pub(super) struct Arguments {
+    /// Plant file, model file, or the name of a built-in system
+    #[arg(long, value_name = "FILE")]
+    plant: PathBuf,
+    /// Where to write the log
+    #[arg(long, value_name = "LOG")]
+    out: PathBuf,
+    /// NAME=VALUE sets an effect's first parameter; NAME.PARAMETER=VALUE another; NAME@JOINT=VALUE on a joint
+    #[arg(long, num_args = 1.., value_name = "NAME=VALUE")]
+    effect: Vec<EffectSetting>,
+    /// Length in s instead of the plant's own
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `NAME[@JOINT][.PARAMETER]=VALUE`
+#[derive(Debug, Clone)]
+struct EffectSetting {
+    name: String,
+    joint: usize,
+    parameter: Option<String>,
+    value: f64,
+}
+
+impl FromStr for EffectSetting {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let usage = "write NAME=VALUE, NAME@JOINT=VALUE or NAME.PARAMETER=VALUE";
+        let (target, value) = text.split_once('=').ok_or(usage)?;
+        let value = value
+            .parse()
+            .map_err(|_| format!("{value:?} is not a number; {usage}"))?;
+        let (target, parameter) = match target.split_once('.') {
+            Some((target, parameter)) => (target, Some(parameter.to_owned())),
+            None => (target, None),
+        };
+        let (name, joint) = match target.split_once('@') {
+            Some((name, joint)) => {
+                let joint = joint
+                    .parse()
+                    .map_err(|_| format!("{joint:?} is not a joint's number; {usage}"))?;
+                (name, joint)
+            }
+            None => (target, 1),
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            joint,
+            parameter,
+            value,
+        })
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let library = Library::built_in();
+    let mut plant = Plant::read(&arguments.plant, &library)?;
+    add_effects(&mut plant, &library, &arguments.effect)?;
+    if let Some(duration) = arguments.duration {
+        if !(duration * plant.sensor.rate_hz >= 2.0 && duration.is_finite()) {
+            bail!(
+                "--duration {duration}: too short for two rows at {} Hz",
+                plant.sensor.rate_hz
+            );
+        }
+        plant.recording.duration_s = duration;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let log = plant.record(&mut rng)?;
+    log.write(&arguments.out)
+        .context("the log was not written")?;
+    let effects: Vec<&str> = plant
+        .effects
+        .iter()
+        .map(|e| e.effect.name.as_str())
+        .collect();
+    if arguments.common.json {
+        let value = json!({"out": arguments.out, "rows": log.rows(), "duration_s": log.duration(), "effects": effects});
+        inputs::print(&format!("{value:#}\n"))?;
+    } else {
+        inputs::print(&format!(
+            "{}: {} rows, {} s\n",
+            arguments.out.display(),
+            log.rows(),
+            log.duration()
+        ))?;
+    }
+    Ok(Answer::Yes)
+}
+
+/// Settings of one effect on one joint belong together.
+fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting]) -> Result<()> {
+    let mut groups: Vec<(&str, usize, Vec<(String, f64)>)> = Vec::new();
+    for setting in settings {
+        let first = library
+            .effect(&setting.name)
+            .map_err(anyhow::Error::msg)?
+            .parameters[0]
+            .name
+            .clone();
+        let value = (setting.parameter.clone().unwrap_or(first), setting.value);
+        match groups
+            .iter_mut()
+            .find(|(name, joint, _)| *name == setting.name && *joint == setting.joint)
+        {
+            Some((_, _, values)) => values.push(value),
+            None => groups.push((&setting.name, setting.joint, vec![value])),
+        }
+    }
+    for (name, joint, values) in groups {
+        plant.add_effect(library, name, joint, &values)?;
+    }
+    Ok(())
+}

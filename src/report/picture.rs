@@ -1,0 +1,147 @@
+//! The report's plots: what of an outcome goes into which chart.
+
+use super::plot::{ErrorRow, JointKind, Panel, PlotError, Role, ShapePanel, ShapeSample, Track};
+use crate::closeloop::{ForceSample, Outcome};
+use crate::data::Log;
+use crate::evaluate::{Assessment, summarise, traces};
+use crate::model::Dynamics;
+
+/// A picture shows this much of a log in s: more than that and half-second predictions become a blur.
+const SHOWN_S: f64 = 8.0;
+
+/// Measured motion and open-loop predictions on the beginning of the first test log.
+pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
+    let Some(log) = outcome.test.first() else {
+        return Err(PlotError::Empty {
+            title: "predictions".into(),
+        });
+    };
+    let horizons = &outcome.errors.before.horizons;
+    let horizon = horizons[horizons.len() / 2].horizon_s;
+    let mut models: Vec<(Role, &str, &Dynamics, Vec<f64>)> = vec![
+        (
+            Role::Before,
+            "declared model",
+            &outcome.before.dynamics,
+            outcome.before.fit.values.clone(),
+        ),
+        (
+            Role::After,
+            "with effects",
+            &outcome.after.dynamics,
+            outcome.after.fit.values.clone(),
+        ),
+    ];
+    if let Some(learned) = &outcome.learned {
+        models.push((
+            Role::Hybrid,
+            "with effects and network",
+            &learned.hybrid,
+            learned.hybrid.values(),
+        ));
+    }
+    let panel = |joint: usize| Panel {
+        joint: joint + 1,
+        kind: kind(outcome, joint),
+        tracks: std::iter::once(measured(log, joint))
+            .chain(models.iter().map(|(role, label, dynamics, values)| Track {
+                label: (*label).to_owned(),
+                role: *role,
+                segments: predicted(dynamics, values, log, joint, horizon),
+            }))
+            .collect(),
+    };
+    let panels: Vec<Panel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    let title = format!(
+        "{}: predictions of {horizon} s, each started from the log",
+        log.name()
+    );
+    super::plot::predictions(&panels, &title)
+}
+
+fn kind(outcome: &Outcome, joint: usize) -> JointKind {
+    if outcome.prismatic[joint] {
+        JointKind::Prismatic
+    } else {
+        JointKind::Revolute
+    }
+}
+
+fn end(log: &Log) -> f64 {
+    log.time.first().map_or(0.0, |start| start + SHOWN_S)
+}
+
+fn measured(log: &Log, joint: usize) -> Track {
+    let points = log.time.iter().copied().zip(log.q[joint].iter().copied());
+    Track {
+        label: "measured".into(),
+        role: Role::Measured,
+        segments: vec![points.take_while(|(t, _)| *t <= end(log)).collect()],
+    }
+}
+
+fn predicted(
+    dynamics: &Dynamics,
+    values: &[f64],
+    log: &Log,
+    joint: usize,
+    horizon: f64,
+) -> Vec<Vec<(f64, f64)>> {
+    traces(dynamics, values, log, horizon)
+        .into_iter()
+        .take_while(|trace| trace.time.last().is_some_and(|t| *t <= end(log)))
+        .map(|trace| {
+            trace
+                .time
+                .into_iter()
+                .zip(trace.q[joint].iter().copied())
+                .collect()
+        })
+        .collect()
+}
+
+/// The residual generalised force over angle, speed and torque, before and after.
+pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
+    let samples = |all: &[ForceSample], joint: usize| {
+        all.iter()
+            .map(|s| ShapeSample {
+                q: s.q[joint],
+                qd: s.qd[joint],
+                tau: s.tau[joint],
+                residual: s.force[joint],
+            })
+            .collect()
+    };
+    let panel = |joint: usize| ShapePanel {
+        joint: joint + 1,
+        kind: kind(outcome, joint),
+        before: samples(&outcome.residual_before, joint),
+        after: samples(&outcome.residual_after, joint),
+    };
+    let panels: Vec<ShapePanel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    super::plot::residual_shape(&panels, "What the model lacks, before and after")
+}
+
+/// Open-loop errors at each horizon.
+pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
+    let joints = outcome.after.dynamics.joints;
+    let numbers = |assessment: &Assessment| summarise(&assessment.horizons, joints).position_rmse;
+    let (before, after) = (
+        numbers(&outcome.errors.before),
+        numbers(&outcome.errors.after),
+    );
+    let hybrid = outcome.errors.hybrid.as_ref().map(numbers);
+    let row = |joint: usize, h: usize| ErrorRow {
+        joint: joint + 1,
+        kind: kind(outcome, joint),
+        horizon_s: outcome.errors.before.horizons[h].horizon_s,
+        before: Some(before[h][joint]),
+        after: Some(after[h][joint]),
+        hybrid: hybrid.as_ref().map(|hybrid| hybrid[h][joint]),
+    };
+    let rows: Vec<ErrorRow> = (0..joints)
+        .flat_map(|joint| (0..before.len()).map(move |h| (joint, h)))
+        .map(|(j, h)| row(j, h))
+        .collect();
+    super::plot::error_bars(&rows, "Open-loop position error on the test logs")
+}
