@@ -1,1 +1,1 @@
-
+//! One binary for all integration tests: Burn is linked once.
