@@ -18,5 +18,5 @@ pub use residual::{ForceSample, norm, residual_force};
 pub use run::{Request, STAGES, Stage, close_loop};
 pub use select::{Evidence, Round, Selection, p_value, select};
 pub use split::{How, Split};
-pub use study::{Fitted, Study, StudyError, WINDOWS_S, joined};
+pub use study::{Fitted, Study, StudyError, joined};
 pub use unexplained::{SIGNIFICANT, Unexplained, unexplained};

@@ -35,8 +35,6 @@ pub struct Outcome {
     pub test: Vec<Log>,
     pub audits: Vec<Audit>,
     pub identifiability: Identifiability,
-    /// Declared parameters that were held because the logs do not determine them.
-    pub held: Vec<usize>,
     pub before: Fitted,
     pub after: Fitted,
     /// All parameters of `after`, with their intervals.
@@ -87,8 +85,24 @@ pub struct Errors {
 }
 
 impl Alternative {
-    /// What a round says about the candidates that do as well as the one that was chosen.
-    pub(super) fn of_round(round: &Round) -> Vec<Self> {
+    /// The candidates that did as well as the one that a round chose, unless they are in the final model
+    /// themselves; what the latest round says of one holds.
+    pub(super) fn of_rounds(rounds: &[Round], model: &Fitted) -> Vec<Self> {
+        let mut all: Vec<Self> = Vec::new();
+        for alternative in rounds.iter().flat_map(Self::of_round) {
+            let same = |e: &FittedEffect| {
+                e.joint == alternative.effect.joint
+                    && e.effect.name == alternative.effect.effect.name
+            };
+            all.retain(|other| !same(&other.effect));
+            if !model.effects.iter().any(same) {
+                all.push(alternative);
+            }
+        }
+        all
+    }
+
+    fn of_round(round: &Round) -> Vec<Self> {
         let Some(chosen) = round.chosen.map(|i| &round.evidence[i]) else {
             return Vec::new();
         };

@@ -10,7 +10,7 @@ use super::study::{Fitted, Study, StudyError};
 use super::unexplained::{Unexplained, unexplained};
 use crate::data::audit;
 use crate::evaluate::{Assessment, assess};
-use crate::identify::{Identifiability, identifiability, uncertainty};
+use crate::identify::uncertainty;
 use crate::model::{Dynamics, Library, Parameter, System};
 use crate::train::Backend;
 
@@ -62,7 +62,6 @@ pub fn close_loop(
     });
     let mut study = Study::new(system, &split.train);
     let before = study.fit_declared()?;
-    let identifiability = identifiability(&before.dynamics, &before.fit);
     let Selection {
         model: after,
         rounds,
@@ -107,17 +106,16 @@ pub fn close_loop(
     );
     let parameters = with_intervals(&study, &after);
     let findings = findings(&study, &after, &parameters, &errors.after, judge);
-    let (verdict, reason) = verdict(&study, &after, &left, &identifiability);
+    let (verdict, reason) = verdict(&study, &after, &left);
     Ok(Outcome {
         verdict,
         reason,
         how_split: split.how.clone(),
         audits,
-        held: study.held.clone(),
         sign_widths: study.sign_widths(),
         prismatic: system.prismatic.clone(),
-        identifiability,
-        alternatives: rounds.iter().flat_map(Alternative::of_round).collect(),
+        identifiability: study.identifiability.clone(),
+        alternatives: Alternative::of_rounds(&rounds, &after),
         before,
         after,
         parameters,
@@ -219,12 +217,7 @@ fn rms(assessment: &Assessment) -> f64 {
     (windows.iter().flat_map(|w| &w.position).sum::<f64>() / rows).sqrt()
 }
 
-fn verdict(
-    study: &Study<'_>,
-    after: &Fitted,
-    left: &Unexplained,
-    identifiability: &Identifiability,
-) -> (Verdict, String) {
+fn verdict(study: &Study<'_>, after: &Fitted, left: &Unexplained) -> (Verdict, String) {
     let windows = study.shooting.windows.len();
     if windows < FEWEST_WINDOWS {
         let reason = format!(
@@ -232,7 +225,8 @@ fn verdict(
         );
         return (Verdict::Inconclusive, reason);
     }
-    if identifiability.free > 0 && identifiability.determined == 0 {
+    let known = &study.identifiability;
+    if known.free > 0 && known.determined == 0 {
         let reason =
             "the training logs determine no parameter of the declared model; move the joints more"
                 .into();

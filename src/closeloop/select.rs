@@ -250,7 +250,11 @@ fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
     #[allow(clippy::cast_precision_loss)] // few stretches
     let freedom = (before.len() as f64 - 1.0).max(1.0);
     let law = StudentsT::new(0.0, 1.0, freedom).expect("freedom is at least one");
-    law.sf(mean / error.max(f64::MIN_POSITIVE))
+    if error > 0.0 {
+        law.sf(mean / error)
+    } else {
+        1.0
+    }
 }
 
 fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {

@@ -2,7 +2,7 @@ use thiserror::Error;
 
 use crate::data::{Audit, Log, audit};
 use crate::expr::SignForm;
-use crate::identify::{Fit, FitError, Shooting, cut, fit, identifiability};
+use crate::identify::{Fit, FitError, Identifiability, Shooting, cut, fit, identifiability};
 use crate::model::{Dynamics, FittedEffect, Measure, System};
 
 /// Why the loop could not be closed at all.
@@ -16,9 +16,10 @@ pub enum StudyError {
     Hybrid(#[from] crate::model::HybridError),
 }
 
-/// Windows over which models are fitted and compared, in s: short ones first, in which even a poor start
-/// does not diverge, then the length over which most effects show.
-pub const WINDOWS_S: [f64; 2] = [0.15, 0.5];
+/// Length in s of the windows of the first fit: even a poor start does not diverge in them.
+const SHORT_S: f64 = 0.15;
+/// Length in s of the windows over which models are fitted and compared: most effects show in them.
+const WINDOW_S: f64 = 0.5;
 
 /// Dry friction is smoothed over this share of a joint's top speed in the logs, so that the width means the
 /// same on a slow axis and on a fast arm.
@@ -33,8 +34,8 @@ pub struct Study<'a> {
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub shooting: Shooting<'a>,
-    /// Declared parameters that the logs do not determine, held at their declared values.
-    pub held: Vec<usize>,
+    /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
+    pub identifiability: Identifiability,
 }
 
 /// A model fitted to a study's logs.
@@ -78,87 +79,74 @@ impl<'a> Study<'a> {
             system,
             logs,
             sign: sign.collect(),
-            shooting: Shooting::new(logs, cut(logs, WINDOWS_S[1]), &noise),
+            shooting: Shooting::new(logs, cut(logs, WINDOW_S), &noise),
             top_speed,
             top_torque,
-            held: Vec::new(),
+            identifiability: Identifiability::default(),
         }
     }
 
-    /// Fit the declared model, with the effects that its file carries, from its declared values; what the
-    /// logs do not determine is found on the way and held from then on.
+    /// Fit the declared model, with the effects that its file carries, from its declared values: over short
+    /// windows, in which even a poor start does not diverge, then over longer ones. Parameters that the
+    /// logs do not determine are found on the way and held from then on at the values reached: only those are
+    /// sure to be compatible with the bounds of the others.
     ///
     /// # Errors
     /// No window, or a model that diverges even over short windows.
     pub fn fit_declared(&mut self) -> Result<Fitted, StudyError> {
-        let short = Shooting::new(
-            self.logs,
-            cut(self.logs, WINDOWS_S[0]),
-            &self.shooting.noise,
-        );
         let declared: Vec<f64> = self.system.parameters.iter().map(|p| p.value).collect();
-        let effects = &self.system.effects;
-        let first = self.fit_on(&short, effects, &declared, short.initial_locals(0), None)?;
-        let first = self.hold_undetermined(&short, first)?;
-        let locals = self.shooting.initial_locals(0);
-        let second = self.fit_on(
-            &self.shooting,
-            &first.effects,
-            &first.declared,
+        let short = Shooting::new(self.logs, cut(self.logs, SHORT_S), &self.shooting.noise);
+        let (first, held) = self.fit_and_hold(&short, &self.system.effects, &declared)?;
+        self.hold(held);
+        let (second, held) = self.fit_and_hold(&self.shooting, &first.effects, &first.declared)?;
+        self.hold(held);
+        Ok(second)
+    }
+
+    fn fit_and_hold(
+        &self,
+        shooting: &Shooting<'_>,
+        effects: &[FittedEffect],
+        declared: &[f64],
+    ) -> Result<(Fitted, Identifiability), FitError> {
+        let free = self.fit_on(
+            shooting,
+            effects,
+            declared,
+            shooting.initial_locals(0),
+            None,
+        )?;
+        let mut verdict = identifiability(&free.dynamics, &free.fit);
+        // Only declared parameters are held: an effect that the file carries is asked about as it is.
+        verdict.hold.retain(|&k| k < declared.len());
+        if verdict.hold.is_empty() {
+            return Ok((free, verdict));
+        }
+        let kept = |k: &usize| !verdict.hold.contains(k);
+        let active: Vec<usize> = free.fit.active.iter().copied().filter(kept).collect();
+        let locals = free.fit.locals.clone();
+        let fit = fit(
+            shooting,
+            &free.dynamics,
+            &active,
+            &free.fit.values,
             locals,
             None,
         )?;
-        let verdict = identifiability(&second.dynamics, &second.fit);
-        if verdict.hold.is_empty() {
-            return Ok(second);
-        }
-        self.held.extend(
-            verdict
-                .hold
-                .iter()
-                .filter(|&&k| k < self.system.parameters.len()),
-        );
-        let locals = self.shooting.initial_locals(0);
-        Ok(self.fit_on(
-            &self.shooting,
-            &first.effects,
-            &self.declared_placeheld(&first.declared),
-            locals,
-            None,
-        )?)
+        Ok((
+            Fitted::new(free.dynamics, effects, fit, declared.len()),
+            verdict,
+        ))
     }
 
-    fn hold_undetermined(
-        &mut self,
-        short: &Shooting<'_>,
-        first: Fitted,
-    ) -> Result<Fitted, StudyError> {
-        let verdict = identifiability(&first.dynamics, &first.fit);
-        self.held.extend(
-            verdict
-                .hold
-                .iter()
-                .filter(|&&k| k < self.system.parameters.len()),
-        );
-        if self.held.is_empty() {
-            return Ok(first);
-        }
-        let values = self.declared_placeheld(&first.declared);
-        Ok(self.fit_on(
-            short,
-            &first.effects,
-            &values,
-            short.initial_locals(0),
-            None,
-        )?)
-    }
-
-    fn declared_placeheld(&self, values: &[f64]) -> Vec<f64> {
-        let mut values = values.to_vec();
-        for &k in &self.held {
-            values[k] = self.system.parameters[k].value;
-        }
-        values
+    fn hold(&mut self, verdict: Identifiability) {
+        self.identifiability
+            .undetermined
+            .extend(verdict.undetermined);
+        self.identifiability.free = self.identifiability.free.max(verdict.free);
+        self.identifiability.hold.extend(verdict.hold);
+        self.identifiability.determined =
+            self.identifiability.free - self.identifiability.hold.len();
     }
 
     /// Fit a set of effects, starting from the values that they and the declared parameters carry.
@@ -198,7 +186,8 @@ impl<'a> Study<'a> {
 
     /// Parameters that a fit may change.
     pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
-        let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
+        let free =
+            |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
     }
 

@@ -40,7 +40,7 @@ pub struct Fit {
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
 const MOST_STEPS: usize = 40;
 /// A fit ends when a step lowers the cost by less than this share.
-const ENOUGH: f64 = 1e-7;
+const ENOUGH: f64 = 1e-6;
 
 /// Fit the parameters `active` of `dynamics` to the windows, starting from `values` and `locals`, with
 /// every window's start state (and forces) free: Levenberg-Marquardt with the windows' own values

@@ -4,7 +4,7 @@ use super::fit::Fit;
 use crate::model::Dynamics;
 
 /// Which combinations of the free parameters the logs determine.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Identifiability {
     /// Number of free parameters.
     pub free: usize,
@@ -13,7 +13,7 @@ pub struct Identifiability {
     /// Combinations that are not: for each, the parameters that take part and their relative weight.
     /// Changing them together by these shares of their magnitude changes no prediction.
     pub undetermined: Vec<Vec<(String, f64)>>,
-    /// Parameters to hold at their declared value so that the rest is determined.
+    /// Parameters to hold so that the rest is determined.
     pub hold: Vec<usize>,
 }
 

@@ -76,7 +76,7 @@ struct IdentifiabilityEntry {
     determined: usize,
     /// Combinations that the logs do not determine, as (parameter, weight).
     undetermined: Vec<Vec<(String, f64)>>,
-    /// Parameters held at their declared values for that reason.
+    /// Parameters held for that reason.
     held: Vec<String>,
 }
 
@@ -247,7 +247,7 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
         free: verdict.free,
         determined: verdict.determined,
         undetermined: verdict.undetermined.clone(),
-        held: outcome.held.iter().map(name).collect(),
+        held: verdict.hold.iter().map(name).collect(),
     }
 }
 

@@ -6,7 +6,7 @@ use crate::data::Log;
 use crate::evaluate::{Assessment, summarise, traces};
 use crate::model::Dynamics;
 
-/// A picture shows this much of a log in s: more than that and half-second predictions become a blur.
+/// A picture shows this much of a log in s: more than that and predictions become a blur.
 const SHOWN_S: f64 = 8.0;
 
 /// Measured motion and open-loop predictions on the beginning of the first test log.
@@ -16,8 +16,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             title: "predictions".into(),
         });
     };
-    let horizons = &outcome.errors.before.horizons;
-    let horizon = horizons[horizons.len() / 2].horizon_s;
+    let horizons = outcome.errors.before.horizons.iter().map(|h| h.horizon_s);
+    // Differences between models grow with the horizon: the longest one shows them best.
+    let horizon = horizons.fold(0.0, f64::max);
     let mut models: Vec<(Role, &str, &Dynamics, Vec<f64>)> = vec![
         (
             Role::Before,

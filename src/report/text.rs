@@ -240,11 +240,11 @@ fn parameters(outcome: &Outcome) -> String {
         "\nThe logs determine {} of {} free parameters.",
         verdict.determined, verdict.free
     );
-    for &k in &outcome.held {
+    for &k in &verdict.hold {
         let name = &outcome.before.dynamics.parameters[k].name;
         let _ = writeln!(
             out,
-            "- `{name}` is held at its declared value: the logs determine it only in combination with others. \
+            "- `{name}` is held: the logs determine it only in combination with others. \
              Fitted values of the others, and of effects, are relative to it."
         );
     }
