@@ -1,1 +1,6 @@
 //! One binary for all integration tests: Burn is linked once.
+
+mod bad_input;
+mod demo;
+mod measured;
+mod support;

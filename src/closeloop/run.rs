@@ -9,7 +9,7 @@ use super::split::Split;
 use super::study::{Fitted, Study, StudyError};
 use super::unexplained::{Unexplained, unexplained};
 use crate::data::audit;
-use crate::evaluate::{Assessment, assess};
+use crate::evaluate::{Assessment, assess, window_count};
 use crate::identify::uncertainty;
 use crate::model::{Dynamics, Library, Parameter, System};
 use crate::train::Backend;
@@ -55,6 +55,12 @@ pub fn close_loop(
         horizons_s,
         backend,
     } = request;
+    if let Some(&horizon_s) = horizons_s
+        .iter()
+        .find(|h| window_count(&split.test, **h) == 0)
+    {
+        return Err(StudyError::NoTest { horizon_s });
+    }
     let audits = split.train.iter().chain(&split.test).map(audit).collect();
     progress(Stage {
         number: 0,

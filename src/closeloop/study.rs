@@ -8,6 +8,10 @@ use crate::model::{Dynamics, FittedEffect, Measure, System};
 /// Why the loop could not be closed at all.
 #[derive(Debug, Error)]
 pub enum StudyError {
+    #[error(
+        "the test logs give no window of {horizon_s} s to judge by; give longer test logs or leave out less"
+    )]
+    NoTest { horizon_s: f64 },
     #[error(transparent)]
     Fit(#[from] FitError),
     #[error(transparent)]

@@ -7,6 +7,6 @@ mod summary;
 mod trace;
 
 pub use calibrate::{CalibrateError, Offsets, calibrate};
-pub use open_loop::{Assessment, OpenLoop, WindowError, assess};
+pub use open_loop::{Assessment, OpenLoop, WindowError, assess, window_count};
 pub use summary::{Summary, summarise};
 pub use trace::{Trace, traces};

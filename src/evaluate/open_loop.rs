@@ -115,6 +115,14 @@ fn run<'v>(
     horizons_s.iter().map(one).collect()
 }
 
+/// How many windows of `horizon_s` seconds the logs give.
+pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
+    logs.iter()
+        .enumerate()
+        .map(|(index, log)| windows(index, log, horizon_s).len())
+        .sum()
+}
+
 /// The windows of one log: every half horizon from the first row that has enough before it.
 pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
     let slack = 1e-6 * horizon_s;

@@ -40,7 +40,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     let name = name.to_lowercase();
     candidates
         .into_iter()
-        .map(|c| (strsim::damerau_levenshtein(&name, &c.to_lowercase()), c))
+        .map(|c| (distance(&name, &c.to_lowercase()), c))
         .filter(|(distance, c)| *distance <= 1 + c.len().max(name.len()) / 4)
         // Equal distances are told apart by the shared beginning.
         .min_by(|a, b| {
@@ -48,6 +48,14 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
             a.0.cmp(&b.0).then(likeness(b.1).total_cmp(&likeness(a.1)))
         })
         .map(|(_, c)| c)
+}
+
+/// Slips of the hand between two names; a beginning of at least four letters stands for the whole.
+fn distance(name: &str, candidate: &str) -> usize {
+    if name.len() >= 4 && candidate.starts_with(name) {
+        return 1;
+    }
+    strsim::damerau_levenshtein(name, candidate)
 }
 
 /// `; did you mean ...?` or nothing.

@@ -119,6 +119,12 @@ impl Program {
             Op::Const(value) => atom(notation.number(value)),
             Op::Input(k) => atom(notation.name(&self.inputs[k as usize])),
             Op::Unary(op, a) => unary(notation, op, at(a)),
+            Op::Binary(Binary::Mul, a, b) if a == b => notation.power(at(a), atom("2".into())),
+            Op::Binary(Binary::Mul, square, a)
+                if self.ops[square.index()] == Op::Binary(Binary::Mul, a, a) =>
+            {
+                notation.power(at(a), atom("3".into()))
+            }
             Op::Binary(op, a, b) => binary(notation, op, at(a), at(b)),
             Op::Where(c, a, b) => atom(notation.choice(&at(c).text, &at(a).text, &at(b).text)),
         }
@@ -383,6 +389,7 @@ mod tests {
             "-(a + b)",
             "where(a < b, atan2(a, b), max(a, 0.25))",
             "a^b^q1",
+            "exp(-(qd1 / a)^2) * b^3",
             "a - b + q1",
         ] {
             assert_eq!(program(text).formula(0), text);

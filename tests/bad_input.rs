@@ -1,0 +1,325 @@
+//! Bad input gets one clear error that names the place and the remedy, exit status 2, and nothing half written.
+
+use std::fs;
+use std::path::PathBuf;
+
+use crate::support::{refuses, succeeds, text};
+
+const GOOD: &str = "time,q1,qd1,tau1\n0,0.1,0,0\n0.01,0.1,0,0\n0.02,0.1,0,0\n";
+
+/// A scratch folder with one file in it.
+struct Scratch {
+    folder: tempfile::TempDir,
+    file: PathBuf,
+}
+
+fn scratch(name: &str, contents: &str) -> Scratch {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join(name);
+    fs::write(&file, contents).unwrap();
+    Scratch { folder, file }
+}
+
+impl Scratch {
+    /// What closing the loop on this log says; no folder may come of it.
+    fn closeloop(&self, model: &str) -> String {
+        let out = self.folder.path().join("out");
+        let message = refuses(&[
+            "closeloop",
+            "--model",
+            model,
+            "--train",
+            text(&self.file),
+            "--out",
+            text(&out),
+        ]);
+        assert!(!out.exists(), "a folder was left behind");
+        message
+    }
+}
+
+/// Each part must stand in the message.
+fn says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is missing in:\n{message}");
+    }
+}
+
+#[test]
+fn a_log_that_cannot_be_read_is_refused_with_its_place() {
+    let cases: &[(&str, &[&str])] = &[
+        ("", &["log.csv", "empty"]),
+        ("time,q1,qd1,tau1\n", &["log.csv", "row"]),
+        (
+            "time,q1,qd1,tau1\n0,0.1,0,0\n",
+            &["log.csv", "1 row(s)", "at least two"],
+        ),
+        (
+            "time,q1,velocity,tau1\n0,1,2,3\n1,1,2,3\n",
+            &["log.csv", "qd1", "[columns]"],
+        ),
+        (
+            "time,q1,qd1,tau1\n0,abc,0,0\n1,0,0,0\n",
+            &["log.csv, line 2", "q1", "\"abc\" is not a number"],
+        ),
+        (
+            "time,q1,qd1,tau1\n0,NaN,0,0\n1,0,0,0\n",
+            &["log.csv, line 2", "q1", "NaN"],
+        ),
+        (
+            "time,q1,qd1,tau1\n0,0,0,0\n0,0,0,0\n",
+            &["log.csv, line 3", "time"],
+        ),
+        (
+            "time,q1,q2,qd1,qd2,tau1,tau2\n0,0,0,0,0,0,0\n1,0,0,0,0,0,0\n",
+            &["log.csv", "joint"],
+        ),
+        ("time,q1,qd1,tau1\n0,0,0\n", &["log.csv, line 2"]),
+    ];
+    for (contents, parts) in cases {
+        says(&scratch("log.csv", contents).closeloop("pendulum"), parts);
+    }
+}
+
+#[test]
+fn a_log_that_is_not_there_is_named() {
+    says(
+        &refuses(&["evaluate", "--model", "pendulum", "--test", "nowhere.csv"]),
+        &["nowhere.csv"],
+    );
+}
+
+#[test]
+fn a_log_that_is_too_short_to_fit_says_so() {
+    says(
+        &scratch("log.csv", GOOD).closeloop("pendulum"),
+        &["too short", "--test"],
+    );
+}
+
+/// What a model file with this change of the pendulum's says.
+fn model_message(from: &str, to: &str) -> String {
+    let pendulum = include_str!("../models/pendulum.toml");
+    assert!(pendulum.contains(from));
+    let model = scratch("model.toml", &pendulum.replacen(from, to, 1));
+    let log = scratch("log.csv", GOOD);
+    log.closeloop(text(&model.file))
+}
+
+#[test]
+fn a_model_file_is_refused_with_line_column_and_the_near_name() {
+    let cases: &[(&str, &str, &[&str])] = &[
+        (
+            "C_g * sin",
+            "C_q * sin",
+            &[
+                "model.toml, line 11, column 8",
+                "unknown name `C_q`",
+                "`C_g`",
+                "^^^",
+            ],
+        ),
+        (
+            "sin(q1)",
+            "sinus(q1)",
+            &["line 11", "unknown function `sinus`", "`sin`"],
+        ),
+        ("sin(q1) +", "sin(q1 +", &["line 11", "never closed"]),
+        (
+            "value = 15.0",
+            "vlaue = 15.0",
+            &["line 7", "unknown key `vlaue`", "`value`"],
+        ),
+        ("joints = 1", "joints = 1.5", &["line 4", "whole number"]),
+        ("joints = 1", "joints = \"one\"", &["line 4", "a number"]),
+        (
+            "[dynamics]",
+            "[dynamik]",
+            &["unknown key `dynamik`", "`dynamics`"],
+        ),
+        ("name = \"pendulum\"", "name = pendulum", &["line 2"]),
+        (
+            "positive = true",
+            "bounds = [5, 6]",
+            &["line 8", "outside of its bounds"],
+        ),
+    ];
+    for (from, to, parts) in cases {
+        says(&model_message(from, to), parts);
+    }
+}
+
+#[test]
+fn an_unknown_effect_in_a_model_file_is_met_with_the_near_one() {
+    let effect = "[[effect]]\nname = \"coulom_friction\"\njoint = 1\nF_c = 0.1\n\n[energy]";
+    says(
+        &model_message("[energy]", effect),
+        &["unknown effect `coulom_friction`", "`coulomb_friction`"],
+    );
+    let joint = "[[effect]]\nname = \"coulomb_friction\"\njoint = 2\nF_c = 0.1\n\n[energy]";
+    says(
+        &model_message("[energy]", joint),
+        &["`joint` is a number from 1 to 1"],
+    );
+    let parameter = "[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nFc = 0.1\n\n[energy]";
+    says(
+        &model_message("[energy]", parameter),
+        &["unknown key `Fc`", "`F_c`"],
+    );
+}
+
+#[test]
+fn a_model_that_is_not_there_is_met_with_what_is() {
+    says(
+        &scratch("log.csv", GOOD).closeloop("pendulun"),
+        &["pendulun", "acrobot, cartpole, drive, pendulum"],
+    );
+}
+
+#[test]
+fn unknown_effects_and_parameters_of_a_simulation_are_named() {
+    let simulate = |effect: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("log.csv");
+        let message = refuses(&[
+            "simulate",
+            "--plant",
+            "pendulum",
+            "--effect",
+            effect,
+            "--out",
+            text(&out),
+        ]);
+        assert!(!out.exists());
+        message
+    };
+    says(
+        &simulate("coulomb=0.1"),
+        &["unknown effect `coulomb`", "`coulomb_friction`"],
+    );
+    says(
+        &simulate("coulomb_friction.F_d=0.1"),
+        &["no parameter `F_d`", "`F_c`"],
+    );
+    says(
+        &simulate("coulomb_friction@3=0.1"),
+        &["`joint` is from 1 to 1"],
+    );
+    says(
+        &simulate("coulomb_friction=much"),
+        &["\"much\" is not a number"],
+    );
+}
+
+#[test]
+fn leave_out_must_name_a_log_and_a_time() {
+    let log = scratch("log.csv", GOOD);
+    let ask = |span: &str| {
+        refuses(&[
+            "evaluate",
+            "--model",
+            "pendulum",
+            "--test",
+            text(&log.file),
+            "--leave-out",
+            span,
+        ])
+    };
+    says(&ask("other.csv@0-1"), &["other.csv", "log.csv"]);
+    says(&ask("log.csv@3-1"), &["3", "1"]);
+    says(&ask("log.csv"), &["@"]);
+}
+
+#[test]
+fn a_checkpoint_must_be_one() {
+    let log = scratch("log.csv", GOOD);
+    let evaluate =
+        |dir: &str| refuses(&["evaluate", "--checkpoint", dir, "--test", text(&log.file)]);
+    says(&evaluate("nowhere"), &["nowhere"]);
+    let broken = scratch("checkpoint.json", "{ not json");
+    says(&evaluate(text(broken.folder.path())), &["checkpoint.json"]);
+}
+
+/// Results that cannot be written, as on a full disk: every write fails with an error.
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("log.csv");
+    let command = format!(
+        "trap '' XFSZ; ulimit -f 1; exec {} simulate --plant pendulum --out {}",
+        env!("CARGO_BIN_EXE_residyn"),
+        text(&out)
+    );
+    let output = std::process::Command::new("bash")
+        .args(["-c", &command])
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    says(&message, &["log.csv"]);
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        0,
+        "something was left behind"
+    );
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_before_the_work() {
+    let file = scratch("a-file", "");
+    let inside = file.file.join("report");
+    says(
+        &refuses(&["closeloop", "--out", text(&inside)]),
+        &["a-file", "--out"],
+    );
+    says(
+        &refuses(&["closeloop", "--out", text(&file.file)]),
+        &["is a file", "--out"],
+    );
+    let log = inside.join("log.csv");
+    says(
+        &refuses(&["simulate", "--plant", "pendulum", "--out", text(&log)]),
+        &["a-file"],
+    );
+}
+
+#[test]
+fn a_rig_that_diverges_is_reported() {
+    let pendulum = include_str!("../models/pendulum.toml")
+        .replace("C_i * tau1", "C_i * tau1 + exp(abs(q1))^4");
+    let model = scratch("model.toml", &pendulum);
+    let out = model.folder.path().join("log.csv");
+    let message = refuses(&[
+        "simulate",
+        "--plant",
+        text(&model.file),
+        "--out",
+        text(&out),
+    ]);
+    says(&message, &["diverges"]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn good_input_is_not_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("log.csv");
+    succeeds(&[
+        "simulate",
+        "--plant",
+        "pendulum",
+        "--out",
+        text(&out),
+        "--duration",
+        "3",
+    ]);
+    succeeds(&[
+        "evaluate",
+        "--model",
+        "pendulum",
+        "--test",
+        text(&out),
+        "--json",
+    ]);
+}

@@ -1,0 +1,153 @@
+//! The demo: an effect that the model does not declare is named, sized and worth its place.
+
+use serde_json::Value;
+
+use crate::support::{refuses, succeeds, text};
+
+fn demo(seed: &str) -> (Value, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let json = succeeds(&["closeloop", "--json", "--seed", seed, "--out", text(&out)]);
+    (serde_json::from_str(&json).unwrap(), folder)
+}
+
+/// The true value, as in configs/demo.toml.
+const TRUE_F_C: f64 = 0.16;
+
+#[test]
+fn the_demo_names_the_hidden_effect_with_its_size() {
+    for seed in ["0", "1", "2"] {
+        let (report, _folder) = demo(seed);
+        assert_eq!(report["verdict"], "explained", "seed {seed}");
+        let effects = report["effects"].as_array().unwrap();
+        assert_eq!(effects.len(), 1, "seed {seed}: {effects:?}");
+        assert_eq!(effects[0]["name"], "coulomb_friction");
+        assert_eq!(effects[0]["expression"], "-F_c1 * sign(qd1)");
+        let parameter = &effects[0]["parameters"][0];
+        let value = parameter["value"].as_f64().unwrap();
+        assert!(
+            (value - TRUE_F_C).abs() < 0.01 * TRUE_F_C,
+            "seed {seed}: {value}"
+        );
+        let rmse = |model: &str| {
+            report["error"][model]["position_rmse"][1][0]
+                .as_f64()
+                .unwrap()
+        };
+        assert!(rmse("after") <= 0.25 * rmse("before"), "seed {seed}");
+    }
+}
+
+#[test]
+fn the_true_value_lies_inside_its_interval() {
+    let (report, _folder) = demo("0");
+    let ci: Vec<f64> =
+        serde_json::from_value(report["effects"][0]["parameters"][0]["ci95"].clone()).unwrap();
+    assert!(ci[0] < TRUE_F_C && TRUE_F_C < ci[1], "{ci:?}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_report() {
+    let ((first, _a), (second, _b)) = (demo("3"), demo("3"));
+    assert_eq!(first, second);
+}
+
+#[test]
+fn what_was_written_is_taken_by_other_commands() {
+    let (report, folder) = demo("4");
+    let out = folder.path().join("report");
+    for file in [
+        "report.json",
+        "report.md",
+        "model.toml",
+        "predictions.svg",
+        "residual.svg",
+        "errors.svg",
+    ] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+    let log = folder.path().join("new.csv");
+    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml");
+    succeeds(&[
+        "simulate",
+        "--plant",
+        plant,
+        "--seed",
+        "9",
+        "--out",
+        text(&log),
+    ]);
+    let error = |arguments: &[&str]| {
+        let all = [&["evaluate", "--json", "--test", text(&log)], arguments].concat();
+        let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
+        value["position_rmse"][1][0].as_f64().unwrap()
+    };
+    let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
+    let fitted = error(&["--model", text(&model)]);
+    assert!(fitted < 0.01, "{fitted}");
+    let hybrid = error(&["--checkpoint", text(&checkpoint)]);
+    assert!((hybrid - fitted).abs() < 0.2 * fitted, "{hybrid} {fitted}");
+    // The written model, closed again, lacks nothing.
+    let again = folder.path().join("again");
+    let json = succeeds(&[
+        "closeloop",
+        "--json",
+        "--model",
+        text(&model),
+        "--train",
+        text(&log),
+        "--out",
+        text(&again),
+    ]);
+    let again: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(again["verdict"], "no_missing_effect");
+    assert_eq!(report["files"]["checkpoint"], "checkpoint");
+}
+
+#[test]
+fn a_checkpoint_of_another_model_is_refused() {
+    let (_report, folder) = demo("5");
+    let checkpoint = folder.path().join("report/checkpoint");
+    let log = folder.path().join("two-joints.csv");
+    succeeds(&[
+        "simulate",
+        "--plant",
+        "acrobot",
+        "--out",
+        text(&log),
+        "--duration",
+        "2",
+    ]);
+    let message = refuses(&[
+        "evaluate",
+        "--checkpoint",
+        text(&checkpoint),
+        "--test",
+        text(&log),
+    ]);
+    assert!(message.contains("joint"), "{message}");
+    // A checkpoint whose weights belong to another model than its own model file.
+    let model = include_str!("../models/drive.toml");
+    std::fs::write(checkpoint.join("model.toml"), model).unwrap();
+    let one = folder.path().join("one-joint.csv");
+    succeeds(&[
+        "simulate",
+        "--plant",
+        "pendulum",
+        "--out",
+        text(&one),
+        "--duration",
+        "2",
+    ]);
+    let message = refuses(&[
+        "evaluate",
+        "--checkpoint",
+        text(&checkpoint),
+        "--test",
+        text(&one),
+    ]);
+    assert!(
+        message.contains("pendulum") && message.contains("drive"),
+        "{message}"
+    );
+}

@@ -1,0 +1,60 @@
+//! What several tests share: the real binary, scratch folders, measured data.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Run the program and return what it printed and its exit status.
+pub fn residyn(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_residyn"))
+        .args(arguments)
+        .output()
+        .expect("the binary runs")
+}
+
+/// Run the program, which must succeed, and return its standard output.
+pub fn succeeds(arguments: &[&str]) -> String {
+    let output = residyn(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?} failed:\n{errors}");
+    String::from_utf8(output.stdout).expect("output is UTF-8")
+}
+
+/// Run the program, which must fail as one that could not run, and return its message.
+pub fn refuses(arguments: &[&str]) -> String {
+    let output = residyn(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}:\n{errors}");
+    assert!(output.stdout.is_empty(), "{arguments:?} printed a result");
+    errors
+}
+
+/// A path as text.
+pub fn text(path: &Path) -> &str {
+    path.to_str().expect("scratch paths are UTF-8")
+}
+
+/// The folder of measured logs, `$RESIDYN_DATA` or beside the project; loudly `None` where there is none.
+///
+/// # Panics
+/// Where `RESIDYN_REQUIRE_DATA` is set and there is none.
+pub fn measured(set: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("RESIDYN_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let folder = root.join(set);
+    if folder.is_dir() {
+        return Some(folder);
+    }
+    let required = std::env::var_os("RESIDYN_REQUIRE_DATA").is_some();
+    assert!(
+        !required,
+        "measured data are required, and {} is missing",
+        folder.display()
+    );
+    eprintln!(
+        "SKIPPED: no measured data at {}; set RESIDYN_DATA (see README)",
+        folder.display()
+    );
+    None
+}
