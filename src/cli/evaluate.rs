@@ -8,7 +8,6 @@ use serde::Serialize;
 use super::{Answer, Common, inputs};
 use crate::data::{LeaveOut, Log};
 use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
-use crate::expr::SignForm;
 use crate::model::{Dynamics, System};
 use crate::train::Checkpoint;
 
@@ -119,12 +118,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(Answer::Yes)
 }
 
-/// The system, for its columns, and what is integrated. Dry friction is smoothed as in fits, over 0.01 rad/s.
+/// The system, for its columns, and what is integrated.
 fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
     let library = inputs::library(&arguments.effects)?;
     if let Some(model) = &arguments.model {
         let system = library.system(model)?;
-        let dynamics = system.dynamics(&sign(&system));
+        let dynamics = system.dynamics(&system.sign());
         return Ok((system, dynamics));
     }
     let dir = arguments
@@ -137,15 +136,11 @@ fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
         &checkpoint.model_toml,
         library.effects(),
     )?;
-    let physics = system.dynamics(&sign(&system));
+    let physics = system.dynamics(&system.sign());
     let dynamics = checkpoint
         .model(&physics, &arguments.common.device.device())?
         .to_dynamics()?;
     Ok((system, dynamics))
-}
-
-fn sign(system: &System) -> Vec<SignForm> {
-    vec![SignForm::DEFAULT; system.joints]
 }
 
 fn table(summary: &Summary) -> String {

@@ -1,5 +1,6 @@
 //! The command line: parse, call, print; nothing else.
 
+mod audit;
 mod closeloop;
 mod evaluate;
 mod inputs;
@@ -29,6 +30,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Closeloop(closeloop::Arguments),
+    Audit(audit::Arguments),
     Evaluate(evaluate::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
@@ -59,6 +61,7 @@ enum Answer {
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
+        Command::Audit(arguments) => audit::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),

@@ -118,7 +118,7 @@ pub fn close_loop(
         reason,
         how_split: split.how.clone(),
         audits,
-        sign_widths: study.sign_widths(),
+        sign_widths: study.sign_widths.clone(),
         prismatic: system.prismatic.clone(),
         identifiability: study.identifiability.clone(),
         alternatives: Alternative::of_rounds(&rounds, &after),

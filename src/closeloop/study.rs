@@ -34,6 +34,8 @@ pub struct Study<'a> {
     pub system: &'a System,
     pub logs: &'a [Log],
     pub sign: Vec<SignForm>,
+    /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
+    pub sign_widths: Vec<f64>,
     /// Top speed and top torque of each joint.
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
@@ -76,13 +78,21 @@ impl<'a> Study<'a> {
                 .max(channel.resolution / 12.0_f64.sqrt())
                 .max(1e-9)
         });
-        let sign = top_speed.iter().map(|speed| SignForm::Smooth {
-            width: SIGN_WIDTH * speed.max(1e-6),
-        });
+        let by_speed = || {
+            top_speed
+                .iter()
+                .map(|speed| SIGN_WIDTH * speed.max(1e-6))
+                .collect()
+        };
+        let sign_widths: Vec<f64> = system.sign_width.clone().unwrap_or_else(by_speed);
         Self {
             system,
             logs,
-            sign: sign.collect(),
+            sign: sign_widths
+                .iter()
+                .map(|&width| SignForm::Smooth { width })
+                .collect(),
+            sign_widths,
             shooting: Shooting::new(logs, cut(logs, WINDOW_S), &noise),
             top_speed,
             top_torque,
@@ -193,15 +203,6 @@ impl<'a> Study<'a> {
         let free =
             |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
-    }
-
-    /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
-    pub fn sign_widths(&self) -> Vec<f64> {
-        let width = |sign: &SignForm| match sign {
-            SignForm::Exact => 0.0,
-            SignForm::Smooth { width } => *width,
-        };
-        self.sign.iter().map(width).collect()
     }
 
     /// The unit in which an effect's searched values are given, on this joint.

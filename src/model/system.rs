@@ -45,6 +45,9 @@ pub struct System {
     pub joints: usize,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
+    /// For each joint the speed (rad/s or m/s) over which dry friction reverses; where the file gives none,
+    /// fits choose it by the speeds in the logs.
+    pub sign_width: Option<Vec<f64>>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
     pub effects: Vec<FittedEffect>,
@@ -57,7 +60,7 @@ pub struct System {
     pub(super) energy: Option<Energy>,
 }
 
-const SYSTEM_KEYS: &[&str] = &["name", "about", "joints", "prismatic"];
+const SYSTEM_KEYS: &[&str] = &["name", "about", "joints", "prismatic", "sign_width"];
 const PARAMETER_KEYS: &[&str] = &[
     "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
 ];
@@ -105,6 +108,7 @@ impl System {
             about: section.text_or_empty("about")?,
             joints,
             prismatic: prismatic(&section, joints)?,
+            sign_width: sign_width(&section, joints)?,
             columns: columns(top.section("columns")?, joints)?,
             parameters: parameters(top.section("parameters")?)?,
             effects: super::effects_in_file::read(&top, joints, library)?,
@@ -156,6 +160,15 @@ impl System {
         names.push("t".into());
         names.extend(self.parameters.iter().map(|p| p.name.clone()));
         names
+    }
+
+    /// How dry friction is written in each joint: as the file says, else in the default width.
+    pub fn sign(&self) -> Vec<SignForm> {
+        let width = |width: &f64| SignForm::Smooth { width: *width };
+        let given = self.sign_width.as_ref();
+        given.map_or(vec![SignForm::DEFAULT; self.joints], |widths| {
+            widths.iter().map(width).collect()
+        })
     }
 
     /// Whether the file gives mass matrix and bias, which effects of the inertia need.
@@ -222,6 +235,19 @@ fn prismatic(section: &Section<'_>, joints: usize) -> Result<Vec<bool>, FileErro
         return Err(section.error_at("prismatic", message));
     }
     Ok(numbers.iter().map(|j| listed.contains(j)).collect())
+}
+
+/// One width above zero a joint.
+fn sign_width(section: &Section<'_>, joints: usize) -> Result<Option<Vec<f64>>, FileError> {
+    let widths = section.numbers("sign_width")?;
+    match &widths {
+        Some(widths) if widths.len() != joints || widths.iter().any(|w| *w <= 0.0) => {
+            let message =
+                format!("`sign_width` is a list of {joints} speeds above zero, one a joint");
+            Err(section.error_at("sign_width", message))
+        }
+        _ => Ok(widths),
+    }
 }
 
 fn columns(section: Option<Section<'_>>, joints: usize) -> Result<Columns, FileError> {

@@ -11,7 +11,7 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
         "# Fitted by residyn {}; the declared equations, then the effects that were found.\n\n",
         env!("CARGO_PKG_VERSION")
     );
-    text += &with_values(&system.declaration, declared);
+    text += &with_values(&system.declaration, declared, &outcome.sign_widths);
     for (effect, _) in outcome.after.effects.iter().zip(0..) {
         let finding = outcome
             .findings
@@ -39,7 +39,7 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
 }
 
 /// The declaration with new numbers in place of the declared ones.
-fn with_values(declaration: &str, parameters: &[Parameter]) -> String {
+fn with_values(declaration: &str, parameters: &[Parameter], sign_widths: &[f64]) -> String {
     let mut document: toml_edit::DocumentMut = declaration
         .parse()
         .expect("the declaration was read as TOML before");
@@ -58,5 +58,8 @@ fn with_values(declaration: &str, parameters: &[Parameter]) -> String {
             }
         }
     }
+    // Predictions are only the same again with the same smoothing of dry friction.
+    let widths: toml_edit::Array = sign_widths.iter().copied().collect();
+    document["system"]["sign_width"] = toml_edit::value(widths);
     document.to_string()
 }

@@ -1,0 +1,36 @@
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::{Answer, Common, inputs};
+use crate::data::{Audit, audit};
+
+/// What logs are good for: sampling, noise, spikes, lags, excitation, and what cannot be told from them
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  residyn audit --model pendulum run1.csv run2.csv")]
+pub(super) struct Arguments {
+    /// Model file, or the name of a built-in system: says how many joints there are and what columns are called
+    #[arg(long)]
+    model: PathBuf,
+    /// Logs to look at
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let system = inputs::library(&[])?.system(&arguments.model)?;
+    let logs = inputs::logs(&arguments.logs, &system)?;
+    inputs::print_notes(&logs);
+    let audits: Vec<Audit> = logs.iter().map(audit).collect();
+    if arguments.common.json {
+        inputs::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
+    } else {
+        for audit in &audits {
+            inputs::print(&format!("{audit}\n"))?;
+        }
+    }
+    Ok(Answer::Yes)
+}
