@@ -111,7 +111,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 /// Settings of one effect on one joint belong together.
 fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting]) -> Result<()> {
-    let mut groups: Vec<(&str, usize, Vec<(String, f64)>)> = Vec::new();
+    type Group<'s> = (&'s str, usize, Vec<(String, f64)>);
+    let mut groups: Vec<Group<'_>> = Vec::new();
     for setting in settings {
         let first = library
             .effect(&setting.name)

@@ -203,7 +203,7 @@ impl Pack {
                 }
             }
         }
-        pack.substeps = pack.dt.iter().map(|dt| substeps(dt)).collect();
+        pack.substeps = pack.dt.iter().map(substeps).collect();
         pack
     }
 

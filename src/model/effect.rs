@@ -159,7 +159,8 @@ fn entry(
     section: &Section<'_>,
     parameters: &[EffectParameter],
 ) -> Result<Entry, FileError> {
-    let kinds: [(&str, fn(Formula) -> Entry); 4] = [
+    type Make = fn(Formula) -> Entry;
+    let kinds: [(&str, Make); 4] = [
         ("force", Entry::Force),
         ("torque", Entry::Torque),
         ("angle", Entry::Angle),

@@ -1,0 +1,34 @@
+# What developers run; `just` lists it. .ci/run does all of it in one go.
+
+_list:
+    @just --list
+
+# Format the code
+fmt:
+    cargo fmt
+
+# Lints, as errors
+lint:
+    cargo clippy --release --all-targets -- -D warnings
+
+# All tests; arguments go to cargo test
+test *arguments:
+    tests/run {{arguments}}
+
+# The library's documentation
+doc:
+    RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
+
+# Licences, advisories, bans and sources of the dependencies
+deny:
+    cargo deny check
+
+# Everything that must hold before a change is taken
+ci:
+    .ci/run
+
+# Run the demo and refresh the pictures of the README
+demo:
+    cargo run --release -- closeloop --out target/demo
+    cp target/demo/residual.svg docs/demo-residual.svg
+    cp target/demo/errors.svg docs/demo-errors.svg

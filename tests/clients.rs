@@ -1,0 +1,55 @@
+//! Real clients read what the program writes: Python with the packages of `tests/clients`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use tempfile::TempDir;
+
+/// The folder that `residyn closeloop` writes for the demo rig; made once for all tests of this file.
+fn demo() -> &'static Path {
+    static FOLDER: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, report) = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let report = folder.path().join("report");
+        let run = Command::new(env!("CARGO_BIN_EXE_residyn"))
+            .args(["closeloop", "--out"])
+            .arg(&report)
+            .output()
+            .expect("the program starts");
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(0), "closeloop failed: {said}");
+        (folder, report)
+    });
+    report
+}
+
+/// Run one of the scripts in `tests/clients`; without an interpreter, say so where nobody misses it.
+fn client(script: &str, arguments: &[&Path]) {
+    let Some(python) = std::env::var_os("RESIDYN_PYTHON") else {
+        let note = format!("SKIPPED {script}: RESIDYN_PYTHON is not set; run tests/run\n");
+        // Not eprintln!, which the test harness swallows.
+        let _ = std::io::stderr().write_all(note.as_bytes());
+        return;
+    };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let run = Command::new(python)
+        .arg(root.join("tests/clients").join(script))
+        .args(arguments)
+        .output()
+        .expect("RESIDYN_PYTHON names an interpreter");
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{script} failed:\n{said}");
+}
+
+#[test]
+fn python_reads_the_weights_of_a_checkpoint() {
+    client("weights.py", &[demo()]);
+}
+
+#[test]
+fn report_matches_its_published_schema() {
+    let schema = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/report.schema.json");
+    client("report.py", &[demo(), &schema]);
+}

@@ -1,0 +1,33 @@
+"""Read a report as any program would: JSON, checked against the schema, and the files that it names."""
+
+import json
+import pathlib
+import sys
+
+import jsonschema
+
+
+def refuse(constant):
+    raise ValueError(f"{constant} is no JSON number")
+
+
+folder, schema_path = map(pathlib.Path, sys.argv[1:])
+report = json.loads((folder / "report.json").read_text(), parse_constant=refuse)
+schema = json.loads(schema_path.read_text())
+validator = jsonschema.validators.validator_for(schema)
+validator.check_schema(schema)
+faults = [f"{fault.json_path}: {fault.message}" for fault in validator(schema).iter_errors(report)]
+assert not faults, "\n".join(faults)
+
+horizons, joints = len(report["error"]["horizons_s"]), report["joints"]
+for model in ("before", "after", "hybrid"):
+    for measure in ("position_rmse", "position_median", "velocity_rmse"):
+        rows = (report["error"][model] or {}).get(measure)
+        if rows is not None:
+            assert [len(row) for row in rows] == [joints] * horizons, f"shape of error.{model}.{measure}"
+
+for name in ("model", "report", "checkpoint"):
+    file = report["files"][name]
+    assert file is None or (folder / file).exists(), f"files.{name} names {file}, which is not there"
+for plot in report["files"].get("plots", []):
+    assert (folder / plot).exists(), f"files.plots names {plot}, which is not there"
