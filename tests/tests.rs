@@ -1,1 +1,8 @@
 //! One binary for all integration tests: Burn is linked once.
+
+mod common;
+mod effects;
+mod functions;
+mod gradients;
+mod oracles;
+mod parity;
