@@ -13,7 +13,7 @@ use crate::common::{
 /// Wide enough that third derivatives of tanh(v / width) leave central differences four digits.
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.3 }];
 /// f32 keeps 6e-8 of a value; derivatives multiply the accelerations' terms by up to 1 / (mass of the
-/// pole): measured up to REPLACE of max(1, value).
+/// pole): measured up to 4e-5 of max(1, value), for 12^2 sin(12 q) cogs.
 const F32: f64 = 1e-4;
 const ROWS: usize = 16;
 

@@ -6,8 +6,8 @@ use residyn::expr::{Program, SignForm};
 use crate::common::{assert_near, catalog, column, devices, in_f32, numbers, points, tensor};
 
 /// f32 keeps 24 bits, 6e-8 of a value. The accelerations here are sums of terms up to some tens whose
-/// angles (up to 12 q) are rounded as well: measured up to REPLACE of max(1, value).
-const F32: f64 = 2e-5;
+/// angles (up to 12 q) are rounded as well: measured up to 5e-6 of max(1, value).
+const F32: f64 = 1e-5;
 const ROWS: usize = 48;
 
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.05 }];
