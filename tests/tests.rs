@@ -2,6 +2,12 @@
 
 mod bad_input;
 mod clients;
+mod common;
 mod demo;
+mod effects;
+mod functions;
+mod gradients;
 mod measured;
+mod oracles;
+mod parity;
 mod support;

@@ -96,13 +96,16 @@ fn columns(op: Binary, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
         Binary::Div => a / b,
         Binary::Pow => a.powf(b),
         Binary::Atan2 => a.atan2(b),
+        // As in numbers: what is not a number spreads instead of vanishing.
         Binary::Min => {
             let (a, b) = same_shape(a, b);
-            select(a.clone().lower(b.clone()), a, b)
+            let first = a.clone().lower(b.clone()).bool_or(a.clone().is_nan());
+            select(first, a, b)
         }
         Binary::Max => {
             let (a, b) = same_shape(a, b);
-            select(a.clone().greater(b.clone()), a, b)
+            let first = a.clone().greater(b.clone()).bool_or(a.clone().is_nan());
+            select(first, a, b)
         }
         Binary::Less => {
             let (a, b) = same_shape(a, b);

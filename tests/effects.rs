@@ -1,0 +1,282 @@
+//! Every effect against its meaning, written by hand; exact sign.
+
+use residyn::expr::SignForm;
+use residyn::model::{Effect, Library};
+
+use crate::common::{
+    USER_EFFECT, assert_near, dynamics, fitted, library_with_user_effect, points, rng, system,
+};
+use crate::oracles::ORACLES;
+use rand::RngExt;
+
+/// As for the systems: rounding of some dozens of operations.
+const ROUNDING: f64 = 1e-12;
+
+/// The torque that reaches the equations of motion, from the effect's parameters and q, v, tau of its
+/// joint. Friction levels are positive when they oppose the motion.
+type Meaning = fn(&[f64], f64, f64, f64) -> f64;
+
+/// All effects of the force and of the torque.
+const MEANINGS: [(&str, Meaning); 12] = [
+    ("viscous_friction", |p, _, v, tau| tau - p[0] * v),
+    ("coulomb_friction", |p, _, v, tau| tau - p[0] * sign(v)),
+    ("stribeck_friction", |p, _, v, tau| {
+        let [f_c, f_s, v_s] = p.try_into().unwrap();
+        tau - (f_c + (f_s - f_c) * (-(v / v_s).powi(2)).exp()) * sign(v)
+    }),
+    ("asymmetric_friction", |p, _, v, tau| {
+        let [f_p, f_n, b_p, b_n] = p.try_into().unwrap();
+        match v {
+            v if v > 0.0 => tau - (f_p + b_p * v),
+            v if v < 0.0 => tau + (f_n - b_n * v),
+            // Halfway between the two, as a sign of zero says.
+            _ => tau - 0.5 * (f_p - f_n),
+        }
+    }),
+    ("quadratic_drag", |p, _, v, tau| tau - p[0] * v * v.abs()),
+    ("load_friction", |p, _, v, tau| {
+        tau - p[0] * tau.abs() * sign(v)
+    }),
+    ("joint_spring", |p, q, _, tau| tau - p[0] * (q - p[1])),
+    ("constant_torque", |p, _, _, tau| tau + p[0]),
+    ("cogging_torque", |p, q, _, tau| {
+        tau + p[0] * (p[1] * q + p[2]).sin()
+    }),
+    ("actuator_gain", |p, _, _, tau| (1.0 + p[0]) * tau),
+    ("actuator_deadzone", |p, _, _, tau| match tau {
+        tau if tau > p[0] => tau - p[0],
+        tau if tau < -p[0] => tau + p[0],
+        _ => 0.0,
+    }),
+    ("actuator_saturation", |p, _, _, tau| match tau {
+        tau if tau > p[0] => p[0],
+        tau if tau < -p[0] => -p[0],
+        tau => tau,
+    }),
+];
+
+fn sign(x: f64) -> f64 {
+    f64::from(u8::from(x > 0.0)) - f64::from(u8::from(x < 0.0))
+}
+
+/// Effect parameters about their typical values, by up to a half.
+fn values(effect: &Effect, seed: u64) -> Vec<f64> {
+    let mut rng = rng(seed);
+    let typical = effect.parameters.iter().map(|p| p.typical);
+    typical.map(|t| t * rng.random_range(0.5..1.5)).collect()
+}
+
+/// Random points, and each of them at rest, at a small torque and with a joint turned backwards.
+fn points_and_edges(model: &residyn::model::Dynamics, joint: usize) -> Vec<Vec<f64>> {
+    let n = model.joints;
+    let plain = points(model, 40, 3);
+    let with = |k: usize, value: f64| {
+        plain.iter().map(move |point| {
+            let mut point = point.clone();
+            point[k] = value;
+            point
+        })
+    };
+    let edges = with(n + joint, 0.0)
+        .chain(with(2 * n + joint, 0.01))
+        .chain(with(joint, -1.2));
+    plain.iter().cloned().chain(edges).collect()
+}
+
+#[test]
+fn effects_of_force_and_torque_do_what_their_row_says() {
+    let library = Library::built_in();
+    for (name, meaning) in MEANINGS {
+        let effect = library.effect(name).unwrap();
+        for (system_name, oracle) in ORACLES {
+            let system = system(system_name);
+            for joint in 0..system.joints {
+                let own = values(effect, 7);
+                let model = dynamics(&system, &[fitted(effect, joint, &own)], SignForm::Exact);
+                let n = system.joints;
+                for mut point in points_and_edges(&model, joint) {
+                    let end = point.len() - own.len();
+                    point[end..].copy_from_slice(&own);
+                    let found = model.program.eval(&point);
+                    let (q, v, tau) = (point[joint], point[n + joint], point[2 * n + joint]);
+                    let mut bare = point[..end].to_vec();
+                    bare[2 * n + joint] = meaning(&own, q, v, tau);
+                    for (j, wanted) in oracle(&bare).into_iter().enumerate() {
+                        let what = format!("{name} on joint {} of {system_name}", joint + 1);
+                        assert_near(found[n + j], wanted, ROUNDING, &what);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn friction_opposes_the_motion() {
+    let library = Library::built_in();
+    let drive = system("drive");
+    let frictions = [
+        "viscous_friction",
+        "coulomb_friction",
+        "stribeck_friction",
+        "asymmetric_friction",
+        "quadratic_drag",
+        "load_friction",
+    ];
+    for name in frictions {
+        let effect = library.effect(name).unwrap();
+        let model = dynamics(
+            &drive,
+            &[fitted(effect, 0, &values(effect, 1))],
+            SignForm::Exact,
+        );
+        for (v, tau) in [(1.5, 1.0), (-1.5, 1.0), (0.2, -1.0), (-0.2, -1.0)] {
+            let inputs = [&[0.3, v, tau, 0.0], model.values().as_slice()].concat();
+            // The drive has a mass of 1: acceleration less torque is the force of friction.
+            let friction = model.program.eval(&inputs)[1] - tau;
+            assert!(friction * v < 0.0, "{name}: {friction} at speed {v}");
+        }
+    }
+}
+
+#[test]
+fn a_tilt_turns_gravity() {
+    let tilt = Library::built_in();
+    let tilt = tilt.effect("gravity_tilt").unwrap();
+    let pendulum = dynamics(
+        &system("pendulum"),
+        &[fitted(tilt, 0, &[0.03])],
+        SignForm::Exact,
+    );
+    for point in points(&pendulum, 100, 5) {
+        let [q, _, tau, _, c_g, c_i, delta] = point[..].try_into().unwrap();
+        let wanted = c_g * (q + delta).sin() + c_i * tau;
+        assert_near(
+            pendulum.program.eval(&point)[1],
+            wanted,
+            ROUNDING,
+            "pendulum",
+        );
+    }
+    // In a chain all angles count from the first link's: a tilt there tilts all.
+    let acrobot = dynamics(
+        &system("acrobot"),
+        &[fitted(tilt, 0, &[0.03])],
+        SignForm::Exact,
+    );
+    for point in points(&acrobot, 100, 5) {
+        let (delta, bare) = point.split_last().unwrap();
+        let mut turned = bare.to_vec();
+        turned[0] += delta;
+        let wanted = ORACLES[1].1(&turned);
+        let found = acrobot.program.eval(&point);
+        assert_near(found[2], wanted[0], ROUNDING, "acrobot, joint 1");
+        assert_near(found[3], wanted[1], ROUNDING, "acrobot, joint 2");
+    }
+}
+
+/// M(q) qdd = tau - bias: the mass matrix's columns are what unit torques reveal, so that the rotor's
+/// inertia is tested by the torque it would take to turn it.
+#[test]
+fn a_rotor_adds_to_its_own_joint_alone() {
+    let library = Library::built_in();
+    let rotor = library.effect("rotor_inertia").unwrap();
+    for (name, oracle) in ORACLES
+        .into_iter()
+        .filter(|(name, _)| system(name).has_mass_matrix())
+    {
+        let system = system(name);
+        let n = system.joints;
+        for joint in 0..n {
+            let model = dynamics(&system, &[fitted(rotor, joint, &[0.2])], SignForm::Exact);
+            for point in points(&model, 100, 6) {
+                let found = model.program.eval(&point);
+                let (inertia, bare) = point.split_last().unwrap();
+                // The bare rig, driven by what the rotor leaves of the torque, moves the same way.
+                let mut left = bare.to_vec();
+                left[2 * n + joint] -= inertia * found[n + joint];
+                for (j, wanted) in oracle(&left).into_iter().enumerate() {
+                    assert_near(found[n + j], wanted, ROUNDING, name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn torque_effects_come_before_forces_and_in_their_order() {
+    let library = Library::built_in();
+    let effect = |name: &str, values: &[f64]| fitted(library.effect(name).unwrap(), 0, values);
+    let load = effect("load_friction", &[0.2]);
+    let gain = effect("actuator_gain", &[0.5]);
+    let limit = effect("actuator_saturation", &[1.2]);
+    let drive = system("drive");
+    let at = |effects: &[_], tau: f64| {
+        let model = dynamics(&drive, effects, SignForm::Exact);
+        let inputs = [&[0.0, 1.0, tau, 0.0], model.values().as_slice()].concat();
+        model.program.eval(&inputs)[1]
+    };
+    // The gear sees 1.5 N m of a commanded 1 N m, wherever in the list the friction stands.
+    assert_near(
+        at(&[load.clone(), gain.clone()], 1.0),
+        1.5 - 0.2 * 1.5,
+        ROUNDING,
+        "load",
+    );
+    assert_near(
+        at(&[gain.clone(), load], 1.0),
+        1.5 - 0.2 * 1.5,
+        ROUNDING,
+        "load",
+    );
+    assert_near(
+        at(&[gain.clone(), limit.clone()], 1.0),
+        1.2,
+        ROUNDING,
+        "gain, then limit",
+    );
+    assert_near(at(&[limit, gain], 1.4), 1.8, ROUNDING, "limit, then gain");
+}
+
+#[test]
+fn every_effect_file_is_tested_here() {
+    let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
+    tested.extend(["gravity_tilt", "rotor_inertia"]);
+    tested.sort_unstable();
+    let library = Library::built_in();
+    let known: Vec<&str> = library.effects().iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(known, tested);
+}
+
+#[test]
+fn an_effect_of_a_users_folder_acts() {
+    let library = library_with_user_effect();
+    let effect = library.effect("eddy_brake").unwrap();
+    let model = dynamics(
+        &system("drive"),
+        &[fitted(effect, 0, &[0.3, 2.0])],
+        SignForm::Exact,
+    );
+    for point in points(&model, 50, 8) {
+        let [_, v, tau, _, m, most, at] = point[..].try_into().unwrap();
+        let wanted = (tau - 2.0 * most * v * at / (at * at + v * v)) / m;
+        assert_near(
+            model.program.eval(&point)[1],
+            wanted,
+            ROUNDING,
+            "eddy_brake",
+        );
+    }
+}
+
+#[test]
+fn an_effect_of_a_users_folder_replaces_one_of_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = USER_EFFECT.replace("eddy_brake", "viscous_friction");
+    std::fs::write(folder.path().join("any.toml"), text).unwrap();
+    let built_in = Library::built_in();
+    let library = Library::built_in().with_folder(folder.path()).unwrap();
+    assert_eq!(library.effects().len(), built_in.effects().len());
+    let parameters = &library.effect("viscous_friction").unwrap().parameters;
+    assert_eq!(parameters[0].name, "T_m");
+}

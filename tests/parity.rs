@@ -1,0 +1,129 @@
+//! One function, whoever reads the program: f64, f32, many lanes, Burn's tensors.
+
+use burn::tensor::{Device, Tensor};
+use residyn::expr::{Program, SignForm};
+
+use crate::common::{assert_near, catalog, column, devices, in_f32, numbers, points, tensor};
+
+/// f32 keeps 24 bits, 6e-8 of a value. The accelerations here are sums of terms up to some tens whose
+/// angles (up to 12 q) are rounded as well: measured up to 5e-6 of max(1, value).
+const F32: f64 = 1e-5;
+const ROWS: usize = 48;
+
+const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.05 }];
+
+fn cases() -> impl Iterator<Item = (String, Program, Vec<Vec<f64>>)> {
+    SIGNS
+        .into_iter()
+        .flat_map(catalog)
+        .enumerate()
+        .map(|(k, case)| {
+            let points = points(&case.dynamics, ROWS, k as u64);
+            (case.name, case.dynamics.program, points)
+        })
+}
+
+#[test]
+fn eight_lanes_are_one_lane_to_the_last_bit() {
+    for (name, program, points) in cases() {
+        let mut tape = program.tape::<f64, 8>();
+        for points in points.chunks_exact(8) {
+            for (k, slot) in tape.inputs().iter_mut().enumerate() {
+                *slot = std::array::from_fn(|lane| points[lane][k]);
+            }
+            tape.run();
+            for (lane, point) in points.iter().enumerate() {
+                let many: Vec<f64> = (0..program.output_count())
+                    .map(|o| tape.output(o)[lane])
+                    .collect();
+                assert_eq!(many, program.eval(point), "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sixteen_lanes_of_f32_are_f64() {
+    for (name, program, points) in cases() {
+        compare(&name, &program, &points, &in_f32(&program, &points));
+    }
+}
+
+#[test]
+fn burn_replays_the_program() {
+    for device in devices() {
+        for (name, program, points) in cases() {
+            let inputs: Vec<Tensor<1>> = (0..program.inputs().len())
+                .map(|k| tensor(&column(&points, k), &device))
+                .collect();
+            compare(&name, &program, &points, &replay(&program, &inputs));
+        }
+    }
+}
+
+#[test]
+fn burn_replays_inputs_that_all_rows_share() {
+    for device in devices() {
+        for (name, program, points) in cases() {
+            // Every third input is shared by all rows, from a different one on in each case.
+            let shared = |k: usize| (k + name.len()) % 3 == 0;
+            check_shared(&name, &program, &points, &device, shared);
+            // All are shared but the first, as parameters and a constant torque are.
+            check_shared(&name, &program, &points, &device, |k| k > 0);
+        }
+    }
+}
+
+fn check_shared(
+    name: &str,
+    program: &Program,
+    points: &[Vec<f64>],
+    device: &Device,
+    shared: impl Fn(usize) -> bool,
+) {
+    let mut points = points.to_vec();
+    let first = points[0].clone();
+    for point in &mut points {
+        (0..first.len())
+            .filter(|k| shared(*k))
+            .for_each(|k| point[k] = first[k]);
+    }
+    let inputs: Vec<Tensor<1>> = (0..first.len())
+        .map(|k| match shared(k) {
+            true => tensor(&first[k..=k], device),
+            false => tensor(&column(&points, k), device),
+        })
+        .collect();
+    compare(name, program, &points, &replay(program, &inputs));
+}
+
+/// `[row][output]`; outputs that all rows share are repeated.
+fn replay(program: &Program, inputs: &[Tensor<1>]) -> Vec<Vec<f64>> {
+    let outputs: Vec<Vec<f64>> = program.replay(inputs).into_iter().map(numbers).collect();
+    let of_row = |values: &Vec<f64>, row: usize| match values.len() {
+        1 => values[0],
+        rows => {
+            assert_eq!(rows, ROWS);
+            values[row]
+        }
+    };
+    (0..ROWS)
+        .map(|row| outputs.iter().map(|values| of_row(values, row)).collect())
+        .collect()
+}
+
+fn compare(name: &str, program: &Program, points: &[Vec<f64>], found: &[Vec<f64>]) {
+    assert_eq!(points.len(), found.len());
+    for (point, found) in points.iter().zip(found) {
+        for (found, wanted) in found.iter().zip(program.eval(point)) {
+            assert_near(*found, wanted, F32, name);
+        }
+    }
+}
+
+#[test]
+fn the_catalog_is_whole() {
+    // 4 systems and 6 joints; 19 shapes (14 effects, 4 probes, a user's own) on each joint, but no
+    // tilt on a second joint and no rotor in the pendulum.
+    assert_eq!(catalog(SignForm::Exact).len(), 4 + 6 * 19 - 2 - 1);
+}
