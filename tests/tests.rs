@@ -1,5 +1,8 @@
 //! One binary for all integration tests: Burn is linked once.
 
+// In tests a panic is the message.
+#![allow(clippy::unwrap_used)]
+
 mod bad_input;
 mod clients;
 mod common;
