@@ -20,12 +20,7 @@ pub fn candidates(
                 .iter()
                 .any(|p| p.joint == joint && p.effect.name == effect.name);
             if !there && can_act(study, effect, joint) {
-                all.push(FittedEffect {
-                    effect: effect.clone(),
-                    joint,
-                    values: vec![(0.0, None); effect.parameters.len()],
-                    fixed: false,
-                });
+                all.push(FittedEffect::absent(effect, joint));
             }
         }
     }

@@ -1,10 +1,11 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::bootstrap::reduction_interval;
+use super::folds::{folds, left_out_losses};
 use super::learn::learn_residual;
 use super::outcome::{Alternative, Errors, Finding, Outcome, Verdict};
 use super::residual::residual_force;
-use super::select::{Selection, p_value, select};
+use super::select::{Selection, p_of_gains, p_value, select};
 use super::split::Split;
 use super::study::{Fitted, Study, StudyError};
 use super::unexplained::{Unexplained, unexplained};
@@ -184,7 +185,7 @@ fn findings(
     with: &Assessment,
     judge: impl Fn(&Fitted) -> Assessment,
 ) -> Vec<Finding> {
-    let declared = study.system.effects.len();
+    let folds = folds(&study.shooting);
     let finding = |k: usize| {
         let own = parameters[model.range_of(k)].to_vec();
         let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
@@ -192,25 +193,34 @@ fn findings(
         for (slot, parameter) in effect.values.iter_mut().zip(&own) {
             *slot = (parameter.value, parameter.ci95);
         }
-        let without = without(study, model, k).map(|model| judge(&model));
-        Finding {
+        let without = without(study, model, k)?;
+        let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
+        Some(Finding {
             expression: effect.expression(&names),
             effect,
             parameters: own,
-            p_value: p_value(study, model, k).unwrap_or(0.0),
-            error_reduction: without
-                .map_or(0.0, |w| 1.0 - rms(with) / rms(&w).max(f64::MIN_POSITIVE)),
-        }
+            p_value: p_value(study, model, k)
+                .unwrap_or_else(|| p_of_gains(&losses(&without), &losses(model))),
+            error_reduction: 1.0 - rms(with) / rms(&judge(&without)).max(f64::MIN_POSITIVE),
+        })
     };
-    (declared..model.effects.len()).map(finding).collect()
+    let declared = study.system.effects.len();
+    (declared..model.effects.len())
+        .filter_map(finding)
+        .collect()
 }
 
-/// The model refitted without its k-th effect.
+/// The model refitted without its k-th effect, its residuals on the same scale.
 fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Option<Fitted> {
     let mut effects = model.effects.clone();
     effects.remove(k);
     study
-        .refit(&effects, &model.declared, model.fit.locals.clone(), None)
+        .refit(
+            &effects,
+            &model.declared,
+            model.fit.locals.clone(),
+            Some(model.fit.scale),
+        )
         .ok()
 }
 

@@ -70,12 +70,7 @@ pub fn unexplained(
 
 fn ask(study: &Study<'_>, model: &Fitted, probe: &Effect, joint: usize) -> Option<(f64, Fitted)> {
     let mut effects = model.effects.clone();
-    effects.push(FittedEffect {
-        effect: probe.clone(),
-        joint,
-        values: vec![(0.0, None); probe.parameters.len()],
-        fixed: false,
-    });
+    effects.push(FittedEffect::absent(probe, joint));
     let scale = Some(model.fit.scale);
     let fitted = study
         .refit(&effects, &model.declared, model.fit.locals.clone(), scale)

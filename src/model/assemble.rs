@@ -1,4 +1,4 @@
-use super::effect::{EFFECT_NAMES, Entry};
+use super::effect::{EFFECT_NAMES, Effect, Entry};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
 use super::{Dynamics, Parameter};
@@ -39,6 +39,16 @@ impl System {
 }
 
 impl FittedEffect {
+    /// The effect on a joint (counted from 0) with all parameters zero.
+    pub fn absent(effect: &Effect, joint: usize) -> Self {
+        Self {
+            effect: effect.clone(),
+            joint,
+            values: vec![(0.0, None); effect.parameters.len()],
+            fixed: false,
+        }
+    }
+
     /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
     pub fn expression(&self, names: &[String]) -> String {
         let mut graph = Graph::new();

@@ -52,6 +52,13 @@ pub struct EffectParameter {
     pub whole: bool,
 }
 
+impl EffectParameter {
+    /// Whether the parameter at zero leaves the rig as it is.
+    pub fn is_switch(&self) -> bool {
+        self.starts == [0.0]
+    }
+}
+
 /// A physical effect that a model may lack: one file of `models/effects`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
