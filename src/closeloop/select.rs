@@ -112,7 +112,7 @@ fn round(
             candidate.effect.name,
             candidate.joint + 1
         ));
-        let beside = beside(model, candidate);
+        let beside = beside(study, model, candidate);
         screened.extend(beside.and_then(|beside| best_start(study, &beside, candidate)));
     }
     // A step that starts far from "absent" promises little truth: such candidates are always fitted.
@@ -142,9 +142,10 @@ fn round(
     }
 }
 
-/// The model that a candidate joins: without the simpler effects that it contains. `None` if the model has
+/// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
+/// them. `None` if the model has
 /// an effect that contains the candidate.
-fn beside(model: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
+fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
     let contains = |a: &FittedEffect, b: &FittedEffect| {
         a.joint == b.joint && a.effect.contains.contains(&b.effect.name)
     };
@@ -156,9 +157,12 @@ fn beside(model: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
         return None;
     }
     let mut beside = model.clone();
-    beside
-        .effects
-        .retain(|present| !contains(candidate, present));
+    let found = beside.effects.split_off(study.system.effects.len());
+    beside.effects.extend(
+        found
+            .into_iter()
+            .filter(|present| !contains(candidate, present)),
+    );
     Some(beside)
 }
 
@@ -170,7 +174,7 @@ fn weigh(
     folds: &[usize],
     before: &[f64],
 ) -> Option<Evidence> {
-    let mut effects = beside(model, &start)?.effects;
+    let mut effects = beside(study, model, &start)?.effects;
     effects.push(start);
     let scale = Some(model.fit.scale);
     let fitted = study
@@ -291,7 +295,7 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
 /// Drop effects that a later one has made needless, or put simpler ones in their place that now do as well.
 fn simplified(study: &Study<'_>, library: &[Effect], model: Fitted, folds: &[usize]) -> Fitted {
     let with: f64 = left_out_losses(&model.fit, folds).iter().sum();
-    for effects in simpler(library, &model.effects) {
+    for effects in simpler(library, &model.effects, study.system.effects.len()) {
         let scale = Some(model.fit.scale);
         let locals = model.fit.locals.clone();
         let Ok(less) = study.refit(&effects, &model.declared, locals, scale) else {
@@ -305,10 +309,15 @@ fn simplified(study: &Study<'_>, library: &[Effect], model: Fitted, folds: &[usi
     model
 }
 
-/// Every set of effects that is one step simpler: one effect less, or one replaced by one that it contains.
-fn simpler(library: &[Effect], effects: &[FittedEffect]) -> Vec<Vec<FittedEffect>> {
+/// Every set of effects that is one step simpler: one effect less, or one replaced by one that it contains. The
+/// first `declared` ones stay.
+fn simpler(
+    library: &[Effect],
+    effects: &[FittedEffect],
+    declared: usize,
+) -> Vec<Vec<FittedEffect>> {
     let mut all = Vec::new();
-    for k in 0..effects.len() {
+    for k in declared..effects.len() {
         let mut without = effects.to_vec();
         let old = without.remove(k);
         let contained = library
