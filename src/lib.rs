@@ -1,4 +1,42 @@
 //! Residyn: from a rig's log to the physical effect that its model lacks.
+//!
+//! A model is a file: its equations are parsed once into one small program ([`expr::Program`]), and
+//! everything else reads that program. [`closeloop`] fits a declared model to logs and names the effects
+//! that it lacks; [`evaluate`] measures how far a model runs from logs; [`plant`] simulates rigs with effects
+//! that nobody is told about; [`train`] trains hybrid models of physics and a network. The binary
+//! `residyn` is a thin layer over these modules.
+//!
+//! The library prints nothing outside of [`cli`], reads no clock, and takes its random numbers as an argument.
+//!
+//! # Example
+//!
+//! Record a simulated pendulum that has friction, and measure how far the declared model, which has none, runs
+//! from that log:
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use rand::SeedableRng;
+//! use residyn::evaluate::{assess, summarise};
+//! use residyn::expr::SignForm;
+//! use residyn::model::Library;
+//! use residyn::plant::Plant;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let library = Library::built_in();
+//! let mut rig = Plant::read(Path::new("pendulum"), &library)?;
+//! rig.add_effect(&library, "coulomb_friction", 1, &[("F_c".to_owned(), 0.2)])?;
+//! let log = rig.record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
+//!
+//! let declared = library.system(Path::new("pendulum"))?.dynamics(&[SignForm::DEFAULT]);
+//! let values = declared.values();
+//! let errors = assess(&declared, |_| &values, &[log], &[0.5]);
+//! let summary = summarise(&errors.horizons, declared.joints);
+//! assert!(summary.position_rmse[0][0] > 0.01, "friction shows within half a second");
+//! # Ok(())
+//! # }
+//! ```
+
 pub mod cli;
 pub mod closeloop;
 pub mod data;
