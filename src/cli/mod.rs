@@ -2,10 +2,13 @@
 
 mod closeloop;
 mod evaluate;
+mod fitting;
 mod inputs;
 mod list;
 mod progress;
 mod simulate;
+mod train;
+mod tune;
 
 use std::process::ExitCode;
 
@@ -29,6 +32,8 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Closeloop(closeloop::Arguments),
+    Train(train::Arguments),
+    Tune(tune::Arguments),
     Evaluate(evaluate::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
@@ -59,6 +64,8 @@ enum Answer {
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Tune(arguments) => tune::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
