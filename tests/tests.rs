@@ -1,1 +1,3 @@
 //! One binary for all integration tests: Burn is linked once.
+
+mod train;

@@ -36,9 +36,7 @@ impl<'d> Environment<'d> {
         };
         Self {
             method: match integrator {
-                Integrator::SemiImplicitEuler => {
-                    Method::SemiImplicitEuler(tape(dynamics, values))
-                }
+                Integrator::SemiImplicitEuler => Method::SemiImplicitEuler(tape(dynamics, values)),
                 Integrator::Rk4 => runge_kutta(1),
                 Integrator::Fine { steps } => runge_kutta(steps.get() as usize),
             },
@@ -129,11 +127,13 @@ mod tests {
                 .step(&mut state, &tau, 0.0);
             let prepared = model.prepare();
             let (columns, inputs) = (start.map(column), tau.map(column));
-            let step =
-                integrator.step(&prepared, &columns, &inputs, &column(0.0), &column(0.02));
+            let step = integrator.step(&prepared, &columns, &inputs, &column(0.0), &column(0.02));
             for (mine, trained) in state.iter().zip(step.state) {
                 let trained = f64::from(trained.into_scalar::<f32>());
-                assert!((mine - trained).abs() < 1e-5, "{mine} {trained} {integrator:?}");
+                assert!(
+                    (mine - trained).abs() < 1e-5,
+                    "{mine} {trained} {integrator:?}"
+                );
             }
         }
     }

@@ -1,8 +1,8 @@
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::file::{Plant, PlantError};
 use super::Environment;
+use super::file::{Plant, PlantError};
 use crate::closeloop::joined;
 use crate::data::Trajectory;
 use crate::model::Integrator;
@@ -86,11 +86,16 @@ impl Sampling {
             }
             let sound = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
             if let Some(bad) = ranges.iter().find(|range| !sound(range)) {
-                return Err(format!("`{name}` has the range {bad:?}; write [lowest, highest]"));
+                return Err(format!(
+                    "`{name}` has the range {bad:?}; write [lowest, highest]"
+                ));
             }
         }
         if !(self.step_s > 0.0 && self.step_s.is_finite()) {
-            return Err(format!("`step_s` is {}; it must be above zero", self.step_s));
+            return Err(format!(
+                "`step_s` is {}; it must be above zero",
+                self.step_s
+            ));
         }
         if self.trajectories == 0 || self.length == 0 {
             return Err("`trajectories` and `length` must be at least 1".to_owned());
@@ -106,7 +111,9 @@ impl Sampling {
                 _ => Draw {
                     position: uniform(&self.position, rng),
                     velocity: uniform(&self.velocity, rng),
-                    torque: (0..self.length).map(|_| uniform(&self.torque, rng)).collect(),
+                    torque: (0..self.length)
+                        .map(|_| uniform(&self.torque, rng))
+                        .collect(),
                 },
             };
             draws.push(draw);
@@ -153,4 +160,59 @@ fn uniform(ranges: &[[f64; 2]], rng: &mut impl Rng) -> Vec<f64> {
         .iter()
         .map(|[low, high]| rng.random_range(*low..=*high))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Sampling, Starts};
+    use crate::model::{Integrator, Library};
+    use crate::plant::Plant;
+
+    fn sampling() -> Sampling {
+        Sampling {
+            trajectories: 3,
+            length: 2,
+            step_s: 0.02,
+            integrator: Integrator::SemiImplicitEuler,
+            position: vec![[-1.0, 1.0]],
+            velocity: vec![[-8.0, 8.0]],
+            torque: vec![[-3.0, 3.0]],
+            starts: Starts::Mirrored,
+        }
+    }
+
+    #[test]
+    fn a_mirrored_start_differs_in_the_sign_of_its_velocity_alone() {
+        let plant = Plant::read(Path::new("pendulum"), &Library::built_in()).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let drawn = plant.sample(&sampling(), &mut rng).unwrap();
+        let [first, second, third] = drawn.as_slice() else {
+            panic!("three were asked for")
+        };
+        assert_eq!(first.states[..2], [second.states[0], -second.states[1]]);
+        assert_eq!(first.inputs, second.inputs);
+        assert_ne!(first.inputs, third.inputs);
+        assert_eq!(first.time, [0.0, 0.02, 0.04]);
+        // v' = v + h (15 sin q + 3 tau), q' = q + h v'
+        let (q, v, tau) = (first.states[0], first.states[1], first.inputs[0]);
+        let next = v + 0.02 * (15.0 * q.sin() + 3.0 * tau);
+        assert!((first.states[3] - next).abs() < 1e-12);
+        assert!((first.states[2] - (q + 0.02 * next)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ranges_that_do_not_suit_the_rig_are_refused() {
+        let plant = Plant::read(Path::new("acrobot"), &Library::built_in()).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let message = plant.sample(&sampling(), &mut rng).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "`position` needs a range [lowest, highest] for each of 2 joints, found 1"
+        );
+    }
 }

@@ -1,16 +1,12 @@
 use serde_json::Value;
 
-/// The first place, in order of keys, where two configurations differ, in words; none where they do not.
+/// The first place within `place`, in order of keys, where two configurations differ, in words.
 pub(super) fn first_difference(place: &str, saved: &Value, mine: &Value) -> Option<String> {
     if let (Value::Object(saved), Value::Object(mine)) = (saved, mine) {
         let keys = saved.keys().chain(mine.keys());
         return keys
             .filter_map(|key| {
-                let place = if place.is_empty() {
-                    key.clone()
-                } else {
-                    format!("{place}.{key}")
-                };
+                let place = format!("{place}.{key}");
                 let of = |map: &serde_json::Map<String, Value>| {
                     map.get(key).cloned().unwrap_or(Value::Null)
                 };
@@ -30,16 +26,16 @@ mod tests {
     #[test]
     fn the_place_and_both_values_are_named() {
         let saved = json!({"seed": 1, "fit": {"epochs": 40, "integrator": "rk4"}});
-        assert_eq!(first_difference("", &saved, &saved), None);
+        assert_eq!(first_difference("run", &saved, &saved), None);
         let mine = json!({"seed": 1, "fit": {"epochs": 50, "integrator": "rk4"}});
         assert_eq!(
-            first_difference("", &saved, &mine).unwrap(),
-            "its `fit.epochs` is 40, here it is 50"
+            first_difference("run", &saved, &mine).unwrap(),
+            "its `run.fit.epochs` is 40, here it is 50"
         );
         let more = json!({"seed": 1, "fit": {"epochs": 40, "integrator": "rk4"}, "from": 3});
         assert_eq!(
-            first_difference("", &saved, &more).unwrap(),
-            "its `from` is null, here it is 3"
+            first_difference("run", &saved, &more).unwrap(),
+            "its `run.from` is null, here it is 3"
         );
     }
 }

@@ -22,6 +22,11 @@ pub enum RecipeError {
         path: PathBuf,
         source: SegmentsError,
     },
+    #[error("{path}: `model` is not what the checkpoint holds: {source}", path = .path.display())]
+    OtherModel {
+        path: PathBuf,
+        source: CheckpointError,
+    },
     #[error(
         "{dir} holds the checkpoint of another run: {difference}; give another folder with --out, or \
          remove this one to start anew",

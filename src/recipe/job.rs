@@ -6,9 +6,7 @@ use super::difference::first_difference;
 use super::material::{Purpose, stream};
 use super::{Kind, Material, Recipe, RecipeError};
 use crate::expr::SignForm;
-use crate::model::{
-    Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, System,
-};
+use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, System};
 use crate::train::{Backend, Checkpoint, Origin, Training};
 
 /// A recipe with all that it names read and drawn: the start of a run, or of its continuation.
@@ -95,13 +93,20 @@ impl Job {
 
     /// What tells this run from that of a checkpoint; none where they are the same.
     fn difference(&self, checkpoint: &Checkpoint) -> Option<String> {
-        let manifest = &checkpoint.manifest;
-        let mine = json!({"seed": self.origin.seed, "config": self.origin.config});
-        let saved = json!({"seed": manifest.seed, "config": manifest.config});
-        first_difference("", &saved, &mine).or_else(|| {
-            let same = checkpoint.model_toml == self.origin.model_toml;
+        let (saved, mine) = (&checkpoint.manifest, &self.origin);
+        let settings = || {
+            // The data come last: where a seed or a setting differs, that is what to say.
+            ["command", "recipe", "device", "from", "data"]
+                .into_iter()
+                .find_map(|key| first_difference(key, &saved.config[key], &mine.config[key]))
+        };
+        let text = || {
+            let same = checkpoint.model_toml == mine.model_toml;
             (!same).then(|| "its model file has another text".to_owned())
-        })
+        };
+        first_difference("seed", &json!(saved.seed), &json!(mine.seed))
+            .or_else(settings)
+            .or_else(text)
     }
 }
 

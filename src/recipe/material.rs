@@ -77,9 +77,11 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
             return Err(in_file(&log.path)(SegmentsError::TooShort { rows, steps }));
         }
     }
-    let notes = logs
-        .iter()
-        .flat_map(|log| log.notes.iter().map(|note| format!("{}: {note}", log.name())));
+    let notes = logs.iter().flat_map(|log| {
+        log.notes
+            .iter()
+            .map(|note| format!("{}: {note}", log.name()))
+    });
     Ok(Material {
         training,
         test: None,

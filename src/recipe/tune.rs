@@ -33,7 +33,13 @@ impl Job {
         }
         // Only to refuse a checkpoint of another system: the equations come from beside the weights.
         let meant = equations(&declared(&recipe, library)?.system);
-        checkpoint.model(&meant, &backend.device())?;
+        let refused = |source| RecipeError::OtherModel {
+            path: recipe.path.clone(),
+            source,
+        };
+        checkpoint
+            .model(&meant, &backend.device())
+            .map_err(refused)?;
         tuned(checkpoint, recipe, library, backend, seed)
     }
 
@@ -93,7 +99,11 @@ fn tuned(
 
 fn beside(checkpoint: &Checkpoint, library: &Library) -> Result<System, RecipeError> {
     let name = Path::new("the checkpoint's model.toml");
-    Ok(System::from_text(name, &checkpoint.model_toml, library.effects())?)
+    Ok(System::from_text(
+        name,
+        &checkpoint.model_toml,
+        library.effects(),
+    )?)
 }
 
 fn kind_of(checkpoint: &Checkpoint) -> Kind {
