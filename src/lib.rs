@@ -45,5 +45,6 @@ pub mod expr;
 pub mod identify;
 pub mod model;
 pub mod plant;
+pub mod recipe;
 pub mod report;
 pub mod train;

@@ -14,3 +14,4 @@ mod measured;
 mod oracles;
 mod parity;
 mod support;
+mod train;

@@ -3,10 +3,13 @@
 mod audit;
 mod closeloop;
 mod evaluate;
+mod fitting;
 mod inputs;
 mod list;
 mod progress;
 mod simulate;
+mod train;
+mod tune;
 
 use std::process::ExitCode;
 
@@ -31,6 +34,8 @@ struct Cli {
 enum Command {
     Closeloop(closeloop::Arguments),
     Audit(audit::Arguments),
+    Train(train::Arguments),
+    Tune(tune::Arguments),
     Evaluate(evaluate::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
@@ -62,6 +67,8 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
         Command::Audit(arguments) => audit::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Tune(arguments) => tune::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),

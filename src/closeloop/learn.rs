@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use rand_chacha::ChaCha8Rng;
 
 use super::study::{Fitted, Study};
-use crate::data::{Log, half_width_s, local_cubic};
+use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
     Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
 };
@@ -91,7 +91,12 @@ fn fit_settings() -> FitSettings {
 
 /// Segments to train on and to choose the epoch by; `None` where the logs give too few.
 fn segments(study: &Study<'_>) -> Option<(Segments, Segments)> {
-    let stretches: Vec<Smooth> = study.logs.iter().flat_map(stretches).collect();
+    let thinning = Thinning {
+        step_s: STEP_S,
+        length_s: STRETCH_S,
+    };
+    let of_log = |log: &Log| trajectories(log, thinning);
+    let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
     let stride = (rows / SEGMENTS).max(1);
     let mut sets = [
@@ -105,56 +110,4 @@ fn segments(study: &Study<'_>) -> Option<(Segments, Segments)> {
     }
     let [training, validation] = sets;
     (!training.is_empty() && !validation.is_empty()).then_some((training, validation))
-}
-
-/// Smoothed states of a stretch of a log, rows put together to steps of about [`STEP_S`].
-#[derive(Default)]
-struct Smooth {
-    time: Vec<f64>,
-    /// `[row][2n]`
-    states: Vec<f64>,
-    /// `[row][n]`: the mean torque until the next row.
-    inputs: Vec<f64>,
-}
-
-fn stretches(log: &Log) -> Vec<Smooth> {
-    let step = log.median_step();
-    let half_width = half_width_s(step);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
-    let merged = ((STEP_S / step).round() as usize).max(1);
-    let mut all = vec![Smooth::default()];
-    for first in (0..log.rows().saturating_sub(merged)).step_by(merged) {
-        let (from, to) = (log.time[first], log.time[first + merged]);
-        let broken = to - from > 2.0 * step * merged as f64
-            || log
-                .leave_out
-                .iter()
-                .any(|span| span.start_s <= to && span.end_s >= from);
-        let states: Option<Vec<_>> = log
-            .q
-            .iter()
-            .map(|q| local_cubic(&log.time, q, first, half_width))
-            .collect();
-        let current = all.last_mut().expect("there is always one");
-        let full = current
-            .time
-            .first()
-            .is_some_and(|start| from - start >= STRETCH_S);
-        match states {
-            Some(states) if !broken => {
-                current.time.push(from);
-                current.states.extend(states.iter().map(|s| s.value));
-                current.states.extend(states.iter().map(|s| s.slope));
-                #[allow(clippy::cast_precision_loss)] // few rows
-                let mean =
-                    |tau: &Vec<f64>| tau[first..first + merged].iter().sum::<f64>() / merged as f64;
-                current.inputs.extend(log.tau.iter().map(mean));
-                if full {
-                    all.push(Smooth::default());
-                }
-            }
-            _ => all.push(Smooth::default()),
-        }
-    }
-    all
 }

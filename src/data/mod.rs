@@ -17,6 +17,7 @@ mod local_cubic;
 mod log;
 mod read;
 mod signal;
+mod trajectory;
 
 pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueLag, VelocityCheck, audit,
@@ -26,3 +27,4 @@ pub use error::{CellFault, LogError};
 pub use leave_out::{LeaveOut, LeaveOutError};
 pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};
+pub use trajectory::{Thinning, Trajectory, trajectories};

@@ -17,6 +17,8 @@ pub enum PlantError {
     File { path: PathBuf, message: String },
     #[error("{0}")]
     Effect(String),
+    #[error("{0}")]
+    Sampling(String),
     #[error(
         "the simulated rig diverges at {time_s:.3} s; give it less torque, or parameters of a real rig"
     )]

@@ -1,8 +1,12 @@
 //! Simulated rigs: a model with effects that nobody is told about, driven and measured as a rig is.
 
+mod environment;
 mod excitation;
 mod file;
+mod sampling;
 mod simulate;
 
+pub use environment::Environment;
 pub use excitation::Excitation;
 pub use file::{Plant, PlantError, Sensor};
+pub use sampling::{Sampling, Starts};

@@ -171,6 +171,18 @@ impl Checkpoint {
         })
     }
 
+    /// The checkpoint in `dir`, or none where `dir` does not exist or is empty.
+    ///
+    /// # Errors
+    /// As [`Checkpoint::load`], or a directory that holds something else.
+    pub fn find(dir: &Path) -> Result<Option<Self>, CheckpointError> {
+        refuse_other_contents(dir)?;
+        if dir.join(MANIFEST).is_file() || (!dir.exists() && previous(dir).exists()) {
+            return Self::load(dir).map(Some);
+        }
+        Ok(None)
+    }
+
     /// The trained model, on `device`. `dynamics` is what the checkpoint's model file says.
     ///
     /// # Errors

@@ -171,6 +171,19 @@ impl Segments {
         self.steps
     }
 
+    /// A number that tells apart segments of other contents: FNV-1a over all bits. It finds changed
+    /// data; it is no protection against anyone.
+    pub fn fingerprint(&self) -> u64 {
+        let numbers = [&self.states, &self.inputs, &self.dt, &self.start];
+        let numbers = numbers.into_iter().flatten().map(|x| x.to_bits());
+        #[allow(clippy::cast_possible_truncation)] // few joints and steps
+        let shape = [self.joints as u32, self.steps as u32];
+        let bytes = shape.into_iter().chain(numbers).flat_map(u32::to_le_bytes);
+        bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
+
     /// Mean and spread of the features that a network sees, over all steps.
     pub fn scaling(&self, angles: Angles) -> InputScaling {
         let n = self.joints;

@@ -1,0 +1,90 @@
+//! What `train` and `tune` share: run a job with a bar and checkpoints, print what came of it.
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+
+use super::{Answer, Common, inputs, progress};
+use crate::recipe::Job;
+use crate::train::{Progress, Training, save};
+
+/// Where and how often to save.
+#[derive(Debug, Args)]
+pub(super) struct Saving {
+    /// Folder of the checkpoint; an interrupted run in it goes on where its last checkpoint left it
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Epochs between checkpoints; one is also written when 10 s have passed
+    #[arg(long, default_value = "500", value_name = "EPOCHS")]
+    save_every: NonZeroUsize,
+}
+
+/// So much work at most is lost when a run is interrupted.
+const LONGEST_UNSAVED: Duration = Duration::from_secs(10);
+
+impl Saving {
+    /// The folder asked for, or a name made from that of what the run begins with.
+    pub(super) fn folder(&self, source: &Path, ending: &str) -> PathBuf {
+        let named = || {
+            let stem = source.file_stem().unwrap_or_default();
+            format!("{}-{ending}", stem.to_string_lossy()).into()
+        };
+        self.out.clone().unwrap_or_else(named)
+    }
+}
+
+/// Run `job` to its end and print the outcome.
+pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common) -> Result<Answer> {
+    inputs::check_writable(dir)?;
+    for note in &job.material.notes {
+        eprintln!("note: {note}");
+    }
+    let mut training = job.begin(dir)?;
+    if training.epoch() > 0 {
+        eprintln!(
+            "note: {} goes on from epoch {}",
+            dir.display(),
+            training.epoch()
+        );
+    }
+    run(job, &mut training, dir, saving)?;
+    let outcome = job.outcome(&training, dir)?;
+    if common.json {
+        inputs::print(&(serde_json::to_string_pretty(&outcome)? + "\n"))?;
+    } else {
+        inputs::print(&outcome.text())?;
+    }
+    Ok(Answer::Yes)
+}
+
+fn run(job: &Job, training: &mut Training, dir: &Path, saving: &Saving) -> Result<()> {
+    let bar = progress::bar(training.settings().epochs);
+    let mut saved = Instant::now();
+    let mut failed = None;
+    let mut observer = |at: &Progress| {
+        bar.set_position(at.epoch as u64);
+        bar.set_message(format!("epochs, loss {:.3e}", at.loss));
+        let due = at.epoch.is_multiple_of(saving.save_every.get())
+            || at.epoch == at.epochs
+            || saved.elapsed() >= LONGEST_UNSAVED;
+        if due {
+            if let Err(error) = save(dir, at.training, &job.origin) {
+                failed = Some(error);
+                return ControlFlow::Break(());
+            }
+            saved = Instant::now();
+        }
+        ControlFlow::Continue(())
+    };
+    let ended = training.run(&job.material.training, None, &mut observer);
+    bar.finish_and_clear();
+    ended?;
+    match failed {
+        Some(error) => Err(anyhow!(error)).context("training stopped, since it cannot be saved"),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,41 @@
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::fitting::{Saving, carry_out};
+use super::{Answer, Common, inputs};
+use crate::recipe::{Job, Recipe};
+
+/// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant
+///
+/// The same command goes on with a run that was interrupted, and ends with the same numbers.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  residyn train --config configs/train-pendulum.toml --out pendulum --seed 1"
+)]
+pub(super) struct Arguments {
+    /// Training recipe
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    saving: Saving,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let Arguments {
+        config,
+        effects,
+        saving,
+        common,
+    } = arguments;
+    let library = inputs::library(effects)?;
+    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
+    let dir = saving.folder(config, "checkpoint");
+    carry_out(&job, &dir, saving, common)
+}

@@ -1,0 +1,62 @@
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::fitting::{Saving, carry_out};
+use super::{Answer, Common, inputs};
+use crate::recipe::{Job, Recipe};
+use crate::train::Checkpoint;
+
+/// Fine-tune a saved checkpoint on new data (sim-to-real)
+///
+/// The whole model of the checkpoint keeps learning. If it has no residual network, it is given one that starts
+/// as nothing, unless the recipe's `kind` says otherwise.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  residyn tune --checkpoint pendulum --train run1.csv run2.csv --out tuned\n  \
+                  residyn tune --checkpoint pendulum --config configs/tune-pendulum.toml --out tuned"
+)]
+pub(super) struct Arguments {
+    /// Checkpoint to begin with; it is left as it is
+    #[arg(long, value_name = "DIR")]
+    checkpoint: PathBuf,
+    /// Training recipe, without [start] and hold
+    #[arg(long, value_name = "FILE", required_unless_present = "train")]
+    config: Option<PathBuf>,
+    /// Logs to learn from, with the usual settings
+    #[arg(long, num_args = 1.., value_name = "LOG", conflicts_with = "config")]
+    train: Vec<PathBuf>,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    saving: Saving,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let Arguments {
+        checkpoint: from,
+        config,
+        train,
+        effects,
+        saving,
+        common,
+    } = arguments;
+    let library = inputs::library(effects)?;
+    let checkpoint = Checkpoint::load(from)?;
+    let job = match config {
+        Some(config) => {
+            let recipe = Recipe::read(config)?;
+            Job::tune(&checkpoint, recipe, &library, common.device, common.seed)?
+        }
+        None => {
+            let logs = train.clone();
+            Job::tune_on_logs(&checkpoint, logs, &library, common.device, common.seed)?
+        }
+    };
+    let dir = saving.folder(from, "tuned");
+    carry_out(&job, &dir, saving, common)
+}

@@ -1,0 +1,140 @@
+use crate::expr::Tape;
+use crate::model::{Dynamics, Integrator, Rollout};
+
+/// A model that is stepped as a controlled environment is: a fixed step under a held torque, in f64.
+///
+/// The steps are those of [`Integrator`], which does the same on tensors: what a model is trained on and
+/// what it is trained through must not differ.
+pub struct Environment<'d> {
+    method: Method<'d>,
+    joints: usize,
+    step_s: f64,
+}
+
+enum Method<'d> {
+    SemiImplicitEuler(Tape<'d, f64, 1>),
+    RungeKutta {
+        rollout: Rollout<'d, f64, 1>,
+        substeps: usize,
+    },
+}
+
+impl<'d> Environment<'d> {
+    /// `dynamics` with parameters `values`, in its order, in steps of `step_s` seconds.
+    ///
+    /// # Panics
+    /// When `values` has not one entry a parameter.
+    pub fn new(
+        dynamics: &'d Dynamics,
+        values: &[f64],
+        integrator: Integrator,
+        step_s: f64,
+    ) -> Self {
+        let runge_kutta = |substeps: usize| Method::RungeKutta {
+            rollout: Rollout::new(dynamics, values),
+            substeps,
+        };
+        Self {
+            method: match integrator {
+                Integrator::SemiImplicitEuler => Method::SemiImplicitEuler(tape(dynamics, values)),
+                Integrator::Rk4 => runge_kutta(1),
+                Integrator::Fine { steps } => runge_kutta(steps.get() as usize),
+            },
+            joints: dynamics.joints,
+            step_s,
+        }
+    }
+
+    /// Advance `state` (positions, then velocities) by one step from `time_s` under the torque `tau`.
+    ///
+    /// # Panics
+    /// When `state` or `tau` is not of the model's size.
+    pub fn step(&mut self, state: &mut [f64], tau: &[f64], time_s: f64) {
+        match &mut self.method {
+            Method::SemiImplicitEuler(tape) => {
+                semi_implicit(tape, self.joints, state, tau, time_s, self.step_s);
+            }
+            Method::RungeKutta { rollout, substeps } => {
+                let column = |values: &[f64]| values.iter().map(|x| [*x]).collect::<Vec<_>>();
+                let mut lanes = column(state);
+                let (time, step) = ([time_s], [self.step_s]);
+                rollout.advance(&mut lanes, &column(tau), time, step, *substeps);
+                for (value, [lane]) in state.iter_mut().zip(lanes) {
+                    *value = lane;
+                }
+            }
+        }
+    }
+}
+
+fn tape<'d>(dynamics: &'d Dynamics, values: &[f64]) -> Tape<'d, f64, 1> {
+    let expected = dynamics.parameters.len();
+    assert_eq!(values.len(), expected, "one value for each parameter");
+    let mut tape = dynamics.program.tape();
+    let first = 3 * dynamics.joints + 1;
+    for (slot, value) in tape.inputs()[first..].iter_mut().zip(values) {
+        *slot = [*value];
+    }
+    tape
+}
+
+/// v' = v + h f_v, q' = q + h (f_q + h f_v)
+fn semi_implicit(
+    tape: &mut Tape<f64, 1>,
+    joints: usize,
+    state: &mut [f64],
+    tau: &[f64],
+    time_s: f64,
+    step_s: f64,
+) {
+    let inputs = state.iter().chain(tau).chain([&time_s]);
+    for (slot, value) in tape.inputs()[..=3 * joints].iter_mut().zip(inputs) {
+        *slot = [*value];
+    }
+    tape.run();
+    for j in 0..joints {
+        let gain = step_s * tape.output(joints + j)[0];
+        state[j] += step_s * (tape.output(j)[0] + gain);
+        state[joints + j] += gain;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use burn::tensor::{Tensor, TensorData};
+
+    use super::Environment;
+    use crate::expr::SignForm;
+    use crate::model::{HybridModel, Integrator, Library};
+    use crate::train::Backend;
+
+    #[test]
+    fn steps_are_those_of_training() {
+        let system = Library::built_in().system(Path::new("acrobot")).unwrap();
+        let dynamics = system.dynamics(&[SignForm::DEFAULT; 2]);
+        let device = Backend::Flex.device();
+        let model = HybridModel::physics(&dynamics, &device).unwrap();
+        let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);
+        let (start, tau) = ([0.5, -1.0, 2.0, -3.0], [1.0, -2.0]);
+        let fine = Integrator::Fine {
+            steps: 3.try_into().unwrap(),
+        };
+        for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4, fine] {
+            let mut state = start;
+            Environment::new(&dynamics, &dynamics.values(), integrator, 0.02)
+                .step(&mut state, &tau, 0.0);
+            let prepared = model.prepare();
+            let (columns, inputs) = (start.map(column), tau.map(column));
+            let step = integrator.step(&prepared, &columns, &inputs, &column(0.0), &column(0.02));
+            for (mine, trained) in state.iter().zip(step.state) {
+                let trained = f64::from(trained.into_scalar::<f32>());
+                assert!(
+                    (mine - trained).abs() < 1e-5,
+                    "{mine} {trained} {integrator:?}"
+                );
+            }
+        }
+    }
+}

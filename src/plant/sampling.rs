@@ -1,0 +1,218 @@
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
+
+use super::Environment;
+use super::file::{Plant, PlantError};
+use crate::closeloop::joined;
+use crate::data::Trajectory;
+use crate::model::Integrator;
+
+/// Random trajectories of a plant with its exact states: starts uniform in the ranges, a new torque
+/// uniform in its range at every step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sampling {
+    pub trajectories: usize,
+    /// Steps of each; 1 gives transitions that are independent of each other.
+    pub length: usize,
+    pub step_s: f64,
+    pub integrator: Integrator,
+    /// Ranges of the start, one a joint, in rad (or m).
+    pub position: Vec<[f64; 2]>,
+    /// The same for velocities.
+    pub velocity: Vec<[f64; 2]>,
+    /// The same for torques, in N m (or N).
+    pub torque: Vec<[f64; 2]>,
+    pub starts: Starts,
+}
+
+/// How the starts of trajectories hang together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Starts {
+    /// Each is drawn by itself.
+    #[default]
+    Independent,
+    /// Each second one repeats the one before, torques included, with reversed velocities. In transitions
+    /// nothing odd in the velocities, as friction, then correlates by chance with torques and positions.
+    Mirrored,
+}
+
+/// What one trajectory begins with, and its torques, one row a step.
+#[derive(Clone)]
+struct Draw {
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+    torque: Vec<Vec<f64>>,
+}
+
+impl Plant {
+    /// Draw random trajectories.
+    ///
+    /// # Errors
+    /// Ranges that do not suit the plant's joints, or a plant that diverges.
+    pub fn sample(
+        &self,
+        sampling: &Sampling,
+        rng: &mut impl Rng,
+    ) -> Result<Vec<Trajectory>, PlantError> {
+        sampling
+            .check(self.system.joints)
+            .map_err(PlantError::Sampling)?;
+        let dynamics = self.dynamics();
+        let values = joined(&self.parameters, &self.effects);
+        let mut environment =
+            Environment::new(&dynamics, &values, sampling.integrator, sampling.step_s);
+        let draws = sampling.draws(rng);
+        draws
+            .into_iter()
+            .map(|draw| sampling.run(draw, &mut environment))
+            .collect()
+    }
+}
+
+impl Sampling {
+    fn check(&self, joints: usize) -> Result<(), String> {
+        let ranges = [
+            ("position", &self.position),
+            ("velocity", &self.velocity),
+            ("torque", &self.torque),
+        ];
+        for (name, ranges) in ranges {
+            if ranges.len() != joints {
+                let found = ranges.len();
+                return Err(format!(
+                    "`{name}` needs a range [lowest, highest] for each of {joints} joints, found {found}"
+                ));
+            }
+            let sound = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
+            if let Some(bad) = ranges.iter().find(|range| !sound(range)) {
+                return Err(format!(
+                    "`{name}` has the range {bad:?}; write [lowest, highest]"
+                ));
+            }
+        }
+        if !(self.step_s > 0.0 && self.step_s.is_finite()) {
+            return Err(format!(
+                "`step_s` is {}; it must be above zero",
+                self.step_s
+            ));
+        }
+        if self.trajectories == 0 || self.length == 0 {
+            return Err("`trajectories` and `length` must be at least 1".to_owned());
+        }
+        Ok(())
+    }
+
+    fn draws(&self, rng: &mut impl Rng) -> Vec<Draw> {
+        let mut draws: Vec<Draw> = Vec::with_capacity(self.trajectories);
+        for k in 0..self.trajectories {
+            let draw = match (self.starts, draws.last()) {
+                (Starts::Mirrored, Some(last)) if k % 2 == 1 => last.clone().mirrored(),
+                _ => Draw {
+                    position: uniform(&self.position, rng),
+                    velocity: uniform(&self.velocity, rng),
+                    torque: (0..self.length)
+                        .map(|_| uniform(&self.torque, rng))
+                        .collect(),
+                },
+            };
+            draws.push(draw);
+        }
+        draws
+    }
+
+    fn run(&self, draw: Draw, environment: &mut Environment) -> Result<Trajectory, PlantError> {
+        let joints = draw.position.len();
+        let mut state = [draw.position, draw.velocity].concat();
+        let mut trajectory = Trajectory {
+            time: vec![0.0],
+            states: state.clone(),
+            inputs: Vec::new(),
+        };
+        for (tau, step) in draw.torque.iter().zip(1u32..) {
+            let from = trajectory.time[trajectory.time.len() - 1];
+            environment.step(&mut state, tau, from);
+            let time = f64::from(step) * self.step_s;
+            if !state.iter().all(|value| value.is_finite()) {
+                return Err(PlantError::Diverged { time_s: time });
+            }
+            trajectory.time.push(time);
+            trajectory.states.extend(&state);
+            trajectory.inputs.extend(tau);
+        }
+        // Nothing is driven any more after the last row.
+        trajectory.inputs.extend(vec![0.0; joints]);
+        Ok(trajectory)
+    }
+}
+
+impl Draw {
+    fn mirrored(mut self) -> Self {
+        for velocity in &mut self.velocity {
+            *velocity = -*velocity;
+        }
+        self
+    }
+}
+
+fn uniform(ranges: &[[f64; 2]], rng: &mut impl Rng) -> Vec<f64> {
+    ranges
+        .iter()
+        .map(|[low, high]| rng.random_range(*low..=*high))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Sampling, Starts};
+    use crate::model::{Integrator, Library};
+    use crate::plant::Plant;
+
+    fn sampling() -> Sampling {
+        Sampling {
+            trajectories: 3,
+            length: 2,
+            step_s: 0.02,
+            integrator: Integrator::SemiImplicitEuler,
+            position: vec![[-1.0, 1.0]],
+            velocity: vec![[-8.0, 8.0]],
+            torque: vec![[-3.0, 3.0]],
+            starts: Starts::Mirrored,
+        }
+    }
+
+    #[test]
+    fn a_mirrored_start_differs_in_the_sign_of_its_velocity_alone() {
+        let plant = Plant::read(Path::new("pendulum"), &Library::built_in()).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let drawn = plant.sample(&sampling(), &mut rng).unwrap();
+        let [first, second, third] = drawn.as_slice() else {
+            panic!("three were asked for")
+        };
+        assert_eq!(first.states[..2], [second.states[0], -second.states[1]]);
+        assert_eq!(first.inputs, second.inputs);
+        assert_ne!(first.inputs, third.inputs);
+        assert_eq!(first.time, [0.0, 0.02, 0.04]);
+        // v' = v + h (15 sin q + 3 tau), q' = q + h v'
+        let (q, v, tau) = (first.states[0], first.states[1], first.inputs[0]);
+        let next = v + 0.02 * (15.0 * q.sin() + 3.0 * tau);
+        assert!((first.states[3] - next).abs() < 1e-12);
+        assert!((first.states[2] - (q + 0.02 * next)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ranges_that_do_not_suit_the_rig_are_refused() {
+        let plant = Plant::read(Path::new("acrobot"), &Library::built_in()).unwrap();
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let message = plant.sample(&sampling(), &mut rng).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "`position` needs a range [lowest, highest] for each of 2 joints, found 1"
+        );
+    }
+}

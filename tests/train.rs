@@ -1,0 +1,409 @@
+//! `residyn train` and `residyn tune`, through the binary where its face matters.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use residyn::model::Library;
+use residyn::plant::Plant;
+use residyn::recipe::{Job, Outcome, Recipe};
+use residyn::train::{Backend, Penalty};
+use serde_json::Value;
+
+fn configs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")
+}
+
+fn config(name: &str) -> String {
+    configs().join(name).display().to_string()
+}
+
+fn residyn(dir: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
+    command.current_dir(dir).args(arguments);
+    command
+}
+
+fn run(dir: &Path, arguments: &[&str]) -> Output {
+    residyn(dir, arguments).output().unwrap()
+}
+
+/// The JSON of a run that must succeed.
+fn json(dir: &Path, arguments: &[&str]) -> Value {
+    let output = run(dir, &[arguments, &["--json"]].concat());
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The message of a run that must be refused.
+fn refused(dir: &Path, arguments: &[&str]) -> String {
+    let output = run(dir, arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// A recipe carried out in this process.
+fn train(recipe: Recipe, backend: Backend) -> Outcome {
+    let job = Job::train(recipe, &Library::built_in(), backend, 0).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let mut training = job.begin(dir.path()).unwrap();
+    let mut observer = |_: &residyn::train::Progress| ControlFlow::Continue(());
+    training
+        .run(&job.material.training, None, &mut observer)
+        .unwrap();
+    job.outcome(&training, dir.path()).unwrap()
+}
+
+fn recipe(name: &str) -> Recipe {
+    Recipe::read(&configs().join(name)).unwrap()
+}
+
+/// How far the worst parameter is from the truth, as a share of it.
+fn worst(outcome: &Outcome) -> f64 {
+    let off = |p: &residyn::recipe::Learnt| {
+        let truth = p.truth.unwrap();
+        ((p.found - truth) / truth).abs()
+    };
+    outcome.parameters.iter().map(off).fold(0.0, f64::max)
+}
+
+/// Start the command, wait until its checkpoint is there and a little longer, and kill it.
+fn kill_midway(dir: &Path, arguments: &[&str], checkpoint: &Path) {
+    let mut child = residyn(dir, arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !checkpoint.exists() {
+        sleep(Duration::from_millis(5));
+    }
+    sleep(Duration::from_millis(120));
+    child.kill().unwrap();
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), None, "the run was over before it was killed");
+}
+
+#[test]
+fn a_killed_run_goes_on_to_the_same_numbers() {
+    let config = config("train-pendulum.toml");
+    let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let command = [
+        "train",
+        "--config",
+        &config,
+        "--save-every",
+        "20",
+        "--out",
+        "c",
+    ];
+    let expected = json(whole.path(), &command);
+
+    let manifest = killed.path().join("c/checkpoint.json");
+    for _ in 0..2 {
+        kill_midway(killed.path(), &command, &manifest);
+    }
+    let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
+    let notes = String::from_utf8(output.stderr).unwrap();
+    assert!(notes.contains("note: c goes on from epoch"), "{notes}");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(found, expected);
+    for file in [
+        "weights.safetensors",
+        "last.safetensors",
+        "checkpoint.json",
+        "model.toml",
+    ] {
+        let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
+        assert!(read(whole.path()) == read(killed.path()), "{file}");
+    }
+}
+
+#[test]
+fn a_checkpoint_of_another_run_is_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let config = config("smoke/train-pendulum.toml");
+    let command = ["train", "--config", &config, "--out", "c"];
+    let first = json(dir, &command);
+    // The same again is over at once.
+    assert_eq!(json(dir, &command), first);
+    let before = std::fs::read(dir.join("c/weights.safetensors")).unwrap();
+    let message = refused(dir, &[command.as_slice(), &["--seed", "7"]].concat());
+    assert_eq!(
+        message,
+        "error: c holds the checkpoint of another run: its `seed` is 0, here it is 7; give another \
+         folder with --out, or remove this one to start anew\n"
+    );
+    let text = std::fs::read_to_string(&config).unwrap();
+    let longer = text.replace("epochs = 200", "epochs = 300");
+    let longer = longer.replace(
+        "../plants/",
+        &format!("{}/", configs().join("plants").display()),
+    );
+    std::fs::write(dir.join("longer.toml"), longer).unwrap();
+    let message = refused(dir, &["train", "--config", "longer.toml", "--out", "c"]);
+    assert!(message.contains("its `recipe."), "{message}");
+    let after = std::fs::read(dir.join("c/weights.safetensors")).unwrap();
+    assert!(before == after);
+
+    std::fs::create_dir(dir.join("full")).unwrap();
+    std::fs::write(dir.join("full/thesis.txt"), "").unwrap();
+    let message = refused(dir, &["train", "--config", &config, "--out", "full"]);
+    assert!(message.contains("it holds other files"), "{message}");
+}
+
+#[test]
+fn tuning_fits_a_simulated_prior_to_the_real_plant() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let offline = config("smoke/train-pendulum-offline.toml");
+    json(dir, &["train", "--config", &offline, "--out", "sim"]);
+    let config = config("smoke/tune-pendulum.toml");
+    let command = [
+        "tune",
+        "--checkpoint",
+        "sim",
+        "--config",
+        &config,
+        "--out",
+        "real",
+    ];
+    let outcome = json(dir, &command);
+    let error = |when: &str| outcome["test_error"][when].as_f64().unwrap();
+    assert!(error("after") < 0.5 * error("before"), "{outcome}");
+    assert_eq!(json(dir, &command), outcome);
+    // The prior is left as it is, and cannot be written over by what came of it.
+    let own = [
+        "tune",
+        "--checkpoint",
+        "sim",
+        "--config",
+        &config,
+        "--out",
+        "sim",
+    ];
+    assert!(refused(dir, &own).contains("sim holds the checkpoint of another run"));
+}
+
+#[test]
+fn tuning_on_logs_needs_no_recipe() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let plant = config("plants/pendulum-real.toml");
+    for (log, seed) in [("run1.csv", "1"), ("run2.csv", "2")] {
+        json(
+            dir,
+            &["simulate", "--plant", &plant, "--out", log, "--seed", seed],
+        );
+    }
+    let recipe = config("smoke/train-pendulum.toml");
+    json(dir, &["train", "--config", &recipe, "--out", "prior"]);
+    json(
+        dir,
+        &[
+            "tune",
+            "--checkpoint",
+            "prior",
+            "--train",
+            "run1.csv",
+            "--out",
+            "tuned",
+        ],
+    );
+    let error = |checkpoint: &str| {
+        let evaluate = ["evaluate", "--checkpoint", checkpoint, "--test", "run2.csv"];
+        json(dir, &[&evaluate[..], &["--horizon", "0.5"]].concat())["position_rmse"][0][0]
+            .as_f64()
+            .unwrap()
+    };
+    assert!(error("tuned") < error("prior"));
+
+    let logs = "model = \"pendulum\"\nkind = \"hybrid\"\n[data]\nlogs = [\"run1.csv\"]\n\
+                [fit]\nepochs = 20\nintegrator = \"rk4\"\n";
+    std::fs::write(dir.join("logs.toml"), logs).unwrap();
+    let outcome = json(dir, &["train", "--config", "logs.toml"]);
+    assert_eq!(outcome["checkpoint"], "logs-checkpoint");
+    assert!(outcome["error"]["after"].as_f64() < outcome["error"]["before"].as_f64());
+}
+
+#[test]
+fn tuning_refuses_what_does_not_fit() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let acrobot = config("smoke/train-acrobot.toml");
+    json(dir, &["train", "--config", &acrobot, "--out", "acrobot"]);
+    let pendulum = config("smoke/tune-pendulum.toml");
+    let message = refused(
+        dir,
+        &["tune", "--checkpoint", "acrobot", "--config", &pendulum],
+    );
+    assert!(
+        message.contains("its system is acrobot, the model's is pendulum"),
+        "{message}"
+    );
+    let message = refused(
+        dir,
+        &["tune", "--checkpoint", "acrobot", "--config", &acrobot],
+    );
+    assert!(
+        message.contains("[start] and `hold` are for training from scratch"),
+        "{message}"
+    );
+    let message = refused(
+        dir,
+        &["tune", "--checkpoint", "none", "--config", &pendulum],
+    );
+    assert!(message.contains("not a checkpoint"), "{message}");
+}
+
+#[test]
+fn the_published_settings_find_the_pendulum() {
+    for backend in Backend::ALL {
+        let outcome = train(recipe("train-pendulum.toml"), *backend);
+        assert!(worst(&outcome) < 0.01, "{backend}: {outcome:?}");
+    }
+    let outcome = train(recipe("train-pendulum-adaptive.toml"), Backend::Flex);
+    assert!(worst(&outcome) < 0.01, "{outcome:?}");
+    let outcome = train(recipe("train-pendulum-data-driven.toml"), Backend::Flex);
+    assert!(
+        outcome.test_error.unwrap().after < 1e-3 * outcome.error.before,
+        "{outcome:?}"
+    );
+}
+
+/// Seed 0 of train-pendulum.toml, errors being means of ||s' - s_hat'||^2. The friction -0.5 qd has the norm
+/// 0.5 * 8 / sqrt(3) = 2.3.
+///
+/// | alpha | C_g    | C_i   | prediction error | norm of F_r |
+/// |-------|--------|-------|------------------|-------------|
+/// | 0     | 14.979 | 2.813 | 1.0e-8           | 2.38        |
+/// | 1e-5  | 14.987 | 3.001 | 7.0e-8           | 2.34        |
+/// | 1e-4  | 14.996 | 3.000 | 6e-6             | 2.2         |
+/// | 1e-3  | 14.999 | 3.000 | 6.3e-4           | 1.10        |
+/// | 1e-2  | 15.000 | 3.000 | 2.2e-3           | 0.001       |
+///
+/// Without the penalty a network takes over what the physics can express; with too much of it, the residual is
+/// squeezed out and friction is left unlearnt.
+#[test]
+fn only_the_penalty_makes_the_split_unique() {
+    let with = |alpha| {
+        let mut recipe = recipe("train-pendulum.toml");
+        recipe.fit.penalty = Penalty::Fixed { alpha };
+        train(recipe, Backend::Flex)
+    };
+    assert!(worst(&with(0.0)) > 0.01);
+    let (right, strong) = (with(1e-4), with(1e-2));
+    assert!(worst(&right) < 0.001, "{right:?}");
+    assert!(worst(&strong) < 0.001, "{strong:?}");
+    assert!(right.error.after < 0.01 * strong.error.after);
+}
+
+#[test]
+fn the_acrobot_is_found() {
+    let outcome = train(recipe("train-acrobot.toml"), Backend::Flex);
+    assert!(worst(&outcome) < 0.01, "{outcome:?}");
+    assert!(
+        outcome.test_error.unwrap().after < 1e-3 * outcome.error.before,
+        "{outcome:?}"
+    );
+}
+
+/// Recipes and plants; the demo's plant is part of the program, which reads it in its own tests.
+#[test]
+fn every_recipe_and_plant_is_sound() {
+    let library = Library::built_in();
+    let mut count = 0;
+    for folder in ["", "plants", "smoke"] {
+        let entries = std::fs::read_dir(configs().join(folder)).unwrap();
+        for path in entries.map(|entry| entry.unwrap().path()) {
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            if folder == "plants" || name == "demo.toml" {
+                Plant::read(&path, &library).unwrap();
+            } else if name.starts_with("train-") {
+                let recipe = Recipe::read(&path).unwrap();
+                Job::train(recipe, &library, Backend::Flex, 0)
+                    .map(drop)
+                    .unwrap();
+            } else if name.starts_with("tune-") {
+                Recipe::read(&path).unwrap();
+            } else {
+                continue;
+            }
+            count += 1;
+        }
+    }
+    assert!(count >= 14, "{count}");
+}
+
+#[test]
+fn bad_recipes_are_refused_with_place_and_remedy() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let top = "model = \"pendulum\"\nkind = \"hybrid\"\n";
+    let plant = "[data]\nplant = \"pendulum\"\ntrajectories = 4\nstep_s = 0.02\nposition = [[-1, 1]]\n\
+                 velocity = [[-1, 1]]\ntorque = [[-1, 1]]\n";
+    let two = "[data]\nplant = \"pendulum\"\nlogs = [\"a.csv\"]\n";
+    let cases: &[(String, &[&str])] = &[
+        (
+            format!("{top}alpha = 3\n{plant}"),
+            &["line 3", "unknown field `alpha`"],
+        ),
+        (
+            format!("{top}[start]\nC_q = 1.0\n{plant}"),
+            &["[start] names `C_q`", "did you mean `C_"],
+        ),
+        (
+            format!("{top}[data]\nlogs = [\"gone.csv\"]\n"),
+            &["gone.csv: cannot be read", "check the path"],
+        ),
+        (
+            format!("{top}{two}"),
+            &["line 3", "both `logs` and `plant`"],
+        ),
+        (
+            format!("{top}[data]\nsteps = 1\n"),
+            &["neither `logs` (log files) nor `plant`"],
+        ),
+        (
+            format!("{top}{plant}steps = 3\n"),
+            &["`steps` is 3", "`length` of 1 steps"],
+        ),
+        (
+            top.to_owned() + &plant.replace("[[-1, 1]]", "[[1, -1]]"),
+            &["`position` has the range"],
+        ),
+        (
+            top.to_owned() + &plant.replace("\"pendulum\"", "\"acrobot\""),
+            &["the plant is a acrobot"],
+        ),
+        (
+            top.replace("pendulum", "pendulun") + plant,
+            &["pendulun", "give a model file or one of"],
+        ),
+        (
+            top.replace("hybrid", "data_driven") + "[start]\nC_g = 1\n" + plant,
+            &["remove them"],
+        ),
+        (
+            top.replace("hybrid", "physics") + plant + "[network]\nhidden = [4]\n",
+            &["remove it"],
+        ),
+        (
+            format!("{top}{plant}[fit]\nlearning_rates = {{ physics = -1 }}\n"),
+            &["it must be finite"],
+        ),
+    ];
+    for (text, wanted) in cases {
+        std::fs::write(dir.join("bad.toml"), text).unwrap();
+        let message = refused(dir, &["train", "--config", "bad.toml", "--out", "c"]);
+        for part in *wanted {
+            assert!(message.contains(part), "{part:?} in {message}");
+        }
+    }
+    assert!(refused(dir, &["train", "--config", "no.toml"]).contains("no.toml: cannot be read"));
+    let left: Vec<_> = std::fs::read_dir(dir).unwrap().collect();
+    assert_eq!(left.len(), 1, "nothing is left behind: {left:?}");
+}
