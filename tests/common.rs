@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::data::Log;
 use residyn::expr::{Graph, Program, SignForm};
-use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, System};
+use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, Rollout, System};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
@@ -188,4 +188,34 @@ pub fn empty_log(name: &str, joints: usize) -> Log {
         leave_out: Vec::new(),
         notes: Vec::new(),
     }
+}
+
+/// A log of `rows` steps of 10 ms without noise: torques of a few sines up to `torque`, held over each step.
+pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed: u64) -> Log {
+    let n = model.joints;
+    let mut rng = rng(seed);
+    let tones: Vec<[f64; 2]> = (0..4 * n)
+        .map(|_| [rng.random_range(0.5..12.0), rng.random_range(0.0..6.28)])
+        .collect();
+    let mut log = empty_log(&format!("{seed}.csv"), n);
+    let mut rollout = Rollout::<f64, 1>::new(model, &model.values());
+    let mut state: Vec<[f64; 1]> = start.iter().map(|x| [*x]).collect();
+    for row in 0..=rows {
+        let time = 0.01 * row as f64;
+        let wave = |j: usize| {
+            tones[4 * j..][..4]
+                .iter()
+                .map(|[w, p]| (w * time + p).sin())
+                .sum::<f64>()
+        };
+        let tau: Vec<[f64; 1]> = (0..n).map(|j| [0.25 * torque * wave(j)]).collect();
+        log.time.push(time);
+        for j in 0..n {
+            log.q[j].push(state[j][0]);
+            log.qd[j].push(state[n + j][0]);
+            log.tau[j].push(tau[j][0]);
+        }
+        rollout.advance(&mut state, &tau, [time], [0.01], 20);
+    }
+    log
 }

@@ -1,0 +1,176 @@
+//! Balances that every motion keeps, and the order of the integrator.
+
+use std::path::Path;
+
+use residyn::expr::{Program, SignForm};
+use residyn::model::{Dynamics, Rollout, System};
+
+use crate::common::{all_systems, dynamics, points, system};
+
+/// A system that states its energy, ready to run.
+struct Balanced {
+    model: Dynamics,
+    /// `[total, power, d total / d state..]`
+    energy: Program,
+}
+
+impl Balanced {
+    fn new(system: &System) -> Self {
+        Self {
+            model: dynamics(system, &[], SignForm::Exact),
+            energy: system.energy_program().expect("the file states an energy"),
+        }
+    }
+
+    fn energy(&self, state: &[[f64; 1]], tau: &[[f64; 1]]) -> [f64; 2] {
+        let moving = state.iter().chain(tau).map(|value| value[0]);
+        let inputs: Vec<f64> = moving.chain([0.0]).chain(self.model.values()).collect();
+        let found = self.energy.eval(&inputs);
+        [found[0], found[1]]
+    }
+}
+
+#[test]
+fn every_system_states_its_energy() {
+    for system in all_systems() {
+        assert!(system.energy_program().is_some(), "{}", system.name);
+    }
+}
+
+#[test]
+fn energy_changes_by_the_power_at_every_point() {
+    for system in all_systems() {
+        let balanced = Balanced::new(&system);
+        for point in points(&balanced.model, 500, 2) {
+            let rates = balanced.model.program.eval(&point);
+            let energy = balanced.energy.eval(&point);
+            let (power, slopes) = (energy[1], &energy[2..]);
+            let parts: Vec<f64> = slopes.iter().zip(&rates).map(|(s, r)| s * r).collect();
+            let change: f64 = parts.iter().sum();
+            // Rounding of the terms that cancel.
+            let size: f64 = parts.iter().map(|part| part.abs()).sum();
+            assert!(
+                (change - power).abs() <= 1e-13 * size,
+                "{}: {change} or {power} of {size}",
+                system.name
+            );
+        }
+    }
+}
+
+/// Hold of the torque in s.
+const HOLD_S: f64 = 0.02;
+/// Integration steps in a hold: 0.1 ms, whose error of order 4 is below rounding.
+const STEPS: usize = 200;
+
+/// Change of energy less work in J over 5 s from rest near zero, under torques of up to 3 N m.
+fn imbalance(system: &System) -> f64 {
+    let balanced = Balanced::new(system);
+    let n = system.joints;
+    let mut rollout = Rollout::<f64, 1>::new(&balanced.model, &balanced.model.values());
+    let mut state: Vec<[f64; 1]> = vec![[0.3]; n];
+    state.extend(vec![[0.0]; n]);
+    let h = HOLD_S / STEPS as f64;
+    let start = balanced.energy(&state, &vec![[0.0]; n])[0];
+    let mut work = 0.0;
+    for hold in 0..250 {
+        let time = HOLD_S * f64::from(hold);
+        let tau: Vec<[f64; 1]> = (0..n)
+            .map(|j| [3.0 * (2.0 * time + 1.5 * j as f64).sin()])
+            .collect();
+        for _ in 0..STEPS {
+            // Simpson's rule on both ends and the middle: of order 4 like the motion.
+            let before = balanced.energy(&state, &tau)[1];
+            rollout.advance(&mut state, &tau, [time], [h / 2.0], 1);
+            let middle = balanced.energy(&state, &tau)[1];
+            rollout.advance(&mut state, &tau, [time], [h / 2.0], 1);
+            let after = balanced.energy(&state, &tau)[1];
+            work += h / 6.0 * (before + 4.0 * middle + after);
+        }
+    }
+    balanced.energy(&state, &vec![[0.0]; n])[0] - start - work
+}
+
+#[test]
+fn energy_less_work_stays_over_five_seconds() {
+    for system in all_systems() {
+        let off = imbalance(&system);
+        // 50 000 sums whose rounding (1e-16 of some tens of J) walks at random. Measured: drive 1.5e-12,
+        // cartpole 5e-13, acrobot 3e-13 J.
+        assert!(off.abs() < 1e-11, "{}: {off:e} J", system.name);
+    }
+}
+
+#[test]
+fn the_acrobot_as_printed_makes_energy_from_nothing() {
+    let text = include_str!("fixtures/acrobot_as_printed.toml");
+    let printed = System::from_text(Path::new("acrobot_as_printed.toml"), text, &[]).unwrap();
+    let off = imbalance(&printed);
+    // Measured 3.2 J of a motion between -15 and 21 J; other torques lose other amounts.
+    assert!(off.abs() > 1.0, "{off} J");
+}
+
+/// The pendulum's state after 1 s in `steps` steps.
+fn swung(steps: usize) -> [f64; 2] {
+    let model = dynamics(&system("pendulum"), &[], SignForm::Exact);
+    let mut rollout = Rollout::<f64, 1>::new(&model, &model.values());
+    let mut state = [[1.0], [0.5]];
+    rollout.advance(&mut state, &[[0.7]], [0.0], [1.0], steps);
+    state.map(|value| value[0])
+}
+
+#[test]
+fn the_rollout_is_of_order_four() {
+    // At 2^-12 s the error is 2^-20 of that at 2^-7 s: as good as none.
+    let truth = swung(4096);
+    let error = |steps| {
+        let found = swung(steps);
+        (found[0] - truth[0]).hypot(found[1] - truth[1])
+    };
+    for steps in [64, 128] {
+        let order = (error(steps) / error(2 * steps)).log2();
+        // The error's next term is of relative order h, a few percent here.
+        assert!(
+            (3.8..4.2).contains(&order),
+            "order {order} at {steps} steps"
+        );
+    }
+}
+
+#[test]
+fn lanes_with_steps_of_their_own_do_not_disturb_each_other() {
+    let model = dynamics(&system("acrobot"), &[], SignForm::Exact);
+    let values = model.values();
+    let lane = |l: usize| [0.2 * l as f64, 1.0 - 0.1 * l as f64, 0.3, -0.5 * l as f64];
+    let (tau, dt) = (
+        |l: usize| [1.0 - l as f64, 0.5 * l as f64],
+        |l: usize| 0.01 * l as f64,
+    );
+    let mut together: Vec<[f64; 4]> = (0..4)
+        .map(|k| std::array::from_fn(|l| lane(l)[k]))
+        .collect();
+    let taus: Vec<[f64; 4]> = (0..2).map(|j| std::array::from_fn(|l| tau(l)[j])).collect();
+    let mut rollout = Rollout::<f64, 4>::new(&model, &values);
+    rollout.advance(&mut together, &taus, [0.0; 4], std::array::from_fn(dt), 3);
+    for l in 0..4 {
+        let mut alone = lane(l).map(|x| [x]);
+        let mut rollout = Rollout::<f64, 1>::new(&model, &values);
+        rollout.advance(&mut alone, &tau(l).map(|x| [x]), [0.0], [dt(l)], 3);
+        let found: Vec<[f64; 1]> = together.iter().map(|lanes| [lanes[l]]).collect();
+        assert_eq!(found, alone);
+    }
+}
+
+#[test]
+fn the_rollout_tells_the_equations_the_time() {
+    // qdd = t from rest: v = t^2 / 2, q = t^3 / 6, which a method of order 4 finds exactly.
+    let text = "[system]\nname = \"clock\"\njoints = 1\n[dynamics]\nqdd1 = \"t\"\n";
+    let clock = System::from_text(Path::new("clock.toml"), text, &[]).unwrap();
+    let model = dynamics(&clock, &[], SignForm::Exact);
+    let mut state = [[0.0], [0.0]];
+    let mut rollout = Rollout::<f64, 1>::new(&model, &[]);
+    rollout.advance(&mut state, &[[0.0]], [0.0], [1.5], 3);
+    rollout.advance(&mut state, &[[0.0]], [1.5], [0.5], 1);
+    assert!((state[0][0] - 8.0 / 6.0).abs() < 1e-14);
+    assert!((state[1][0] - 2.0).abs() < 1e-14);
+}
