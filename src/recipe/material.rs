@@ -57,7 +57,7 @@ impl Material {
 }
 
 fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Material, RecipeError> {
-    let read = |path: &PathBuf| Log::read(&recipe.beside(path), system.joints, &system.columns);
+    let read = |path: &PathBuf| Log::read(recipe.beside(path), system.joints, &system.columns);
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
         step_s: logged.step_s,
