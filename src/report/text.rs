@@ -212,13 +212,9 @@ fn errors(outcome: &Outcome) -> String {
     out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
 }
 
-/// A position error in rad (or m), thousandths where it is small.
+/// A position error in rad (or m), three significant digits.
 fn small(x: f64) -> String {
-    if x < 0.1 {
-        format!("{:.2}e-3", 1e3 * x)
-    } else {
-        format!("{x:.3}")
-    }
+    rounded(x, 0.01 * x)
 }
 
 fn parameters(outcome: &Outcome) -> String {
