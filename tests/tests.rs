@@ -1,3 +1,4 @@
 //! One binary for all integration tests: Burn is linked once.
 
+mod recipes;
 mod train;

@@ -57,7 +57,7 @@ impl Material {
 }
 
 fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Material, RecipeError> {
-    let read = |path: &PathBuf| Log::read(&recipe.beside(path), system.joints, &system.columns);
+    let read = |path: &PathBuf| Log::read(recipe.beside(path), system.joints, &system.columns);
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
         step_s: logged.step_s,
@@ -105,7 +105,7 @@ fn from_plant(
     let plant = Plant::read(&path, library).map_err(of_plant)?;
     if plant.system.name != system.name || plant.system.joints != system.joints {
         return Err(recipe.wrong(format!(
-            "[data]: the plant is a {} with {} joints, but `model` is a {} with {}; name a plant of the \
+            "[data]: the plant's system is {} with {} joints, but `model` is {} with {}; name a plant of the \
              same system",
             plant.system.name, plant.system.joints, system.name, system.joints
         )));
