@@ -118,6 +118,8 @@ fn a_killed_run_goes_on_to_the_same_numbers() {
         let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
         assert!(read(whole.path()) == read(killed.path()), "{file}");
     }
+    let left = std::fs::read_dir(killed.path()).unwrap().count();
+    assert_eq!(left, 1, "only the checkpoint is left");
 }
 
 #[test]
