@@ -74,7 +74,7 @@ fn a_log_that_cannot_be_read_is_refused_with_its_place() {
             "time,q1,q2,qd1,qd2,tau1,tau2\n0,0,0,0,0,0,0\n1,0,0,0,0,0,0\n",
             &["log.csv", "joint"],
         ),
-        ("time,q1,qd1,tau1\n0,0,0\n", &["log.csv, line 2"]),
+        ("time,q1,qd1,tau1\n0,0,0\n1,0,0,0\n", &["log.csv, line 2"]),
     ];
     for (contents, parts) in cases {
         says(&scratch("log.csv", contents).closeloop("pendulum"), parts);

@@ -17,5 +17,6 @@ mod oracles;
 mod parity;
 mod physics;
 mod printers;
+mod recipes;
 mod support;
 mod train;

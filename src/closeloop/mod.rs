@@ -16,7 +16,7 @@ pub use learn::Learned;
 pub use outcome::{Alternative, Errors, Finding, Outcome, Verdict};
 pub use residual::{ForceSample, norm, residual_force};
 pub use run::{Request, STAGES, Stage, close_loop};
-pub use select::{Evidence, Round, Selection, p_value, select};
+pub use select::{Evidence, MOST_EFFECTS, Round, Selection, p_value, select};
 pub use split::{How, Split};
 pub use study::{Fitted, Study, StudyError, joined};
 pub use unexplained::{SIGNIFICANT, Unexplained, unexplained};

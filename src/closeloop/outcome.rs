@@ -114,15 +114,25 @@ impl Alternative {
     }
 
     fn to(chosen: &Evidence, other: &Evidence) -> Self {
-        let name = &chosen.effect.effect.name;
-        let contains = other.effect.effect.contains.contains(name);
+        let name = format!(
+            "{} on joint {}",
+            chosen.effect.effect.name,
+            chosen.effect.joint + 1
+        );
+        let contains = other
+            .effect
+            .effect
+            .contains
+            .contains(&chosen.effect.effect.name)
+            && other.effect.joint == chosen.effect.joint;
         let reason = if contains {
             format!("contains {name} and explains these logs no better")
         } else {
             format!(
-                "not separable on these logs: it cuts the left-out loss by {:.0} %, {name} by {:.0} %",
-                100.0 * other.gain,
-                100.0 * chosen.gain
+                "not separable on these logs: when {name} was added for cutting the left-out loss by {:.0} %, \
+                 this would have cut it by {:.0} %",
+                100.0 * chosen.gain,
+                100.0 * other.gain
             )
         };
         Self {

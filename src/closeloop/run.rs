@@ -113,7 +113,7 @@ pub fn close_loop(
     );
     let parameters = with_intervals(&study, &after);
     let findings = findings(&study, &after, &parameters, &errors.after, judge);
-    let (verdict, reason) = verdict(&study, &after, &left);
+    let (verdict, reason) = verdict(&study, &after, &left, &errors);
     Ok(Outcome {
         verdict,
         reason,
@@ -233,7 +233,12 @@ fn rms(assessment: &Assessment) -> f64 {
     (windows.iter().flat_map(|w| &w.position).sum::<f64>() / rows).sqrt()
 }
 
-fn verdict(study: &Study<'_>, after: &Fitted, left: &Unexplained) -> (Verdict, String) {
+fn verdict(
+    study: &Study<'_>,
+    after: &Fitted,
+    left: &Unexplained,
+    errors: &Errors,
+) -> (Verdict, String) {
     let windows = study.shooting.windows.len();
     if windows < FEWEST_WINDOWS {
         let reason = format!(
@@ -249,6 +254,11 @@ fn verdict(study: &Study<'_>, after: &Fitted, left: &Unexplained) -> (Verdict, S
         return (Verdict::Inconclusive, reason);
     }
     let found = after.effects.len() - study.system.effects.len();
+    if found > 0 && rms(&errors.after) > rms(&errors.before) {
+        let reason = "effects help on left-out stretches of the training logs but raise the error on the test logs: \
+                      do not use them before logs of more varied motion confirm them";
+        return (Verdict::Inconclusive, reason.into());
+    }
     let what_is_left = format!("something that depends on {} is left", left.place);
     match (found, left.is_significant()) {
         (0, false) => (

@@ -46,7 +46,7 @@ const WORTHWHILE: f64 = 0.02;
 /// Candidates that are fitted after all have been screened.
 const FITTED: usize = 8;
 /// Effects that one search adds at most.
-const MOST_EFFECTS: usize = 6;
+pub const MOST_EFFECTS: usize = 6;
 /// Candidates within this many standard errors of the best explain the logs as well as it does.
 const AS_GOOD: f64 = 2.0;
 

@@ -101,7 +101,7 @@ impl Library {
     pub fn system(&self, path: &Path) -> Result<System, FileError> {
         let embedded = path
             .to_str()
-            .filter(|_| !path.exists())
+            .filter(|_| !path.is_file())
             .and_then(Self::system_text);
         if let Some(text) = embedded {
             return System::from_text(path, text, &self.effects);

@@ -111,7 +111,7 @@ impl Plant {
         };
         let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
         let beside = path.parent().unwrap_or(Path::new("")).join(&file.model);
-        let model = if beside.exists() {
+        let model = if beside.is_file() {
             &beside
         } else {
             &file.model

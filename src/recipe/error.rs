@@ -25,7 +25,7 @@ pub enum RecipeError {
     #[error("{path}: `model` is not what the checkpoint holds: {source}", path = .path.display())]
     OtherModel {
         path: PathBuf,
-        source: CheckpointError,
+        source: Box<CheckpointError>,
     },
     #[error(
         "{dir} holds the checkpoint of another run: {difference}; give another folder with --out, or \

@@ -48,6 +48,17 @@ pub enum Kind {
     DataDriven,
 }
 
+impl Kind {
+    /// The name in recipes and results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hybrid => "hybrid",
+            Self::Physics => "physics",
+            Self::DataDriven => "data_driven",
+        }
+    }
+}
+
 impl Recipe {
     /// Read a recipe.
     ///
@@ -128,7 +139,7 @@ impl Recipe {
     /// A file that the recipe names or, where there is none, the name as it is: that of something built in.
     pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
         let beside = self.beside(file);
-        if beside.exists() {
+        if beside.is_file() {
             beside
         } else {
             file.to_owned()

@@ -95,18 +95,23 @@ impl Job {
     fn difference(&self, checkpoint: &Checkpoint) -> Option<String> {
         let (saved, mine) = (&checkpoint.manifest, &self.origin);
         let settings = || {
-            // The data come last: where a seed or a setting differs, that is what to say.
-            ["command", "recipe", "device", "from", "data"]
+            ["command", "recipe", "device", "from"]
                 .into_iter()
                 .find_map(|key| first_difference(key, &saved.config[key], &mine.config[key]))
         };
-        let text = || {
-            let same = checkpoint.model_toml == mine.model_toml;
-            (!same).then(|| "its model file has another text".to_owned())
+        // Last, since another seed or another recipe changes the data as well.
+        let files = || {
+            let same_data = saved.config["data"] == mine.config["data"];
+            let same_model = checkpoint.model_toml == mine.model_toml;
+            match (same_data, same_model) {
+                (true, true) => None,
+                (false, _) => Some("a log or the plant has changed since".to_owned()),
+                (true, false) => Some("the model file has changed since".to_owned()),
+            }
         };
         first_difference("seed", &json!(saved.seed), &json!(mine.seed))
             .or_else(settings)
-            .or_else(text)
+            .or_else(files)
     }
 }
 

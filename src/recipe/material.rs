@@ -105,7 +105,7 @@ fn from_plant(
     let plant = Plant::read(&path, library).map_err(of_plant)?;
     if plant.system.name != system.name || plant.system.joints != system.joints {
         return Err(recipe.wrong(format!(
-            "[data]: the plant is a {} with {} joints, but `model` is a {} with {}; name a plant of the \
+            "[data]: the plant's system is {} with {} joints, but `model` is {} with {}; name a plant of the \
              same system",
             plant.system.name, plant.system.joints, system.name, system.joints
         )));

@@ -152,14 +152,3 @@ impl Outcome {
         }
     }
 }
-
-impl Kind {
-    /// The name in recipes and results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Hybrid => "hybrid",
-            Self::Physics => "physics",
-            Self::DataDriven => "data_driven",
-        }
-    }
-}

@@ -35,7 +35,7 @@ impl Job {
         let meant = equations(&declared(&recipe, library)?.system);
         let refused = |source| RecipeError::OtherModel {
             path: recipe.path.clone(),
-            source,
+            source: Box::new(source),
         };
         checkpoint
             .model(&meant, &backend.device())

@@ -209,9 +209,10 @@ fn effect(finding: &Finding) -> EffectEntry {
     }
 }
 
-/// A parameter is identifiable where the logs give it an interval narrower than its own magnitude.
+/// A parameter is identifiable where the logs give it an interval narrower than its magnitude.
 fn parameter(parameter: &Parameter) -> ParameterEntry {
-    let narrow = |[low, high]: [f64; 2]| high - low < 2.0 * parameter.value.abs().max(1e-12);
+    let magnitude = parameter.value.abs().max(parameter.scale);
+    let narrow = |[low, high]: [f64; 2]| high - low < 2.0 * magnitude;
     ParameterEntry {
         name: parameter.name.clone(),
         value: parameter.value,

@@ -1,5 +1,7 @@
 //! The report's plots: what of an outcome goes into which chart.
 
+use std::f64::consts::{PI, TAU};
+
 use super::plot::{ErrorRow, JointKind, Panel, PlotError, Role, ShapePanel, ShapeSample, Track};
 use crate::closeloop::{ForceSample, Outcome};
 use crate::data::Log;
@@ -103,10 +105,22 @@ fn predicted(
 
 /// The residual generalised force over angle, speed and torque, before and after.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
+    // Over full turns the angle within the turn is what a force can depend on.
+    let turns = |joint: usize| {
+        let reach = outcome.residual_before.iter().map(|s| s.q[joint].abs());
+        !outcome.prismatic[joint] && reach.fold(0.0, f64::max) > TAU
+    };
+    let shown = |q: f64, joint: usize| {
+        if turns(joint) {
+            (q + PI).rem_euclid(TAU) - PI
+        } else {
+            q
+        }
+    };
     let samples = |all: &[ForceSample], joint: usize| {
         all.iter()
             .map(|s| ShapeSample {
-                q: s.q[joint],
+                q: shown(s.q[joint], joint),
                 qd: s.qd[joint],
                 tau: s.tau[joint],
                 residual: s.force[joint],

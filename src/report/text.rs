@@ -1,8 +1,8 @@
 use std::fmt::Write;
 
-use crate::closeloop::{Finding, How, Outcome, Verdict, norm};
+use crate::closeloop::{Finding, How, MOST_EFFECTS, Outcome, SIGNIFICANT, Verdict, norm};
 use crate::data::Severity;
-use crate::evaluate::{Summary, summarise};
+use crate::evaluate::{Assessment, Summary, summarise};
 use crate::model::Parameter;
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
@@ -23,31 +23,50 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 
 /// The answer for a terminal: a few lines, and where the rest is.
 pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
-    let joints = outcome.after.dynamics.joints;
-    let middle = outcome.errors.before.horizons.len() / 2;
-    let rmse = |assessment| summarise(assessment, joints).position_rmse[middle].clone();
-    let (before, after) = (
-        rmse(&outcome.errors.before.horizons),
-        rmse(&outcome.errors.after.horizons),
-    );
     let mut out = format!(
         "{}: {}\n",
         headline(outcome).replace("**", ""),
         outcome.reason
     );
-    for finding in &outcome.findings {
-        let values: Vec<String> = finding.parameters.iter().map(value).collect();
-        let _ = writeln!(out, "  {}   {}", finding.expression, values.join("   "));
-    }
-    for j in 0..joints {
+    for Finding {
+        effect,
+        expression,
+        parameters,
+        ..
+    } in &outcome.findings
+    {
+        let values: Vec<String> = parameters.iter().map(value).collect();
+        let (name, joint) = (&effect.effect.name, effect.joint + 1);
         let _ = writeln!(
             out,
-            "  joint {}: open-loop error at {} s on the test logs {} before, {} after",
-            j + 1,
-            outcome.errors.before.horizons[middle].horizon_s,
-            small(before[j]),
-            small(after[j])
+            "  {name} on joint {joint}: {expression}\n    {}",
+            values.join("\n    ")
         );
+    }
+    for &k in &outcome.identifiability.hold {
+        let name = &outcome.before.dynamics.parameters[k].name;
+        let _ = writeln!(
+            out,
+            "  {name} is held, the logs do not determine it: the other values are relative to it"
+        );
+    }
+    let joints = outcome.after.dynamics.joints;
+    let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
+    let (before, after) = (
+        numbers(&outcome.errors.before),
+        numbers(&outcome.errors.after),
+    );
+    for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
+        for j in 0..joints {
+            let unit = if outcome.prismatic[j] { "m" } else { "rad" };
+            let (before, after) = (small(before[h][j]), small(after[h][j]));
+            let seconds = horizon.horizon_s;
+            let _ = writeln!(
+                out,
+                "  joint {}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after",
+                j + 1
+            );
+        }
     }
     let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
     out
@@ -76,11 +95,20 @@ fn headline(outcome: &Outcome) -> String {
         .collect();
     match (outcome.verdict, found.is_empty()) {
         (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
-        (_, false) => format!("The model lacks {}", found.join(" and ")),
+        (_, false) => format!("The model lacks {}", listed(&found)),
         (Verdict::Unexplained, true) => {
             "Something is missing that no known effect names".to_owned()
         }
         (_, true) => "Nothing is missing that these logs could show".to_owned(),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`
+fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }
 
@@ -102,16 +130,28 @@ fn effects(findings: &[Finding]) -> String {
         let values: Vec<String> = finding.parameters.iter().map(value).collect();
         let _ = writeln!(
             out,
-            "| {} | {} | `{}` | {} | {} | {:.0} % |",
+            "| {} | {} | `{}` | {} | {} | {} |",
             finding.effect.effect.name,
             finding.effect.joint + 1,
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
-            100.0 * finding.error_reduction
+            share(finding.error_reduction)
         );
     }
     out + "\n\"Cuts the error by\" compares the position error on the test logs at the middle horizon with that of a refit without this effect.\n\n"
+}
+
+/// A share that something takes away, in words where it adds instead.
+fn share(part: f64) -> String {
+    let percent = 100.0 * part;
+    if percent > -0.05 {
+        format!("{:.1} %", percent.max(0.0))
+    } else if percent > -100.0 {
+        format!("nothing: raises it by {:.1} %", -percent)
+    } else {
+        "nothing: more than doubles it".to_owned()
+    }
 }
 
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
@@ -128,7 +168,7 @@ fn value(parameter: &Parameter) -> String {
         format!(" {}", parameter.unit)
     };
     let interval = parameter.ci95.map_or_else(
-        || " (held)".to_owned(),
+        || " (not fitted)".to_owned(),
         |[low, high]| format!(" ({} to {})", number(low), number(high)),
     );
     format!(
@@ -267,20 +307,50 @@ fn alternatives(outcome: &Outcome) -> String {
 
 fn left(outcome: &Outcome) -> String {
     let left = &outcome.unexplained;
-    let place = if left.is_significant() {
-        format!("It follows {}.", left.place)
+    let structure = if left.is_significant() {
+        format!(
+            "It follows {} (p = {}).",
+            left.place,
+            probability(left.p_value)
+        )
+    } else if left.p_value < SIGNIFICANT {
+        format!(
+            "There is structure in it (p = {}), too little to matter: no smooth shape over angle, speed, torque or \
+             time saves a twentieth of the loss.",
+            probability(left.p_value)
+        )
     } else {
-        "No dependence on angle, speed, torque or time that would matter was found in it."
-            .to_owned()
+        format!(
+            "It follows neither angle, speed, torque nor time (p = {}).",
+            probability(left.p_value)
+        )
+    };
+    let network = match &outcome.errors.hybrid {
+        Some(hybrid) if worse(hybrid, &outcome.errors.after) => {
+            "The residual network raises the error on the test logs: prefer model.toml to the checkpoint.\n"
+        }
+        _ => "",
     };
     format!(
-        "## What is left\n\n{:.1} % of the residual variance above the sensor's noise is left (p = {} for structure in it). {place}\n\
-         Residual generalised force: {:.4} before, {:.4} after (root mean square over stretches of 0.15 s, N m or N).\n\n![residual](residual.svg)\n\n",
+        "## What is left\n\n{:.1} % of the residual variance above the sensor's noise is left. {structure}\n{network}\
+         Residual generalised force: {:.4} before, {:.4} after (root mean square over stretches of 0.15 s, N m or N).\n\n\
+         ![residual](residual.svg)\n\n",
         100.0 * left.fraction,
-        probability(left.p_value),
         norm(&outcome.residual_before),
         norm(&outcome.residual_after)
     )
+}
+
+/// Whether a model's position error is higher by more than a hundredth at the middle horizon, over all joints.
+fn worse(model: &Assessment, than: &Assessment) -> bool {
+    let squares = |a: &Assessment| -> f64 {
+        a.horizons[a.horizons.len() / 2]
+            .windows
+            .iter()
+            .flat_map(|w| &w.position)
+            .sum()
+    };
+    squares(model).sqrt() > 1.01 * squares(than).sqrt()
 }
 
 fn tried(outcome: &Outcome) -> String {
@@ -297,15 +367,23 @@ fn tried(outcome: &Outcome) -> String {
         for (i, evidence) in round.evidence.iter().enumerate() {
             let _ = writeln!(
                 out,
-                "| {} | {} | {:.1} % | {} | {} |",
+                "| {} | {} | {} | {} | {} |",
                 evidence.effect.effect.name,
                 evidence.effect.joint + 1,
-                100.0 * evidence.gain,
+                share(evidence.gain),
                 probability(evidence.p_value),
                 if round.chosen == Some(i) { "added" } else { "" }
             );
         }
         out.push('\n');
+    }
+    if outcome.rounds.len() == MOST_EFFECTS
+        && outcome.rounds.last().is_some_and(|r| r.chosen.is_some())
+    {
+        let _ = writeln!(
+            out,
+            "The search ended at its limit of {MOST_EFFECTS} effects; there may be more.\n"
+        );
     }
     out
 }

@@ -72,7 +72,7 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
         _ => Path::new("."),
     };
     fs::create_dir_all(parent).map_err(io("create the directory", parent))?;
-    let fresh = fresh_beside(parent).map_err(io("create a directory in", parent))?;
+    let fresh = fresh_beside(dir, parent).map_err(io("create a directory in", parent))?;
     for (name, bytes) in files {
         let path = fresh.path().join(name);
         write(&path, bytes).map_err(io("write", &path))?;
@@ -81,11 +81,19 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
 }
 
 /// A directory that vanishes unless it is kept; as readable as any other, where temporary ones are private.
-fn fresh_beside(parent: &Path) -> std::io::Result<tempfile::TempDir> {
+/// It has one name for each `dir`, so that what a killed program left is met and removed.
+fn fresh_beside(dir: &Path, parent: &Path) -> std::io::Result<tempfile::TempDir> {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(dir.file_name().unwrap_or_default());
+    name.push(".new");
+    let left = parent.join(&name);
+    if left.exists() {
+        fs::remove_dir_all(left)?;
+    }
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-    builder.prefix(".checkpoint-").tempdir_in(parent)
+    builder.prefix(&name).rand_bytes(0).tempdir_in(parent)
 }
 
 /// Write and wait until it is on the disk: a renaming must not overtake the contents.
