@@ -181,7 +181,7 @@ fn values_and_slopes_on_tensors() {
             let zeros = || vec![0.0; grid().len()];
             // What depends on no input has no gradients at all.
             let constant = truth.iter().all(|row| row[1..] == [0.0, 0.0]);
-            let mut found = vec![numbers(value.clone()), zeros(), zeros()];
+            let mut found = [numbers(value.clone()), zeros(), zeros()];
             if !constant || value.is_require_grad() {
                 let gradients = value.sum().backward();
                 for (k, input) in inputs.iter().enumerate() {

@@ -66,7 +66,7 @@ fn burn_replays_inputs_that_all_rows_share() {
     for device in devices() {
         for (name, program, points) in cases() {
             // Every third input is shared by all rows, from a different one on in each case.
-            let shared = |k: usize| (k + name.len()) % 3 == 0;
+            let shared = |k: usize| (k + name.len()).is_multiple_of(3);
             check_shared(&name, &program, &points, &device, shared);
             // All are shared but the first, as parameters and a constant torque are.
             check_shared(&name, &program, &points, &device, |k| k > 0);
