@@ -1,5 +1,6 @@
 //! What several tests share: the catalog of systems and effects, random points, comparisons.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
@@ -195,12 +196,7 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
     let n = model.joints;
     let mut rng = rng(seed);
     let tones: Vec<[f64; 2]> = (0..4 * n)
-        .map(|_| {
-            [
-                rng.random_range(0.5..12.0),
-                rng.random_range(0.0..std::f64::consts::TAU),
-            ]
-        })
+        .map(|_| [rng.random_range(0.5..12.0), rng.random_range(0.0..TAU)])
         .collect();
     let mut log = empty_log(&format!("{seed}.csv"), n);
     let mut rollout = Rollout::<f64, 1>::new(model, &model.values());

@@ -210,12 +210,20 @@ fn torque_effects_come_before_forces_and_in_their_order() {
     let load = effect("load_friction", &[0.2]);
     let gain = effect("actuator_gain", &[0.5]);
     let limit = effect("actuator_saturation", &[1.2]);
+    let offset = effect("constant_torque", &[0.3]);
     let drive = system("drive");
     let at = |effects: &[_], tau: f64| {
         let model = dynamics(&drive, effects, SignForm::Exact);
         let inputs = [&[0.0, 1.0, tau, 0.0], model.values().as_slice()].concat();
         model.program.eval(&inputs)[1]
     };
+    // What is added to the torque is not amplified.
+    assert_near(
+        at(&[offset, gain.clone()], 1.0),
+        1.5 + 0.3,
+        ROUNDING,
+        "offset",
+    );
     // The gear sees 1.5 N m of a commanded 1 N m, wherever in the list the friction stands.
     assert_near(
         at(&[load.clone(), gain.clone()], 1.0),

@@ -275,16 +275,17 @@ fn a_window_that_touches_what_is_left_out_is_dropped() {
     let whole = start_times(&model, &log, 0.4);
     assert_eq!(whole.len(), 13);
     log.leave_out = vec![Interval {
-        start_s: 1.5,
-        end_s: 1.6,
+        start_s: 1.43,
+        end_s: 1.66,
     }];
     let left: Vec<f64> = whole
         .iter()
         .copied()
-        .filter(|t| t + 0.4 < 1.5 || *t > 1.6)
+        .filter(|t| t + 0.4 < 1.43 || *t > 1.66)
         .collect();
     assert_eq!(start_times(&model, &log, 0.4), left);
-    assert_eq!(left.len(), 11);
+    // From the window that reaches 10 ms into it to the one that starts 20 ms before its end.
+    assert_eq!(left.len(), 9);
 }
 
 #[test]

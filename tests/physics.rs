@@ -95,9 +95,9 @@ fn imbalance(system: &System) -> f64 {
 fn energy_less_work_stays_over_five_seconds() {
     for system in all_systems() {
         let off = imbalance(&system);
-        // 50 000 sums whose rounding (1e-16 of some tens of J) walks at random. Measured: drive 1.5e-12,
-        // cartpole 5e-13, acrobot 3e-13 J.
-        assert!(off.abs() < 1e-11, "{}: {off:e} J", system.name);
+        // 50 000 sums whose rounding (1e-16 of some tens of J) walks at random. Measured: pendulum 4e-12,
+        // drive 1.5e-12, cartpole 5e-13, acrobot 3e-13 J.
+        assert!(off.abs() < 2e-11, "{}: {off:e} J", system.name);
     }
 }
 

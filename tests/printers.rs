@@ -87,7 +87,7 @@ fn formulas_with_every_intermediate_written_out_read_back() {
 
 /// Precedence, signs and associativity where they are easy to get wrong.
 #[test]
-fn awkward_formulas_read_back() {
+fn awkward_formulas_read_back_and_are_balanced_in_latex() {
     let inputs = ["x", "y", "z"].map(str::to_owned);
     let formulas = [
         "x - (y - z)",
@@ -126,6 +126,7 @@ fn awkward_formulas_read_back() {
             [0.2, 0.4, 0.9],
         ];
         check_text(formula, &program, &points.map(Vec::from));
+        check_latex(formula, &program.latex(&["out_1"]));
     }
 }
 
