@@ -169,6 +169,31 @@ fn an_unknown_effect_in_a_model_file_is_met_with_the_near_one() {
 }
 
 #[test]
+fn an_effect_that_cannot_act_is_refused() {
+    let effect = |text: &str| model_message("[energy]", &format!("[[effect]]\n{text}\n\n[energy]"));
+    says(
+        &effect("name = \"rotor_inertia\"\njoint = 1\nJ = 0.1"),
+        &[
+            "line 13",
+            "`rotor_inertia` needs a model that gives `mass` and `bias`",
+        ],
+    );
+    says(
+        &effect("name = \"viscous_friction\"\njoint = 1\nb = -1"),
+        &["b = -1 lies outside of 0 to inf"],
+    );
+    let twice = "name = \"viscous_friction\"\njoint = 1\nb = 1";
+    says(
+        &effect(&format!("{twice}\n[[effect]]\n{twice}")),
+        &["acts on joint 1 already"],
+    );
+    says(
+        &model_message("C_i = {", "tau1 = {"),
+        &["the name `tau1` is taken"],
+    );
+}
+
+#[test]
 fn a_model_that_is_not_there_is_met_with_what_is() {
     says(
         &scratch("log.csv", GOOD).closeloop("pendulun"),

@@ -180,7 +180,8 @@ fn an_effects_expression_names_its_joint_and_reads_back() {
             for joint in (0..system.joints).filter(|j| can_act(&system, effect, *j)) {
                 let values = vec![1.0; effect.parameters.len()];
                 let fitted = fitted(effect, joint, &values);
-                let own = fitted.parameter_names(&system.parameters);
+                let taken: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
+                let own = fitted.parameter_names(&taken);
                 let formula = parse(&fitted.expression(&own)).unwrap();
                 for name in formula.names() {
                     let state = ["q", "qd", "tau", "load"].map(|s| format!("{s}{}", joint + 1));

@@ -1,6 +1,6 @@
 use super::study::{Fitted, Study, joined};
 use crate::identify::promise;
-use crate::model::{Effect, Entry, FittedEffect};
+use crate::model::{Effect, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet.
 pub fn candidates(
@@ -10,16 +10,14 @@ pub fn candidates(
 ) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in library {
-        let joints = if effect.first_joint_only {
-            1
-        } else {
-            study.system.joints
-        };
-        for joint in 0..joints {
+        for joint in 0..study.system.joints {
             let there = present
                 .iter()
                 .any(|p| p.joint == joint && p.effect.name == effect.name);
-            if !there && can_act(study, effect, joint) {
+            if !there
+                && is_driven_enough(study, effect, joint)
+                && study.system.can_carry(effect, joint).is_ok()
+            {
                 all.push(FittedEffect::absent(effect, joint));
             }
         }
@@ -27,17 +25,11 @@ pub fn candidates(
     all
 }
 
-fn can_act(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
-    let formula = effect.entry.formula();
-    let needs_torque = formula
-        .names()
-        .iter()
-        .any(|name| ["tau", "load"].contains(name));
-    match effect.entry {
-        Entry::Inertia(_) => study.system.has_mass_matrix(),
-        Entry::Torque(_) => study.top_torque[joint] > 0.0,
-        Entry::Force(_) | Entry::Angle(_) => !needs_torque || study.top_torque[joint] > 0.0,
-    }
+/// Effects of the torque cannot be seen where there is none.
+fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
+    let names = effect.entry.formula().names();
+    let needs_torque = names.iter().any(|name| ["tau", "load"].contains(name));
+    !needs_torque || study.top_torque[joint] > 0.0
 }
 
 /// The candidate at each of its starting points, every combination of searched values.

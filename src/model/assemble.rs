@@ -73,11 +73,12 @@ impl FittedEffect {
     }
 
     /// The names of the effect's parameters on its joint, told apart from names already `taken`.
-    pub fn parameter_names(&self, taken: &[Parameter]) -> Vec<String> {
+    pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
         let joint = self.joint + 1;
-        let is_taken = |name: &str| taken.iter().any(|parameter| parameter.name == name);
         let name = |own: &str| match format!("{own}{joint}") {
-            plain if is_taken(&plain) => format!("{}_{own}{joint}", self.effect.name),
+            plain if taken.contains(&plain.as_str()) => {
+                format!("{}_{own}{joint}", self.effect.name)
+            }
             plain => plain,
         };
         self.effect
@@ -121,7 +122,9 @@ impl<'a> Assembly<'a> {
         let mut parameters = system.parameters.clone();
         let mut with_nodes = Vec::new();
         for effect in effects {
-            let own = effect_parameters(effect, &parameters, system.prismatic[effect.joint]);
+            let of_effects = parameters.iter().map(|p| p.name.as_str());
+            let taken: Vec<&str> = system.own_names().chain(of_effects).collect();
+            let own = effect_parameters(effect, &taken, system.prismatic[effect.joint]);
             with_nodes.push((effect, own.iter().map(|p| graph.input(&p.name)).collect()));
             parameters.extend(own);
         }
@@ -278,11 +281,7 @@ fn unit_on(prismatic: bool, unit: &str) -> String {
     }
 }
 
-fn effect_parameters(
-    effect: &FittedEffect,
-    taken: &[Parameter],
-    prismatic: bool,
-) -> Vec<Parameter> {
+fn effect_parameters(effect: &FittedEffect, taken: &[&str], prismatic: bool) -> Vec<Parameter> {
     let names = effect.parameter_names(taken);
     let declared = effect.effect.parameters.iter().zip(&effect.values);
     declared

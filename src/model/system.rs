@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::Parameter;
-use super::effect::Effect;
+use super::effect::{Effect, Entry};
 use super::reader::{Document, FileError, Located, Section};
 use crate::data::Columns;
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
@@ -118,8 +118,38 @@ impl System {
             motion: motion(document, &dynamics, joints)?,
             energy: energy(top.section("energy")?)?,
         };
+        system.check_names(&top)?;
         system.check_formulas(document)?;
+        for (k, section) in top.sections("effect")?.iter().enumerate() {
+            let (present, rest) = system.effects.split_at(k);
+            let check = system.check_effect(&rest[0], present);
+            check.map_err(|message| section.error(message))?;
+        }
         Ok(system)
+    }
+
+    /// Parameters and intermediates must not take the names of states, torques or each other.
+    fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
+        let mut taken: Vec<String> = self.input_names();
+        taken.truncate(3 * self.joints + 1);
+        let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
+        let lets = self.lets.iter().map(|(name, _)| ("dynamics", name));
+        for (section, name) in parameters.chain(lets) {
+            if taken.contains(name) {
+                let section = top.required_section(section)?;
+                return Err(
+                    section.error_at(name, format!("the name `{name}` is taken; choose another"))
+                );
+            }
+            taken.push(name.clone());
+        }
+        Ok(())
+    }
+
+    /// Names that effects must not take: of parameters and of intermediates.
+    pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
+        let lets = self.lets.iter().map(|(name, _)| name.as_str());
+        self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
     }
 
     /// Lower every formula once, so that a wrong name is met here, with its place.
@@ -169,6 +199,51 @@ impl System {
         given.map_or(vec![SignForm::DEFAULT; self.joints], |widths| {
             widths.iter().map(width).collect()
         })
+    }
+
+    /// Whether an effect can act on a joint (counted from 0) of this system.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn can_carry(&self, effect: &Effect, joint: usize) -> Result<(), String> {
+        let name = &effect.name;
+        if effect.first_joint_only && (joint > 0 || self.prismatic[joint]) {
+            return Err(format!(
+                "`{name}` acts on the first joint, where that turns"
+            ));
+        }
+        match effect.entry {
+            Entry::Inertia(_) if !self.has_mass_matrix() => Err(format!(
+                "`{name}` needs a model that gives `mass` and `bias`; {} gives accelerations",
+                self.name
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether an effect with its values can join `present` ones.
+    ///
+    /// # Errors
+    /// Why not: see [`System::can_carry`], a value outside of its bounds, or the same effect twice.
+    pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
+        let name = &new.effect.name;
+        self.can_carry(&new.effect, new.joint)?;
+        if present
+            .iter()
+            .any(|old| old.joint == new.joint && old.effect.name == *name)
+        {
+            return Err(format!("`{name}` acts on joint {} already", new.joint + 1));
+        }
+        for (parameter, (value, _)) in new.effect.parameters.iter().zip(&new.values) {
+            let [low, high] = parameter.bounds;
+            if !(low..=high).contains(value) {
+                return Err(format!(
+                    "`{name}`: {} = {value} lies outside of {low} to {high}",
+                    parameter.name
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Whether the file gives mass matrix and bias, which effects of the inertia need.

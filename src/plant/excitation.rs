@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Excitation {
-    /// Largest torque, one a joint, in N m (or N).
+    /// Size of the torque, one a joint, in N m (or N): each of k sines has this amplitude over the root of k.
     pub amplitude: Vec<f64>,
     /// Lowest and highest frequency in Hz.
     pub band_hz: [f64; 2],

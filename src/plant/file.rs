@@ -217,12 +217,16 @@ impl Plant {
             };
             own[k].0 = *value;
         }
-        self.effects.push(FittedEffect {
+        let new = FittedEffect {
             effect: effect.clone(),
             joint: joint - 1,
             values: own,
             fixed: false,
-        });
+        };
+        self.system
+            .check_effect(&new, &self.effects)
+            .map_err(PlantError::Effect)?;
+        self.effects.push(new);
         Ok(())
     }
 }
