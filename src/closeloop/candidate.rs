@@ -18,7 +18,11 @@ pub fn candidates(
                 && is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
             {
-                all.push(FittedEffect::absent(effect, joint));
+                let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
+                all.push(FittedEffect::absent(
+                    &effect.measured_by(speed, torque),
+                    joint,
+                ));
             }
         }
     }
@@ -33,25 +37,20 @@ fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
 }
 
 /// The candidate at each of its starting points, every combination of searched values.
-fn starts(study: &Study<'_>, candidate: &FittedEffect) -> Vec<FittedEffect> {
+fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     let mut points = vec![Vec::new()];
     for parameter in &candidate.effect.parameters {
-        let unit = study.unit_of(parameter.measure, candidate.joint);
         let grown = points.iter().flat_map(|point| {
-            parameter.starts.iter().map(move |start| {
-                let value = (start * unit).clamp(parameter.bounds[0], parameter.bounds[1]);
-                [point.as_slice(), &[(value, None)]].concat()
-            })
+            let starts = parameter.starts.iter();
+            starts.map(move |start| [point.as_slice(), &[(*start, None)]].concat())
         });
         points = grown.collect();
     }
-    points
-        .into_iter()
-        .map(|values| FittedEffect {
-            values,
-            ..candidate.clone()
-        })
-        .collect()
+    let at = |values| FittedEffect {
+        values,
+        ..candidate.clone()
+    };
+    points.into_iter().map(at).collect()
 }
 
 /// The starting point of a candidate that promises most beside the model at hand, and the cost it promises.
@@ -76,7 +75,7 @@ pub fn best_start(
         )
         .map(|cost| (start, cost))
     };
-    starts(study, candidate)
+    starts(candidate)
         .into_iter()
         .filter_map(promised)
         .min_by(|a, b| a.1.total_cmp(&b.1))

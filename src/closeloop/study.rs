@@ -3,7 +3,7 @@ use thiserror::Error;
 use crate::data::{Audit, Log, audit};
 use crate::expr::SignForm;
 use crate::identify::{Fit, FitError, Identifiability, Shooting, cut, fit, identifiability};
-use crate::model::{Dynamics, FittedEffect, Measure, System};
+use crate::model::{Dynamics, FittedEffect, System};
 
 /// Why the loop could not be closed at all.
 #[derive(Debug, Error)]
@@ -203,15 +203,6 @@ impl<'a> Study<'a> {
         let free =
             |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
-    }
-
-    /// The unit in which an effect's searched values are given, on this joint.
-    pub fn unit_of(&self, measure: Measure, joint: usize) -> f64 {
-        match measure {
-            Measure::One => 1.0,
-            Measure::Speed => self.top_speed[joint],
-            Measure::Torque => self.top_torque[joint],
-        }
     }
 }
 

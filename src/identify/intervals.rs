@@ -1,4 +1,4 @@
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::fit::Fit;
@@ -52,13 +52,45 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     }
     #[allow(clippy::cast_precision_loss)] // few blocks
     let correction = count as f64 / (count as f64 - 1.0).max(1.0);
-    let inverse = hessian
-        .pseudo_inverse(1e-14)
-        .unwrap_or_else(|_| DMatrix::zeros(size, size));
+    let (inverse, flat) = inverse(&hessian);
     Uncertainty {
-        covariance: &inverse * spread * &inverse * correction,
+        covariance: &inverse * spread * &inverse * correction + flat,
         blocks: count,
     }
+}
+
+/// Directions with less than this share of the best one's information are flat: what the residuals say about
+/// them is rounding.
+const FLAT: f64 = 1e-9;
+
+/// The inverse of an information matrix, and what it says of flat directions alone: there the sandwich, a
+/// product of two roundings, must not pretend to know anything.
+fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    // Unit diagonal, so that "flat" does not depend on units.
+    let scale = hessian
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+    let size = hessian.nrows();
+    let scaled = DMatrix::from_fn(size, size, |i, j| hessian[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::new(scaled);
+    let best = eigen
+        .eigenvalues
+        .iter()
+        .copied()
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let back = DMatrix::from_diagonal(&scale) * &eigen.eigenvectors;
+    let with = |f: &dyn Fn(f64) -> f64| {
+        let weights = eigen.eigenvalues.map(|value| f(value.max(1e-15 * best)));
+        &back * DMatrix::from_diagonal(&weights) * back.transpose()
+    };
+    let flat = |value: f64| {
+        if value < FLAT * best {
+            1.0 / value
+        } else {
+            0.0
+        }
+    };
+    (with(&|value| 1.0 / value), with(&flat))
 }
 
 impl Uncertainty {

@@ -1,4 +1,4 @@
-use super::effect::{EFFECT_NAMES, Effect, Entry};
+use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
 use super::{Dynamics, Parameter};
@@ -290,7 +290,10 @@ fn effect_parameters(effect: &FittedEffect, taken: &[&str], prismatic: bool) -> 
             name,
             value: *value,
             unit: unit_on(prismatic, &parameter.unit),
-            bounds: parameter.bounds,
+            bounds: match parameter.measure {
+                Measure::One => parameter.bounds,
+                Measure::Speed | Measure::Torque => [0.0, f64::INFINITY],
+            },
             fixed: effect.fixed || parameter.whole,
             ci95: *ci95,
             scale: parameter.typical,

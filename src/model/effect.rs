@@ -25,7 +25,7 @@ impl Entry {
     }
 }
 
-/// What a searched value is a multiple of.
+/// What a parameter's bounds and starting values are multiples of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
     /// Itself, in the parameter's own unit.
@@ -44,12 +44,33 @@ pub struct EffectParameter {
     pub about: String,
     /// Usual magnitude on a rig for the lab bench.
     pub typical: f64,
+    /// Admissible range, in `measure`.
     pub bounds: [f64; 2],
-    /// Values from which a fit starts. One value: zero or whatever leaves the rig as it is.
+    /// Values from which a fit starts, in `measure`. One value: zero or whatever leaves the rig as it is.
     pub starts: Vec<f64>,
+    /// What bounds and starting values are multiples of.
     pub measure: Measure,
     /// Only whole numbers make sense: searched, never refined.
     pub whole: bool,
+}
+
+impl Effect {
+    /// The same effect with bounds and starting values in the parameters' own units, for a joint of which the
+    /// logs show this top speed and top torque.
+    #[must_use]
+    pub fn measured_by(&self, top_speed: f64, top_torque: f64) -> Self {
+        let mut effect = self.clone();
+        for parameter in &mut effect.parameters {
+            let unit = match std::mem::replace(&mut parameter.measure, Measure::One) {
+                Measure::One => 1.0,
+                Measure::Speed => top_speed,
+                Measure::Torque => top_torque,
+            };
+            let multiples = parameter.bounds.iter_mut().chain(&mut parameter.starts);
+            multiples.for_each(|value| *value *= unit);
+        }
+        effect
+    }
 }
 
 impl EffectParameter {

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::Parameter;
-use super::effect::{Effect, Entry};
+use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
 use crate::data::Columns;
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
@@ -236,7 +236,8 @@ impl System {
         }
         for (parameter, (value, _)) in new.effect.parameters.iter().zip(&new.values) {
             let [low, high] = parameter.bounds;
-            if !(low..=high).contains(value) {
+            // Bounds that are multiples of what logs show cannot be checked before there are logs.
+            if parameter.measure == Measure::One && !(low..=high).contains(value) {
                 return Err(format!(
                     "`{name}`: {} = {value} lies outside of {low} to {high}",
                     parameter.name
