@@ -2,7 +2,8 @@
 
 use super::effect::Effect;
 use super::reader::{FileError, Section};
-use super::system::{FittedEffect, interval};
+use super::sections::interval;
+use super::system::FittedEffect;
 use crate::expr::suggestion;
 
 pub(super) fn read(

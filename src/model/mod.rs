@@ -13,6 +13,7 @@ mod mlp;
 mod network;
 mod reader;
 mod rollout;
+mod sections;
 mod system;
 
 pub use dynamics::{Dynamics, Parameter};

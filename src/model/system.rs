@@ -1,8 +1,8 @@
 use std::path::Path;
 
-use super::Parameter;
 use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
+use super::{Parameter, sections};
 use crate::data::Columns;
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
@@ -60,13 +60,6 @@ pub struct System {
     pub(super) energy: Option<Energy>,
 }
 
-const SYSTEM_KEYS: &[&str] = &["name", "about", "joints", "prismatic", "sign_width"];
-const PARAMETER_KEYS: &[&str] = &[
-    "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
-];
-/// Enough for every serial arm; a limit catches slips such as `joints = 100`.
-const MOST_JOINTS: usize = 12;
-
 impl System {
     /// Read a model file. `library` is where its `[[effect]]` entries are looked up.
     ///
@@ -100,23 +93,23 @@ impl System {
             "effect",
         ])?;
         let section = top.required_section("system")?;
-        section.only(SYSTEM_KEYS)?;
-        let joints = joints(&section)?;
+        section.only(sections::SYSTEM_KEYS)?;
+        let joints = sections::joints(&section)?;
         let dynamics = top.required_section("dynamics")?;
         let system = Self {
             name: section.required_text("name")?.value,
             about: section.text_or_empty("about")?,
             joints,
-            prismatic: prismatic(&section, joints)?,
-            sign_width: sign_width(&section, joints)?,
-            columns: columns(top.section("columns")?, joints)?,
-            parameters: parameters(top.section("parameters")?)?,
+            prismatic: sections::prismatic(&section, joints)?,
+            sign_width: sections::sign_width(&section, joints)?,
+            columns: sections::columns(top.section("columns")?, joints)?,
+            parameters: sections::parameters(top.section("parameters")?)?,
             effects: super::effects_in_file::read(&top, joints, library)?,
-            hidden: hidden(top.section("residual")?, joints)?,
-            declaration: declaration(&document.text),
-            lets: lets(document, &dynamics)?,
-            motion: motion(document, &dynamics, joints)?,
-            energy: energy(top.section("energy")?)?,
+            hidden: sections::hidden(top.section("residual")?, joints)?,
+            declaration: sections::declaration(&document.text),
+            lets: sections::lets(document, &dynamics)?,
+            motion: sections::motion(document, &dynamics, joints)?,
+            energy: sections::energy(top.section("energy")?)?,
         };
         system.check_names(&top)?;
         system.check_formulas(document)?;
@@ -289,214 +282,4 @@ impl Motion {
             Self::MassAndBias { mass, bias } => Box::new(mass.iter().flatten().chain(bias)),
         }
     }
-}
-
-fn joints(section: &Section<'_>) -> Result<usize, FileError> {
-    match section.whole("joints")? {
-        Some(joints @ 1..=MOST_JOINTS) => Ok(joints),
-        Some(joints) => {
-            let message = format!("`joints` is from 1 to {MOST_JOINTS}, found {joints}");
-            Err(section.error_at("joints", message))
-        }
-        None => Err(section.error("`joints` is missing in [system]; give their number")),
-    }
-}
-
-/// `prismatic = [1]` lists the joints that slide.
-fn prismatic(section: &Section<'_>, joints: usize) -> Result<Vec<bool>, FileError> {
-    let listed = section.numbers("prismatic")?.unwrap_or_default();
-    let numbers: Vec<f64> = (1..=joints).map(|j| j as f64).collect();
-    if let Some(stranger) = listed.iter().find(|j| !numbers.contains(j)) {
-        let message = format!("`prismatic` lists joints from 1 to {joints}, found {stranger}");
-        return Err(section.error_at("prismatic", message));
-    }
-    Ok(numbers.iter().map(|j| listed.contains(j)).collect())
-}
-
-/// One width above zero a joint.
-fn sign_width(section: &Section<'_>, joints: usize) -> Result<Option<Vec<f64>>, FileError> {
-    let widths = section.numbers("sign_width")?;
-    match &widths {
-        Some(widths) if widths.len() != joints || widths.iter().any(|w| *w <= 0.0) => {
-            let message =
-                format!("`sign_width` is a list of {joints} speeds above zero, one a joint");
-            Err(section.error_at("sign_width", message))
-        }
-        _ => Ok(widths),
-    }
-}
-
-fn columns(section: Option<Section<'_>>, joints: usize) -> Result<Columns, FileError> {
-    let mut columns = Columns::standard(joints);
-    let Some(section) = section else {
-        return Ok(columns);
-    };
-    section.only(&["time", "q", "qd", "tau"])?;
-    if let Some(time) = section.text("time")? {
-        columns.time = time.value;
-    }
-    for (key, names) in [
-        ("q", &mut columns.q),
-        ("qd", &mut columns.qd),
-        ("tau", &mut columns.tau),
-    ] {
-        let Some(given) = section.texts(key)? else {
-            continue;
-        };
-        if given.len() != joints {
-            let message = format!(
-                "`{key}` needs one column a joint: {joints}, found {}",
-                given.len()
-            );
-            return Err(section.error_at(key, message));
-        }
-        *names = given.into_iter().map(|text| text.value).collect();
-    }
-    Ok(columns)
-}
-
-fn parameters(section: Option<Section<'_>>) -> Result<Vec<Parameter>, FileError> {
-    let Some(section) = section else {
-        return Ok(Vec::new());
-    };
-    section
-        .named_sections()?
-        .into_iter()
-        .map(|(name, section)| parameter(name, &section))
-        .collect()
-}
-
-fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError> {
-    section.only(PARAMETER_KEYS)?;
-    let value = section.required_number("value")?;
-    let bounds = super::effect::bounds(section)?;
-    if !(bounds[0]..=bounds[1]).contains(&value) {
-        let message = format!(
-            "`value` {value} lies outside of its bounds {} to {}",
-            bounds[0], bounds[1]
-        );
-        return Err(section.error_at("value", message));
-    }
-    Ok(Parameter {
-        name,
-        value,
-        unit: section.text_or_empty("unit")?,
-        bounds,
-        fixed: section.flag("fixed")?,
-        ci95: interval(section, "ci95")?,
-        scale: if value == 0.0 { 1.0 } else { value.abs() },
-    })
-}
-
-/// A list of two numbers, where it is given.
-pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 2]>, FileError> {
-    match section.numbers(key)? {
-        None => Ok(None),
-        Some(numbers) => match numbers[..] {
-            [low, high] => Ok(Some([low, high])),
-            _ => Err(section.error_at(key, format!("`{key}` is a list of two numbers"))),
-        },
-    }
-}
-
-/// The paper's sizes: three layers of 16 for one joint, four for more.
-fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<usize>, FileError> {
-    let default = vec![16; if joints == 1 { 3 } else { 4 }];
-    let Some(section) = section else {
-        return Ok(default);
-    };
-    section.only(&["hidden"])?;
-    let Some(numbers) = section.numbers("hidden")? else {
-        return Ok(default);
-    };
-    let wide = |width: &f64| width.fract() == 0.0 && (1.0..=4096.0).contains(width);
-    if !numbers.iter().all(wide) {
-        return Err(section.error_at(
-            "hidden",
-            "`hidden` lists layer widths: whole numbers from 1 to 4096",
-        ));
-    }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just checked
-    Ok(numbers.into_iter().map(|width| width as usize).collect())
-}
-
-fn lets(
-    document: &Document,
-    dynamics: &Section<'_>,
-) -> Result<Vec<(String, Located<Formula>)>, FileError> {
-    let Some(section) = dynamics.section("let")? else {
-        return Ok(Vec::new());
-    };
-    section
-        .named_texts()?
-        .into_iter()
-        .map(|(name, text)| Ok((name, document.formula(&text)?)))
-        .collect()
-}
-
-fn motion(document: &Document, dynamics: &Section<'_>, joints: usize) -> Result<Motion, FileError> {
-    let accelerations: Vec<String> = (1..=joints).map(|j| format!("qdd{j}")).collect();
-    let mut known: Vec<&str> = vec!["let", "mass", "bias"];
-    known.extend(accelerations.iter().map(String::as_str));
-    dynamics.only(&known)?;
-    if !dynamics.has("mass") && !dynamics.has("bias") {
-        let formula = |key: &String| {
-            let missing =
-                || dynamics.error(format!("`{key}` is missing; give it, or `mass` and `bias`"));
-            dynamics.formula(key)?.ok_or_else(missing)
-        };
-        return Ok(Motion::Accelerations(
-            accelerations
-                .iter()
-                .map(formula)
-                .collect::<Result<_, _>>()?,
-        ));
-    }
-    if let Some(both) = accelerations.iter().find(|key| dynamics.has(key)) {
-        return Err(dynamics.error_at(
-            both,
-            "give either accelerations or `mass` and `bias`, not both",
-        ));
-    }
-    let mass = dynamics.matrix("mass")?.unwrap_or_default();
-    let bias = dynamics.texts("bias")?.unwrap_or_default();
-    if mass.len() != joints || mass.iter().any(|row| row.len() != joints) || bias.len() != joints {
-        let message =
-            format!("`mass` is {joints} rows of {joints} formulas and `bias` is {joints} formulas");
-        return Err(dynamics.error_at("mass", message));
-    }
-    let row = |row: &Vec<Located<String>>| row.iter().map(|text| document.formula(text)).collect();
-    Ok(Motion::MassAndBias {
-        mass: mass.iter().map(row).collect::<Result<_, _>>()?,
-        bias: bias
-            .iter()
-            .map(|text| document.formula(text))
-            .collect::<Result<_, _>>()?,
-    })
-}
-
-fn energy(section: Option<Section<'_>>) -> Result<Option<Energy>, FileError> {
-    let Some(section) = section else {
-        return Ok(None);
-    };
-    section.only(&["total", "power"])?;
-    let both = section.formula("total")?.zip(section.formula("power")?);
-    let (total, power) = both.ok_or_else(|| section.error("[energy] needs `total` and `power`"))?;
-    Ok(Some(Energy { total, power }))
-}
-
-/// Everything before the first `[[effect]]`.
-fn declaration(text: &str) -> String {
-    let end = text
-        .match_indices("[[effect]]")
-        .map(|(at, _)| at)
-        .find(|&at| {
-            text[..at]
-                .lines()
-                .next_back()
-                .is_none_or(|line| line.trim().is_empty())
-                || text[..at].ends_with('\n')
-        })
-        .unwrap_or(text.len());
-    text[..end].trim_end().to_owned() + "\n"
 }

@@ -5,9 +5,11 @@ mod json;
 mod model_file;
 mod picture;
 pub mod plot;
+mod summary;
 mod text;
 
 pub use folder::{WriteError, write, write_whole};
 pub use json::Report;
 pub use model_file::model_file;
-pub use text::{summary, text};
+pub use summary::summary;
+pub use text::text;

@@ -21,57 +21,6 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
     sections.concat()
 }
 
-/// The answer for a terminal: a few lines, and where the rest is.
-pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
-    let mut out = format!(
-        "{}: {}\n",
-        headline(outcome).replace("**", ""),
-        outcome.reason
-    );
-    for Finding {
-        effect,
-        expression,
-        parameters,
-        ..
-    } in &outcome.findings
-    {
-        let values: Vec<String> = parameters.iter().map(value).collect();
-        let (name, joint) = (&effect.effect.name, effect.joint + 1);
-        let _ = writeln!(
-            out,
-            "  {name} on joint {joint}: {expression}\n    {}",
-            values.join("\n    ")
-        );
-    }
-    for &k in &outcome.identifiability.hold {
-        let name = &outcome.before.dynamics.parameters[k].name;
-        let _ = writeln!(
-            out,
-            "  {name} is held, the logs do not determine it: the other values are relative to it"
-        );
-    }
-    let joints = outcome.after.dynamics.joints;
-    let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
-    let (before, after) = (
-        numbers(&outcome.errors.before),
-        numbers(&outcome.errors.after),
-    );
-    for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
-        for j in 0..joints {
-            let unit = if outcome.prismatic[j] { "m" } else { "rad" };
-            let (before, after) = (small(before[h][j]), small(after[h][j]));
-            let seconds = horizon.horizon_s;
-            let _ = writeln!(
-                out,
-                "  joint {}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after",
-                j + 1
-            );
-        }
-    }
-    let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
-    out
-}
-
 fn answer(outcome: &Outcome) -> String {
     format!(
         "# {}: {}\n\n{}.\n\n",
@@ -81,7 +30,7 @@ fn answer(outcome: &Outcome) -> String {
     )
 }
 
-fn headline(outcome: &Outcome) -> String {
+pub(super) fn headline(outcome: &Outcome) -> String {
     let found: Vec<String> = outcome
         .findings
         .iter()
@@ -155,7 +104,7 @@ fn share(part: f64) -> String {
 }
 
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
-fn value(parameter: &Parameter) -> String {
+pub(super) fn value(parameter: &Parameter) -> String {
     let digits = parameter
         .ci95
         .map_or(1e-4 * parameter.value.abs(), |[low, high]| {
@@ -253,7 +202,7 @@ fn errors(outcome: &Outcome) -> String {
 }
 
 /// A position error in rad (or m), three significant digits.
-fn small(x: f64) -> String {
+pub(super) fn small(x: f64) -> String {
     rounded(x, 0.01 * x)
 }
 
