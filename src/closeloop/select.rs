@@ -41,8 +41,9 @@ pub struct Selection {
 
 /// Probability of a false alarm that the search admits, over all candidates of a round.
 const FALSE_ALARM: f64 = 0.01;
-/// An effect must lower the loss on left-out stretches by this share: less is of no use to anyone.
-const WORTHWHILE: f64 = 0.02;
+/// An effect must lower the loss on left-out stretches by this share, the error itself thus by a twentieth: less
+/// is of no use to anyone, and on real rigs it is what a wrong effect saves by standing in for others.
+const WORTHWHILE: f64 = 0.1;
 /// Candidates that are fitted after all have been screened.
 const FITTED: usize = 8;
 /// Effects that one search adds at most.
@@ -184,6 +185,10 @@ fn weigh(
     let total: f64 = before.iter().sum();
     let gain = 1.0 - losses.iter().sum::<f64>() / total.max(f64::MIN_POSITIVE);
     let effect = fitted.effects.last().cloned()?;
+    let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
+    if !effect.effect.is_valid(&values) {
+        return None;
+    }
     let p_value = p_value(study, &fitted, fitted.effects.len() - 1)
         .unwrap_or_else(|| p_of_gains(before, &losses));
     Some(Evidence {
@@ -309,8 +314,8 @@ fn simplified(study: &Study<'_>, library: &[Effect], model: Fitted, folds: &[usi
     model
 }
 
-/// Every set of effects that is one step simpler: one effect less, or one replaced by one that it contains. The
-/// first `declared` ones stay.
+/// Every set of effects that is one step simpler: one effect less, or one replaced by some of those that it
+/// contains, fewest first. The first `declared` ones stay.
 fn simpler(
     library: &[Effect],
     effects: &[FittedEffect],
@@ -320,12 +325,12 @@ fn simpler(
     for k in declared..effects.len() {
         let mut without = effects.to_vec();
         let old = without.remove(k);
-        let contained = library
-            .iter()
-            .filter(|effect| old.effect.contains.contains(&effect.name));
-        for effect in contained {
+        for parts in parts_of(library, &old.effect) {
+            let parts = parts
+                .into_iter()
+                .map(|effect| FittedEffect::absent(effect, old.joint));
             let mut replaced = without.clone();
-            replaced.insert(k, FittedEffect::absent(effect, old.joint));
+            replaced.splice(k..k, parts);
             all.push(replaced);
         }
         // The effect that came last is what the round was about: it is replaced at most.
@@ -334,4 +339,26 @@ fn simpler(
         }
     }
     all
+}
+
+/// The sets of effects contained in one that have fewer parameters together, fewest first.
+fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
+    let is_part = |effect: &&Effect| whole.contains.contains(&effect.name);
+    let parts: Vec<&Effect> = library.iter().filter(is_part).collect();
+    let chosen = |set: usize| -> Vec<&Effect> {
+        let members = parts
+            .iter()
+            .enumerate()
+            .filter(|(bit, _)| set >> bit & 1 == 1);
+        members.map(|(_, effect)| *effect).collect()
+    };
+    let size = |set: &Vec<&Effect>| {
+        set.iter()
+            .map(|effect| effect.parameters.len())
+            .sum::<usize>()
+    };
+    let mut sets: Vec<Vec<&Effect>> = (1..1_usize << parts.len()).map(chosen).collect();
+    sets.retain(|set| size(set) < whole.parameters.len());
+    sets.sort_by_key(size);
+    sets
 }

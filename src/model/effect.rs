@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::reader::{Document, FileError, Located, Section};
-use crate::expr::Formula;
+use crate::expr::{Formula, Graph, Scope, SignForm};
 
 /// How an effect enters the equations of its joint. Formulas speak of `q`, `qd`, `tau`, `load`, `t` of
 /// that joint and of the effect's parameters.
@@ -73,6 +73,25 @@ impl Effect {
     }
 }
 
+impl Effect {
+    /// Whether these values of the parameters, in their order, make sense together.
+    pub fn is_valid(&self, values: &[f64]) -> bool {
+        let Some(formula) = &self.valid_if else {
+            return true;
+        };
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(SignForm::Exact);
+        for (parameter, value) in self.parameters.iter().zip(values) {
+            let node = graph.constant(*value);
+            scope.bind(&parameter.name, node);
+        }
+        let condition = scope
+            .lower(&mut graph, formula)
+            .expect("formulas were checked when the file was read");
+        graph.finish(&[condition]).eval(&[])[0] > 0.0
+    }
+}
+
 impl EffectParameter {
     /// Whether the parameter at zero leaves the rig as it is.
     pub fn is_switch(&self) -> bool {
@@ -87,6 +106,8 @@ pub struct Effect {
     pub about: String,
     pub entry: Entry,
     pub parameters: Vec<EffectParameter>,
+    /// What must be positive of the parameters, where not every combination makes sense.
+    pub valid_if: Option<Formula>,
     /// Simpler effects that this one becomes for special values of its parameters.
     pub contains: Vec<String>,
     pub confused_with: Vec<String>,
@@ -107,6 +128,7 @@ const EFFECT_KEYS: &[&str] = &[
     "confused_with",
     "shown_by",
     "joints",
+    "valid_if",
 ];
 const PARAMETER_KEYS: &[&str] = &[
     "unit",
@@ -158,8 +180,13 @@ impl Effect {
             let texts = section.texts(key)?.unwrap_or_default();
             Ok(texts.into_iter().map(|text| text.value).collect())
         };
+        let valid_if = section.formula("valid_if")?;
+        if let Some(formula) = &valid_if {
+            check_names(document, formula, &[], &parameters)?;
+        }
         Ok(Self {
             name: section.required_text("name")?.value,
+            valid_if: valid_if.map(|formula| formula.value),
             about: section.required_text("about")?.value,
             entry,
             parameters,
@@ -202,7 +229,7 @@ fn entry(
                     section.error_at(key, "an effect has one of force, torque, angle and inertia")
                 );
             }
-            check_names(document, &formula, parameters)?;
+            check_names(document, &formula, &EFFECT_NAMES, parameters)?;
             found = Some(make(formula.value));
         }
     }
@@ -211,17 +238,17 @@ fn entry(
     })
 }
 
+/// A formula may mention the parameters and these `names`.
 fn check_names(
     document: &Document,
     formula: &Located<Formula>,
+    names: &[&str],
     parameters: &[EffectParameter],
 ) -> Result<(), FileError> {
-    let mut graph = crate::expr::Graph::new();
-    let mut scope = crate::expr::Scope::new(crate::expr::SignForm::Exact);
-    for name in EFFECT_NAMES
-        .into_iter()
-        .chain(parameters.iter().map(|p| p.name.as_str()))
-    {
+    let mut graph = Graph::new();
+    let mut scope = Scope::new(SignForm::Exact);
+    let parameters = parameters.iter().map(|p| p.name.as_str());
+    for name in names.iter().copied().chain(parameters) {
         let node = graph.input(name);
         scope.bind(name, node);
     }
