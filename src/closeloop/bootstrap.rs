@@ -1,10 +1,11 @@
 use rand::{Rng, RngExt};
 
-use crate::evaluate::{OpenLoop, WindowError};
+use crate::evaluate::OpenLoop;
+use crate::identify::stretches;
 
 const RESAMPLES: usize = 2000;
-/// Windows of a log nearer than this are kept together.
-const BLOCK_S: f64 = 2.0;
+/// With this many logs whole trajectories are resampled.
+const ENOUGH_LOGS: usize = 5;
 
 /// 95 % interval of the relative reduction of the position error (all joints together) from `before` to
 /// `after`, by resampling whole trajectories or, where there are fewer than five, stretches of two seconds.
@@ -34,30 +35,21 @@ pub fn reduction_interval(
 
 /// Squared errors before and after, summed over each block.
 fn blocks(before: &OpenLoop, after: &OpenLoop) -> Vec<(f64, f64)> {
-    let whole_logs = before
+    let logs = before
         .windows
         .iter()
         .map(|w| w.log)
         .max()
-        .map_or(0, |last| last + 1)
-        >= 5;
-    let mut blocks: Vec<(f64, f64)> = Vec::new();
-    let mut current: Option<(usize, f64)> = None;
-    for (b, a) in before.windows.iter().zip(&after.windows) {
-        let continues = current.is_some_and(|(log, since)| {
-            log == b.log && (whole_logs || b.start_s - since < BLOCK_S)
-        });
-        if !continues {
-            current = Some((b.log, b.start_s));
-            blocks.push((0.0, 0.0));
-        }
-        let block = blocks.last_mut().expect("a block was begun");
-        block.0 += squares(b);
-        block.1 += squares(a);
+        .map_or(0, |last| last + 1);
+    let starts = before.windows.iter().map(|w| match logs {
+        ENOUGH_LOGS.. => (w.log, 0.0),
+        _ => (w.log, w.start_s),
+    });
+    let members = stretches(starts);
+    let mut blocks = vec![(0.0, 0.0); members.last().map_or(0, |last| last + 1)];
+    for ((b, a), member) in before.windows.iter().zip(&after.windows).zip(members) {
+        blocks[member].0 += b.position.iter().sum::<f64>();
+        blocks[member].1 += a.position.iter().sum::<f64>();
     }
     blocks
-}
-
-fn squares(window: &WindowError) -> f64 {
-    window.position.iter().sum()
 }

@@ -155,15 +155,10 @@ fn errors(
     let values = hybrid.map(Dynamics::values).unwrap_or_default();
     Errors {
         hybrid: hybrid.map(|model| assess(model, |_| &values, &split.test, horizons_s)),
-        reduction_ci95: reduction_interval(middle(&before), middle(&after), rng),
+        reduction_ci95: reduction_interval(before.middle(), after.middle(), rng),
         before,
         after,
     }
-}
-
-/// The horizon by which effects are compared.
-fn middle(assessment: &Assessment) -> &crate::evaluate::OpenLoop {
-    &assessment.horizons[assessment.horizons.len() / 2]
 }
 
 /// Fitted values with their 95 % intervals; parameters that were not free have none.
@@ -205,7 +200,8 @@ fn findings(
             parameters: own,
             p_value: p_value(study, model, k)
                 .unwrap_or_else(|| p_of_gains(&losses(&without), &losses(model))),
-            error_reduction: 1.0 - rms(with) / rms(&judge(&without)).max(f64::MIN_POSITIVE),
+            error_reduction: 1.0
+                - with.position_rms() / judge(&without).position_rms().max(f64::MIN_POSITIVE),
         })
     };
     let declared = study.system.effects.len();
@@ -226,15 +222,6 @@ fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Option<Fitted> {
             Some(model.fit.scale),
         )
         .ok()
-}
-
-/// Position error of all joints together at the middle horizon.
-fn rms(assessment: &Assessment) -> f64 {
-    let windows = &middle(assessment).windows;
-    let rows: usize = windows.iter().map(|w| w.rows).sum();
-    #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
-    let rows = rows.max(1) as f64;
-    (windows.iter().flat_map(|w| &w.position).sum::<f64>() / rows).sqrt()
 }
 
 fn verdict(
@@ -258,7 +245,7 @@ fn verdict(
         return (Verdict::Inconclusive, reason);
     }
     let found = after.effects.len() - study.system.effects.len();
-    if found > 0 && rms(&errors.after) > WORSE * rms(&errors.before) {
+    if found > 0 && errors.after.position_rms() > WORSE * errors.before.position_rms() {
         let reason = "effects help on left-out stretches of the training logs but raise the error on the test logs: \
                       do not use them before logs of more varied motion confirm them";
         return (Verdict::Inconclusive, reason.into());

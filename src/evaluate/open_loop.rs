@@ -40,6 +40,23 @@ pub struct Assessment {
     pub step_error: f64,
 }
 
+impl Assessment {
+    /// The horizon by which models are compared in one number.
+    pub fn middle(&self) -> &OpenLoop {
+        &self.horizons[self.horizons.len() / 2]
+    }
+
+    /// Position error of all joints together at the middle horizon: root of the mean over rows of the sum over
+    /// joints, rad (or m).
+    pub fn position_rms(&self) -> f64 {
+        let windows = &self.middle().windows;
+        let rows: usize = windows.iter().map(|w| w.rows).sum();
+        #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
+        let rows = rows.max(1) as f64;
+        (windows.iter().flat_map(|w| &w.position).sum::<f64>() / rows).sqrt()
+    }
+}
+
 /// Windows side by side in one rollout.
 const LANES: usize = 8;
 /// A state beyond this (rad, or rad/s) is no motion of a rig.

@@ -18,20 +18,23 @@ const BLOCK_S: f64 = 2.0;
 
 /// For each window, the block it belongs to: stretches of a log of about two seconds.
 pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
-    let mut blocks = Vec::with_capacity(shooting.windows.len());
+    let windows = shooting.windows.iter();
+    stretches(windows.map(|window| (window.log, window.start_s(shooting.logs))))
+}
+
+/// Numbers of the stretches of about two seconds in which windows, given as log and start in s, begin.
+pub fn stretches(windows: impl Iterator<Item = (usize, f64)>) -> Vec<usize> {
+    let mut stretches = Vec::new();
     let mut current: Option<(usize, f64)> = None;
     let mut count = 0;
-    for window in &shooting.windows {
-        let start = window.start_s(shooting.logs);
-        let continues =
-            current.is_some_and(|(log, since)| log == window.log && start - since < BLOCK_S);
-        if !continues {
-            current = Some((window.log, start));
+    for (log, start) in windows {
+        if current.is_none_or(|(of, since)| of != log || start - since >= BLOCK_S) {
+            current = Some((log, start));
             count += 1;
         }
-        blocks.push(count - 1);
+        stretches.push(count - 1);
     }
-    blocks
+    stretches
 }
 
 /// Covariance of the free parameters by the cluster-robust sandwich: it holds when residuals within a

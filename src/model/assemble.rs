@@ -143,25 +143,30 @@ impl<'a> Assembly<'a> {
     }
 
     fn apply_torque_effects(&mut self) {
-        for index in 0..self.effects.len() {
-            let effect = self.effects[index].0;
-            if let Entry::Torque(formula) = &effect.effect.entry {
-                self.tau[effect.joint] = self.effect_node(index, formula);
-            }
+        for (index, joint, formula) in self.entries(|entry| matches!(entry, Entry::Torque(_))) {
+            self.tau[joint] = self.effect_node(index, formula);
         }
     }
 
     fn apply_forces(&mut self) {
-        let mut forces: Vec<(usize, Node)> = Vec::new();
-        for index in 0..self.effects.len() {
-            let effect = self.effects[index].0;
-            if let Entry::Force(formula) = &effect.effect.entry {
-                forces.push((effect.joint, self.effect_node(index, formula)));
-            }
-        }
+        // All forces see the torque as it was before any of them.
+        let forces: Vec<(usize, Node)> = self
+            .entries(|entry| matches!(entry, Entry::Force(_)))
+            .into_iter()
+            .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
+            .collect();
         for (joint, force) in forces {
             self.tau[joint] = self.graph.add(self.tau[joint], force);
         }
+    }
+
+    /// The effects that enter in one way: number, joint and formula.
+    fn entries(&self, is_wanted: impl Fn(&Entry) -> bool) -> Vec<(usize, usize, &'a Formula)> {
+        let effects = self.effects.iter().enumerate();
+        let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect.entry));
+        wanted
+            .map(|(index, (effect, _))| (index, effect.joint, effect.effect.entry.formula()))
+            .collect()
     }
 
     /// An effect's formula in terms of its joint.
@@ -213,24 +218,17 @@ impl<'a> Assembly<'a> {
     }
 
     fn add_inertia(&mut self, matrix: &mut [Vec<Node>]) {
-        for index in 0..self.effects.len() {
-            let effect = self.effects[index].0;
-            if let Entry::Inertia(formula) = &effect.effect.entry {
-                let extra = self.effect_node(index, formula);
-                let own = &mut matrix[effect.joint][effect.joint];
-                *own = self.graph.add(*own, extra);
-            }
+        for (index, joint, formula) in self.entries(|entry| matches!(entry, Entry::Inertia(_))) {
+            let extra = self.effect_node(index, formula);
+            matrix[joint][joint] = self.graph.add(matrix[joint][joint], extra);
         }
     }
 
     /// The names of the declared equations: angles as effects turn them, torques as effects leave them.
     fn declared_scope(&mut self) -> Scope {
         let mut angles = self.q.clone();
-        for index in 0..self.effects.len() {
-            let effect = self.effects[index].0;
-            if let Entry::Angle(formula) = &effect.effect.entry {
-                angles[effect.joint] = self.effect_node(index, formula);
-            }
+        for (index, joint, formula) in self.entries(|entry| matches!(entry, Entry::Angle(_))) {
+            angles[joint] = self.effect_node(index, formula);
         }
         let mut scope = Scope::new(self.narrowest_sign());
         for j in 0..self.system.joints {

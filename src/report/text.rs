@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use crate::closeloop::{Finding, How, MOST_EFFECTS, Outcome, SIGNIFICANT, Verdict, norm};
 use crate::data::Severity;
-use crate::evaluate::{Assessment, Summary, summarise};
+use crate::evaluate::{Summary, summarise};
 use crate::model::Parameter;
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
@@ -275,7 +275,7 @@ fn left(outcome: &Outcome) -> String {
         )
     };
     let network = match &outcome.errors.hybrid {
-        Some(hybrid) if worse(hybrid, &outcome.errors.after) => {
+        Some(hybrid) if hybrid.position_rms() > 1.01 * outcome.errors.after.position_rms() => {
             "The residual network raises the error on the test logs: prefer model.toml to the checkpoint.\n"
         }
         _ => "",
@@ -288,18 +288,6 @@ fn left(outcome: &Outcome) -> String {
         norm(&outcome.residual_before),
         norm(&outcome.residual_after)
     )
-}
-
-/// Whether a model's position error is higher by more than a hundredth at the middle horizon, over all joints.
-fn worse(model: &Assessment, than: &Assessment) -> bool {
-    let squares = |a: &Assessment| -> f64 {
-        a.horizons[a.horizons.len() / 2]
-            .windows
-            .iter()
-            .flat_map(|w| &w.position)
-            .sum()
-    };
-    squares(model).sqrt() > 1.01 * squares(than).sqrt()
 }
 
 fn tried(outcome: &Outcome) -> String {
