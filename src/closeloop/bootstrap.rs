@@ -1,7 +1,7 @@
 use rand::{Rng, RngExt};
 
 use crate::evaluate::OpenLoop;
-use crate::identify::stretches;
+use crate::identify::{BLOCK_S, stretches};
 
 const RESAMPLES: usize = 2000;
 /// With this many logs whole trajectories are resampled.
@@ -45,7 +45,7 @@ fn blocks(before: &OpenLoop, after: &OpenLoop) -> Vec<(f64, f64)> {
         ENOUGH_LOGS.. => (w.log, 0.0),
         _ => (w.log, w.start_s),
     });
-    let members = stretches(starts);
+    let members = stretches(starts, BLOCK_S);
     let mut blocks = vec![(0.0, 0.0); members.last().map_or(0, |last| last + 1)];
     for ((b, a), member) in before.windows.iter().zip(&after.windows).zip(members) {
         blocks[member].0 += b.position.iter().sum::<f64>();

@@ -37,7 +37,7 @@ fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
 }
 
 /// The candidate at each of its starting points, every combination of searched values.
-fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
+pub(super) fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     let mut points = vec![Vec::new()];
     for parameter in &candidate.effect.parameters {
         let grown = points.iter().flat_map(|point| {
@@ -79,4 +79,31 @@ pub fn best_start(
         .into_iter()
         .filter_map(promised)
         .min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
+/// them. `None` if the model has an effect that contains the candidate.
+pub(super) fn beside(
+    study: &Study<'_>,
+    model: &Fitted,
+    candidate: &FittedEffect,
+) -> Option<Fitted> {
+    let contains = |a: &FittedEffect, b: &FittedEffect| {
+        a.joint == b.joint && a.effect.contains.contains(&b.effect.name)
+    };
+    if model
+        .effects
+        .iter()
+        .any(|present| contains(present, candidate))
+    {
+        return None;
+    }
+    let mut beside = model.clone();
+    let found = beside.effects.split_off(study.system.effects.len());
+    beside.effects.extend(
+        found
+            .into_iter()
+            .filter(|present| !contains(candidate, present)),
+    );
+    Some(beside)
 }

@@ -2,21 +2,28 @@
 
 mod bootstrap;
 mod candidate;
+mod confirm;
+mod evidence;
+mod find;
 mod folds;
 mod learn;
 mod outcome;
 mod residual;
 mod run;
-mod select;
+mod search;
+mod simpler;
 mod split;
 mod study;
 mod unexplained;
 
+pub use confirm::TakenBack;
+pub use evidence::{Evidence, p_value};
+pub use find::{Found, find};
 pub use learn::Learned;
 pub use outcome::{Alternative, Errors, Finding, Outcome, Verdict};
 pub use residual::{ForceSample, norm, residual_force};
 pub use run::{Request, STAGES, Stage, close_loop};
-pub use select::{Evidence, MOST_EFFECTS, Round, Selection, p_value, select};
+pub use search::{MOST_EFFECTS, Rival, Round, Selection, select};
 pub use split::{How, Split};
 pub use study::{Fitted, Study, StudyError, joined};
 pub use unexplained::{SIGNIFICANT, Unexplained, unexplained};

@@ -1,6 +1,7 @@
+use super::confirm::TakenBack;
 use super::learn::Learned;
 use super::residual::ForceSample;
-use super::select::{Evidence, Round};
+use super::search::{Rival, Round};
 use super::split::How;
 use super::study::Fitted;
 use super::unexplained::Unexplained;
@@ -42,6 +43,9 @@ pub struct Outcome {
     pub findings: Vec<Finding>,
     pub rounds: Vec<Round>,
     pub alternatives: Vec<Alternative>,
+    pub taken_back: Vec<TakenBack>,
+    /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
+    pub confirmed_on: usize,
     pub unexplained: Unexplained,
     pub errors: Errors,
     /// Residual generalised force along the training logs, by the model before and after.
@@ -70,6 +74,9 @@ pub struct Finding {
 /// Another explanation that the logs do not tell from the one reported.
 #[derive(Debug, Clone)]
 pub struct Alternative {
+    /// The whole set of effects.
+    pub effects: Vec<FittedEffect>,
+    /// The one of them that the set reported does not have.
     pub effect: FittedEffect,
     pub reason: String,
     pub experiment: String,
@@ -85,60 +92,45 @@ pub struct Errors {
 }
 
 impl Alternative {
-    /// The candidates that did as well as the one that a round chose, unless they are in the final model
-    /// themselves; what the latest round says of one holds.
-    pub(super) fn of_rounds(rounds: &[Round], model: &Fitted) -> Vec<Self> {
-        let mut all: Vec<Self> = Vec::new();
-        for alternative in rounds.iter().flat_map(Self::of_round) {
-            let same = |e: &FittedEffect| {
-                e.joint == alternative.effect.joint
-                    && e.effect.name == alternative.effect.effect.name
-            };
-            all.retain(|other| !same(&other.effect));
-            if !model.effects.iter().any(same) {
-                all.push(alternative);
-            }
-        }
-        all
-    }
-
-    fn of_round(round: &Round) -> Vec<Self> {
-        let Some(chosen) = round.chosen.map(|i| &round.evidence[i]) else {
-            return Vec::new();
+    /// The sets of effects that do as well as the one that stood; those of which a part was taken back are none.
+    pub(super) fn of_rivals(rivals: Vec<Rival>, model: &Fitted) -> Vec<Self> {
+        let stands = |effect: &FittedEffect| {
+            let same = |other: &FittedEffect| other.label() == effect.label();
+            model.effects.iter().any(same)
         };
-        let others = round.evidence.iter().filter(|e| !std::ptr::eq(*e, chosen));
-        others
-            .filter(|e| e.is_as_good_as(chosen))
-            .map(|e| Self::to(chosen, e))
-            .collect()
+        let mut rivals: Vec<Rival> = rivals
+            .into_iter()
+            .filter(|rival| stands(&rival.instead_of))
+            .collect();
+        rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        rivals.into_iter().map(Self::from).collect()
     }
+}
 
-    fn to(chosen: &Evidence, other: &Evidence) -> Self {
-        let name = format!(
-            "{} on joint {}",
-            chosen.effect.effect.name,
-            chosen.effect.joint + 1
-        );
-        let contains = other
-            .effect
-            .effect
-            .contains
-            .contains(&chosen.effect.effect.name)
-            && other.effect.joint == chosen.effect.joint;
+impl From<Rival> for Alternative {
+    fn from(rival: Rival) -> Self {
+        let chosen = rival.instead_of.label();
+        let contains = rival.effect.joint == rival.instead_of.joint
+            && rival
+                .effect
+                .effect
+                .contains
+                .contains(&rival.instead_of.effect.name);
         let reason = if contains {
-            format!("contains {name} and explains these logs no better")
+            format!("contains {chosen} and explains these logs no better")
         } else {
             format!(
-                "not separable on these logs: when {name} was added for cutting the left-out loss by {:.0} %, \
-                 this would have cut it by {:.0} %",
-                100.0 * chosen.gain,
-                100.0 * other.gain
+                "not separable from {chosen} on these logs: beside the other effects it cuts the left-out loss by {:.1} %, \
+                 that one by {:.1} %",
+                100.0 * rival.gain,
+                100.0 * rival.gain_of_chosen
             )
         };
         Self {
-            effect: other.effect.clone(),
+            experiment: rival.effect.effect.shown_by.clone(),
+            effects: rival.model.effects,
+            effect: rival.effect,
             reason,
-            experiment: other.effect.effect.shown_by.clone(),
         }
     }
 }

@@ -1,14 +1,15 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::bootstrap::reduction_interval;
+use super::evidence::{p_of_gains, p_value};
+use super::find::{Found, find};
 use super::folds::{folds, left_out_losses};
 use super::learn::learn_residual;
-use super::outcome::{Alternative, Errors, Finding, Outcome, Verdict};
+use super::outcome::{Errors, Finding, Outcome, Verdict};
 use super::residual::residual_force;
-use super::select::{Selection, p_of_gains, p_value, select};
 use super::split::Split;
 use super::study::{Fitted, Study, StudyError};
-use super::unexplained::{Unexplained, unexplained};
+use super::unexplained::Unexplained;
 use crate::data::audit;
 use crate::evaluate::{Assessment, assess, window_count};
 use crate::identify::uncertainty;
@@ -34,7 +35,7 @@ pub struct Stage<'s> {
 }
 
 /// Number of stages that [`close_loop`] announces.
-pub const STAGES: usize = 6;
+pub const STAGES: usize = 7;
 
 /// Fewer windows than this tell nothing.
 const FEWEST_WINDOWS: usize = 8;
@@ -67,34 +68,27 @@ pub fn close_loop(
         return Err(StudyError::NoTest { horizon_s });
     }
     let audits = split.train.iter().chain(&split.test).map(audit).collect();
-    progress(Stage {
-        number: 0,
-        text: "fitting the declared model",
-    });
     let mut study = Study::new(system, &split.train);
-    let before = study.fit_declared()?;
-    let Selection {
-        model: after,
+    let Found {
+        before,
+        after,
         rounds,
-    } = select(&study, library.effects(), before.clone(), &mut |text| {
-        progress(Stage { number: 1, text });
-    });
+        alternatives,
+        taken_back,
+        confirmed_on,
+        unexplained: left,
+    } = find(&mut study, library, progress)?;
     progress(Stage {
-        number: 2,
-        text: "asking what is left",
-    });
-    let left = unexplained(&study, library.probes(), &before, &after);
-    progress(Stage {
-        number: 3,
+        number: 4,
         text: "residual force",
     });
     let residual_before = residual_force(&study, &before);
     let residual_after = residual_force(&study, &after);
     let learned = learn_residual(&study, &after, backend, rng, &mut |text| {
-        progress(Stage { number: 4, text });
+        progress(Stage { number: 5, text });
     })?;
     progress(Stage {
-        number: 5,
+        number: 6,
         text: "open-loop errors",
     });
     let judge = |model: &Fitted| {
@@ -126,7 +120,9 @@ pub fn close_loop(
         sign_widths: study.sign_widths.clone(),
         prismatic: system.prismatic.clone(),
         identifiability: study.identifiability.clone(),
-        alternatives: Alternative::of_rounds(&rounds, &after),
+        alternatives,
+        taken_back,
+        confirmed_on,
         before,
         after,
         parameters,

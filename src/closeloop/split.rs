@@ -42,12 +42,7 @@ impl Split {
     /// Set whole trajectories apart where there are three or more, else the end of each.
     pub fn of(mut logs: Vec<Log>) -> Self {
         if logs.len() >= ENOUGH_LOGS {
-            #[allow(
-                clippy::cast_precision_loss,
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss
-            )]
-            let count = ((logs.len() as f64 * TEST_SHARE).round() as usize).max(1);
+            let count = share_of(logs.len());
             let test = logs.split_off(logs.len() - count);
             return Self {
                 train: logs,
@@ -55,6 +50,11 @@ impl Split {
                 how: How::LastLogs { count },
             };
         }
+        Self::ends_of(logs)
+    }
+
+    /// Set the end of each log apart.
+    fn ends_of(logs: Vec<Log>) -> Self {
         let (mut train, mut test) = (Vec::new(), Vec::new());
         for log in logs {
             let middle = log.time[0] + (1.0 - TEST_SHARE) * log.duration();
@@ -72,6 +72,54 @@ impl Split {
             },
         }
     }
+}
+
+/// With this many logs to learn from whole ones are set aside to confirm what was learned.
+const ENOUGH_TO_SPARE: usize = 4;
+
+/// Less than this (s) is needed whole to choose effects by.
+const TOO_SHORT_TO_SPARE_S: f64 = 10.0;
+
+/// Logs to choose effects by, and others to confirm the choice: whole trajectories where there are four or
+/// more, else the end of each after a gap. The confirming ones are those of middling speed: a
+/// choice is to be confirmed within the range of motion that it was made for. Of a few seconds none are set aside.
+pub(super) fn set_aside(logs: &[Log]) -> (Vec<Log>, Vec<Log>) {
+    if logs.iter().map(Log::duration).sum::<f64>() < TOO_SHORT_TO_SPARE_S {
+        return (logs.to_vec(), Vec::new());
+    }
+    if logs.len() < ENOUGH_TO_SPARE {
+        let halves = Split::ends_of(logs.to_vec());
+        return (halves.train, halves.test);
+    }
+    let mut by_speed: Vec<usize> = (0..logs.len()).collect();
+    by_speed.sort_by(|&a, &b| speed(&logs[a]).total_cmp(&speed(&logs[b])));
+    let count = share_of(logs.len());
+    let first = (logs.len() - count) / 2;
+    let confirming = &by_speed[first..first + count];
+    let (aside, kept): (Vec<usize>, Vec<usize>) =
+        (0..logs.len()).partition(|k| confirming.contains(k));
+    let of = |indices: Vec<usize>| indices.into_iter().map(|k| logs[k].clone()).collect();
+    (of(kept), of(aside))
+}
+
+/// Mean distance travelled in a second, over all joints.
+fn speed(log: &Log) -> f64 {
+    let travelled = |q: &Vec<f64>| {
+        q.windows(2)
+            .map(|pair| (pair[1] - pair[0]).abs())
+            .sum::<f64>()
+    };
+    log.q.iter().map(travelled).sum::<f64>() / log.duration().max(f64::MIN_POSITIVE)
+}
+
+/// How many of so many logs are set apart.
+#[allow(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss
+)] // few logs
+fn share_of(logs: usize) -> usize {
+    ((logs as f64 * TEST_SHARE).round() as usize).max(1)
 }
 
 /// The rows of a log from `start_s` to `end_s`.

@@ -100,6 +100,23 @@ impl<'a> Study<'a> {
         }
     }
 
+    /// The same system on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
+    pub fn on<'b>(&self, logs: &'b [Log]) -> Study<'b>
+    where
+        'a: 'b,
+    {
+        Study {
+            system: self.system,
+            logs,
+            sign: self.sign.clone(),
+            sign_widths: self.sign_widths.clone(),
+            top_speed: self.top_speed.clone(),
+            top_torque: self.top_torque.clone(),
+            shooting: Shooting::new(logs, cut(logs, WINDOW_S), &self.shooting.noise),
+            identifiability: Identifiability::default(),
+        }
+    }
+
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
     /// windows, in which even a poor start does not diverge, then over longer ones. Parameters that the
     /// logs do not determine are found on the way and held from then on at the values reached: only those are

@@ -1,7 +1,7 @@
 use serde::Serialize;
 
+use super::evidence::p_value;
 use super::folds::{folds, left_out_losses};
-use super::select::p_value;
 use super::study::{Fitted, Study};
 use crate::model::{Effect, FittedEffect};
 

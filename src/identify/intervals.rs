@@ -14,21 +14,28 @@ pub struct Uncertainty {
 }
 
 /// Windows nearer than this (s) belong to one block: what a model lacks is correlated over a swing or two.
-const BLOCK_S: f64 = 2.0;
+pub const BLOCK_S: f64 = 2.0;
+/// Short logs are cut into as many blocks as this, though not shorter than a window's half second: of fewer no test
+/// says anything.
+const ENOUGH_BLOCKS: f64 = 12.0;
+const SHORTEST_BLOCK_S: f64 = 0.5;
 
 /// For each window, the block it belongs to: stretches of a log of about two seconds.
 pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
-    let windows = shooting.windows.iter();
-    stretches(windows.map(|window| (window.log, window.start_s(shooting.logs))))
+    let windows = &shooting.windows;
+    let total_s: f64 = windows.iter().map(|w| w.duration_s(shooting.logs)).sum();
+    let length_s = (total_s / ENOUGH_BLOCKS).clamp(SHORTEST_BLOCK_S, BLOCK_S);
+    let starts = windows.iter().map(|w| (w.log, w.start_s(shooting.logs)));
+    stretches(starts, length_s)
 }
 
-/// Numbers of the stretches of about two seconds in which windows, given as log and start in s, begin.
-pub fn stretches(windows: impl Iterator<Item = (usize, f64)>) -> Vec<usize> {
+/// Numbers of the stretches of about `length_s` in which windows, given as log and start in s, begin.
+pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> Vec<usize> {
     let mut stretches = Vec::new();
     let mut current: Option<(usize, f64)> = None;
     let mut count = 0;
     for (log, start) in windows {
-        if current.is_none_or(|(of, since)| of != log || start - since >= BLOCK_S) {
+        if current.is_none_or(|(of, since)| of != log || start - since >= length_s * (1.0 - 1e-6)) {
             current = Some((log, start));
             count += 1;
         }
@@ -37,27 +44,39 @@ pub fn stretches(windows: impl Iterator<Item = (usize, f64)>) -> Vec<usize> {
     stretches
 }
 
-/// Covariance of the free parameters by the cluster-robust sandwich: it holds when residuals within a
-/// block are correlated, as they are wherever a model lacks something (Liang and Zeger 1986).
+/// Covariance of the free parameters by the jackknife over blocks: it holds when residuals within a block are
+/// correlated, as they are wherever a model lacks something, and when few blocks carry most of what is
+/// known, where the plain sandwich is too sure (Bell and McCaffrey 2002). The fits without a block are not
+/// repeated: each window's loss is taken as quadratic around the joint optimum.
 pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
     let count = blocks.last().map_or(0, |last| last + 1);
     let size = fit.active.len();
     let mut hessian = DMatrix::zeros(size, size);
-    let mut scores = vec![DVector::zeros(size); count];
+    let mut parts = vec![(DVector::zeros(size), DMatrix::zeros(size, size)); count];
     for (terms, &block) in fit.reduced.iter().zip(&blocks) {
         hessian += &terms.hessian;
-        scores[block] += &terms.gradient;
+        parts[block].0 += &terms.gradient;
+        parts[block].1 += &terms.hessian;
     }
-    let mut spread = DMatrix::zeros(size, size);
-    for score in &scores {
-        spread += score * score.transpose();
-    }
+    let (_, flat) = inverse(&hessian);
+    let steps: Vec<DVector<f64>> = parts
+        .iter()
+        .map(|(gradient, part)| inverse(&(&hessian - part)).0 * gradient)
+        .collect();
     #[allow(clippy::cast_precision_loss)] // few blocks
-    let correction = count as f64 / (count as f64 - 1.0).max(1.0);
-    let (inverse, flat) = inverse(&hessian);
+    let share = 1.0 / count.max(1) as f64;
+    let mean = steps
+        .iter()
+        .fold(DVector::zeros(size), |sum, step| sum + step)
+        * share;
+    let mut spread = flat;
+    for step in &steps {
+        let off = step - &mean;
+        spread += &off * off.transpose() * (1.0 - share);
+    }
     Uncertainty {
-        covariance: &inverse * spread * &inverse * correction + flat,
+        covariance: spread,
         blocks: count,
     }
 }

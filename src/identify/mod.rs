@@ -13,7 +13,7 @@ mod window;
 
 pub use fit::{Fit, FitError, fit, promise};
 pub use identifiability::{Identifiability, identifiability};
-pub use intervals::{Uncertainty, blocks, stretches, uncertainty};
+pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
 pub use sensitivity::Local;
 pub use shooting::{Shooting, WindowTerms};
 pub use window::{Window, cut, initial_state};

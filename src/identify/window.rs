@@ -15,6 +15,12 @@ impl Window {
         self.last - self.first + 1
     }
 
+    /// Time from the first row to the last in s.
+    pub fn duration_s(&self, logs: &[Log]) -> f64 {
+        let time = &logs[self.log].time;
+        time[self.last] - time[self.first]
+    }
+
     /// Time of the first row in s.
     pub fn start_s(&self, logs: &[Log]) -> f64 {
         logs[self.log].time[self.first]

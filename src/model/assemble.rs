@@ -49,6 +49,11 @@ impl FittedEffect {
         }
     }
 
+    /// What tells this effect from others in one model.
+    pub fn label(&self) -> String {
+        format!("{} on joint {}", self.effect.name, self.joint + 1)
+    }
+
     /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
     pub fn expression(&self, names: &[String]) -> String {
         let mut graph = Graph::new();

@@ -1,9 +1,9 @@
 use serde::Serialize;
 
-use crate::closeloop::{Alternative, Finding, How, Outcome, Unexplained, Verdict, norm};
+use crate::closeloop::{Alternative, Finding, How, Outcome, TakenBack, Unexplained, Verdict, norm};
 use crate::data::Finding as AuditFinding;
 use crate::evaluate::{Assessment, Summary, summarise};
-use crate::model::Parameter;
+use crate::model::{FittedEffect, Parameter};
 
 /// `report.json`: the outcome with fixed names, for other programs.
 #[derive(Debug, Serialize)]
@@ -19,6 +19,9 @@ pub struct Report {
     reason: String,
     effects: Vec<EffectEntry>,
     alternatives: Vec<AlternativeEntry>,
+    taken_back: Vec<TakenBackEntry>,
+    /// Stretches of two seconds, not used to choose the effects, that confirm them.
+    confirmed_on: usize,
     unexplained: UnexplainedEntry,
     parameters: Vec<ParameterEntry>,
     identifiability: IdentifiabilityEntry,
@@ -60,6 +63,14 @@ struct AlternativeEntry {
     effects: Vec<EffectName>,
     reason: String,
     experiment: String,
+}
+
+/// An effect that was chosen and did not stand.
+#[derive(Debug, Serialize)]
+struct TakenBackEntry {
+    #[serde(flatten)]
+    effect: EffectName,
+    reason: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -167,6 +178,8 @@ impl Report {
             reason: outcome.reason.clone(),
             effects: outcome.findings.iter().map(effect).collect(),
             alternatives: outcome.alternatives.iter().map(alternative).collect(),
+            taken_back: outcome.taken_back.iter().map(taken_back).collect(),
+            confirmed_on: outcome.confirmed_on,
             unexplained: left(&outcome.unexplained),
             parameters: outcome.parameters[..declared]
                 .iter()
@@ -222,12 +235,23 @@ fn parameter(parameter: &Parameter) -> ParameterEntry {
     }
 }
 
+fn effect_name(effect: &FittedEffect) -> EffectName {
+    EffectName {
+        name: effect.effect.name.clone(),
+        joint: effect.joint + 1,
+    }
+}
+
+fn taken_back(taken_back: &TakenBack) -> TakenBackEntry {
+    TakenBackEntry {
+        effect: effect_name(&taken_back.effect),
+        reason: taken_back.reason.clone(),
+    }
+}
+
 fn alternative(alternative: &Alternative) -> AlternativeEntry {
     AlternativeEntry {
-        effects: vec![EffectName {
-            name: alternative.effect.effect.name.clone(),
-            joint: alternative.effect.joint + 1,
-        }],
+        effects: alternative.effects.iter().map(effect_name).collect(),
         reason: alternative.reason.clone(),
         experiment: alternative.experiment.clone(),
     }

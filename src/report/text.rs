@@ -10,6 +10,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
     let sections = [
         answer(outcome),
         effects(&outcome.findings),
+        confirmed(outcome),
         errors(outcome),
         parameters(outcome),
         alternatives(outcome),
@@ -252,6 +253,24 @@ fn alternatives(outcome: &Outcome) -> String {
         );
     }
     out + "\n"
+}
+
+fn confirmed(outcome: &Outcome) -> String {
+    let mut out = match (outcome.findings.is_empty(), outcome.confirmed_on) {
+        (true, _) => String::new(),
+        (false, 0) => {
+            "The logs leave nothing to confirm the effects on beyond what they were chosen by.\n"
+                .into()
+        }
+        (false, stretches) => format!(
+            "Each effect lowers the loss on {stretches} stretches of training data that it was not chosen by.\n"
+        ),
+    };
+    for taken_back in &outcome.taken_back {
+        let (label, reason) = (taken_back.effect.label(), &taken_back.reason);
+        let _ = writeln!(out, "- **{label}** was chosen and taken back: {reason}.");
+    }
+    if out.is_empty() { out } else { out + "\n" }
 }
 
 fn left(outcome: &Outcome) -> String {
