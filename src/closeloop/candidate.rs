@@ -1,5 +1,5 @@
 use super::study::{Fitted, Study, joined};
-use crate::identify::promise;
+use crate::identify::{Shooting, promise};
 use crate::model::{Effect, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet.
@@ -53,32 +53,45 @@ pub(super) fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     points.into_iter().map(at).collect()
 }
 
-/// The starting point of a candidate that promises most beside the model at hand, and the cost it promises.
+/// The starting point of a candidate that promises most beside the model at hand, and the cost it promises: found
+/// on a sample of the windows where there are several, and asked of all of them.
 pub fn best_start(
     study: &Study<'_>,
     model: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<(FittedEffect, f64)> {
-    let promised = |start: FittedEffect| {
-        let mut effects = model.effects.clone();
-        effects.push(start.clone());
-        let dynamics = study.system.dynamics_with(&effects, &study.sign);
-        let values = joined(&model.declared, &effects);
-        let (active, locals) = (study.active(&dynamics), &model.fit.locals);
-        promise(
-            &study.shooting,
-            &dynamics,
-            &active,
-            &values,
-            locals,
-            model.fit.scale,
-        )
-        .map(|cost| (start, cost))
-    };
-    starts(candidate)
-        .into_iter()
-        .filter_map(promised)
-        .min_by(|a, b| a.1.total_cmp(&b.1))
+    let mut starts = starts(candidate);
+    if starts.len() > 1 {
+        let locals = study.sample.locals(&model.fit.locals);
+        let promised = |start: FittedEffect| {
+            let cost = promised(study, &study.sample.shooting, model, &start, &locals)?;
+            Some((start, cost))
+        };
+        let best = starts
+            .into_iter()
+            .filter_map(promised)
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        starts = vec![best.0];
+    }
+    let start = starts.pop()?;
+    let cost = promised(study, &study.shooting, model, &start, &model.fit.locals)?;
+    Some((start, cost))
+}
+
+/// The cost that a candidate promises on some windows.
+fn promised(
+    study: &Study<'_>,
+    shooting: &Shooting<'_>,
+    model: &Fitted,
+    start: &FittedEffect,
+    locals: &[Vec<f64>],
+) -> Option<f64> {
+    let mut effects = model.effects.clone();
+    effects.push(start.clone());
+    let dynamics = study.system.dynamics_with(&effects, &study.sign);
+    let values = joined(&model.declared, &effects);
+    let (active, scale) = (study.active(&dynamics), model.fit.scale);
+    promise(shooting, &dynamics, &active, &values, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares

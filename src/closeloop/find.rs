@@ -2,7 +2,7 @@ use super::confirm::{Confirmed, TakenBack, confirm};
 use super::folds::{folds, left_out_losses};
 use super::outcome::Alternative;
 use super::run::Stage;
-use super::search::{Round, Selection, select};
+use super::search::{Round, Search};
 use super::split::set_aside;
 use super::study::{Fitted, Study, StudyError};
 use super::unexplained::{Unexplained, unexplained};
@@ -43,21 +43,18 @@ pub fn find(
     let mut chosen_by = study.on(&chosen_by);
     let aside = study.on(&aside);
     let declared = chosen_by.fit_declared()?;
-    let Selection {
-        model,
-        rounds,
-        rivals,
-    } = select(&chosen_by, library.effects(), declared, &mut |text| {
-        stage(1, text);
-    });
-    stage(2, "confirming the choice");
+    let mut tell = |text: &str| stage(1, text);
+    let mut search = Search::new(&chosen_by, library.effects(), &mut tell);
+    let model = search.select(declared);
     let Confirmed {
         model,
         mut taken_back,
         stretches,
     } = confirm(&chosen_by, &aside, model);
+    let rivals = search.rivals(&model);
+    let rounds = search.rounds;
     let mut after = on_all(study, &before, &model);
-    stage(3, "asking what is left");
+    stage(2, "asking what is left");
     let mut left = unexplained(study, library.probes(), &before, &after);
     if left.is_significant() && share_left(study, &before, &after) > HALF {
         taken_back.extend(stand_ins(study, &after));

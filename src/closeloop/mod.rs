@@ -23,7 +23,7 @@ pub use learn::Learned;
 pub use outcome::{Alternative, Errors, Finding, Outcome, Verdict};
 pub use residual::{ForceSample, norm, residual_force};
 pub use run::{Request, STAGES, Stage, close_loop};
-pub use search::{MOST_EFFECTS, Rival, Round, Selection, select};
+pub use search::{MOST_EFFECTS, Rival, Round, Search};
 pub use split::{How, Split};
 pub use study::{Fitted, Study, StudyError, joined};
 pub use unexplained::{SIGNIFICANT, Unexplained, unexplained};

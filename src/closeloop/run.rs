@@ -35,7 +35,7 @@ pub struct Stage<'s> {
 }
 
 /// Number of stages that [`close_loop`] announces.
-pub const STAGES: usize = 7;
+pub const STAGES: usize = 6;
 
 /// Fewer windows than this tell nothing.
 const FEWEST_WINDOWS: usize = 8;
@@ -79,16 +79,16 @@ pub fn close_loop(
         unexplained: left,
     } = find(&mut study, library, progress)?;
     progress(Stage {
-        number: 4,
+        number: 3,
         text: "residual force",
     });
     let residual_before = residual_force(&study, &before);
     let residual_after = residual_force(&study, &after);
     let learned = learn_residual(&study, &after, backend, rng, &mut |text| {
-        progress(Stage { number: 5, text });
+        progress(Stage { number: 4, text });
     })?;
     progress(Stage {
-        number: 6,
+        number: 5,
         text: "open-loop errors",
     });
     let judge = |model: &Fitted| {

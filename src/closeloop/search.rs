@@ -29,14 +29,6 @@ pub struct Rival {
     pub gain_of_chosen: f64,
 }
 
-/// The outcome of the search.
-#[derive(Debug, Clone)]
-pub struct Selection {
-    pub model: Fitted,
-    pub rounds: Vec<Round>,
-    pub rivals: Vec<Rival>,
-}
-
 /// Probability of a false alarm that a look admits, over all candidates and all their starting points.
 const FALSE_ALARM: f64 = 0.05;
 /// Few stretches cannot prove so much. There an effect is admitted that takes away half of the loss on stretches
@@ -48,47 +40,6 @@ const FITTED: usize = 8;
 /// Effects that one search adds at most.
 pub const MOST_EFFECTS: usize = 6;
 
-/// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
-/// then exchange, simplify and remove until each effect is the best choice beside all others.
-/// `progress` is told what is being tried.
-pub fn select(
-    study: &Study<'_>,
-    library: &[Effect],
-    declared: Fitted,
-    progress: &mut dyn FnMut(&str),
-) -> Selection {
-    let mut search = Search {
-        study,
-        library,
-        folds: folds(&study.shooting),
-        looks: HashMap::new(),
-        settled: Vec::new(),
-        progress,
-    };
-    let (mut model, mut rounds) = (declared, Vec::new());
-    while model.effects.len() < study.system.effects.len() + MOST_EFFECTS {
-        let round = search.look(&model, None);
-        rounds.push(round.clone());
-        let next = match round.chosen {
-            Some(chosen) => search.simplified(search.rescaled(&round.evidence[chosen].model)),
-            None => match search.exchanged(&model) {
-                Some(other) => search.simplified(search.rescaled(&other)),
-                None => break,
-            },
-        };
-        if search.has_been_at(&next) {
-            break;
-        }
-        model = next;
-    }
-    let rivals = search.rivals(&model);
-    Selection {
-        model,
-        rounds,
-        rivals,
-    }
-}
-
 /// Effects of a model whatever their order.
 type Key = Vec<String>;
 
@@ -98,22 +49,63 @@ fn key(effects: &[FittedEffect]) -> Key {
     key
 }
 
-struct Search<'a, 'p> {
+/// A search for the effects that a model lacks, and what it has seen so far.
+pub struct Search<'a, 'p> {
     study: &'a Study<'a>,
     library: &'a [Effect],
     folds: Vec<usize>,
     /// What has been looked at, by the effects of the model.
     looks: HashMap<Key, Round>,
     /// Models that the search has passed through.
-    settled: Vec<Key>,
+    passed: Vec<Key>,
+    /// What was looked at to add one more effect, in this order.
+    pub rounds: Vec<Round>,
     progress: &'p mut dyn FnMut(&str),
 }
 
-impl Search<'_, '_> {
-    fn has_been_at(&mut self, model: &Fitted) -> bool {
+impl<'a, 'p> Search<'a, 'p> {
+    /// `progress` is told what is being tried.
+    pub fn new(
+        study: &'a Study<'a>,
+        library: &'a [Effect],
+        progress: &'p mut dyn FnMut(&str),
+    ) -> Self {
+        Self {
+            study,
+            library,
+            folds: folds(&study.shooting),
+            looks: HashMap::new(),
+            passed: Vec::new(),
+            rounds: Vec::new(),
+            progress,
+        }
+    }
+
+    /// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
+    /// then exchange, simplify and remove until each effect is the best choice beside all others.
+    pub fn select(&mut self, declared: Fitted) -> Fitted {
+        let mut model = declared;
+        while model.effects.len() < self.declared() + MOST_EFFECTS {
+            let round = self.look(&model, None);
+            self.rounds.push(round.clone());
+            let next = match round.chosen {
+                Some(chosen) => Some(round.evidence[chosen].model.clone()),
+                None => self.exchanged(&model),
+            };
+            let Some(next) = next else { break };
+            let next = self.simplified(self.rescaled(&next));
+            if self.has_passed(&next) {
+                break;
+            }
+            model = next;
+        }
+        model
+    }
+
+    fn has_passed(&mut self, model: &Fitted) -> bool {
         let key = key(&model.effects);
-        let known = self.settled.contains(&key);
-        self.settled.push(key);
+        let known = self.passed.contains(&key);
+        self.passed.push(key);
         known
     }
 
@@ -230,8 +222,8 @@ impl Search<'_, '_> {
         })
     }
 
-    /// What explains the logs as well as one of the effects does, beside all others.
-    fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
+    /// What explains the logs as well as one of the effects of a model does, beside all others.
+    pub fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
         let mut rivals = Vec::new();
         for k in self.declared()..model.effects.len() {
             let Some((present, without)) = self.without(model, k) else {

@@ -40,8 +40,37 @@ pub struct Study<'a> {
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub shooting: Shooting<'a>,
+    /// A few of its windows, spread evenly, for first looks.
+    pub sample: Sample<'a>,
     /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
     pub identifiability: Identifiability,
+}
+
+/// Some of a study's windows.
+pub struct Sample<'a> {
+    pub shooting: Shooting<'a>,
+    /// Which of the study's windows they are.
+    members: Vec<usize>,
+}
+
+/// Windows of a first look.
+const SAMPLE: usize = 24;
+
+impl<'a> Sample<'a> {
+    fn of(shooting: &Shooting<'a>) -> Self {
+        let every = shooting.windows.len().div_ceil(SAMPLE).max(1);
+        let members: Vec<usize> = (0..shooting.windows.len()).step_by(every).collect();
+        let windows = members.iter().map(|&w| shooting.windows[w]).collect();
+        Self {
+            shooting: Shooting::new(shooting.logs, windows, &shooting.noise),
+            members,
+        }
+    }
+
+    /// The local values of these windows, of those of all.
+    pub fn locals(&self, all: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        self.members.iter().map(|&w| all[w].clone()).collect()
+    }
 }
 
 /// A model fitted to a study's logs.
@@ -85,6 +114,7 @@ impl<'a> Study<'a> {
                 .collect()
         };
         let sign_widths: Vec<f64> = system.sign_width.clone().unwrap_or_else(by_speed);
+        let shooting = Shooting::new(logs, cut(logs, WINDOW_S), &noise);
         Self {
             system,
             logs,
@@ -93,7 +123,8 @@ impl<'a> Study<'a> {
                 .map(|&width| SignForm::Smooth { width })
                 .collect(),
             sign_widths,
-            shooting: Shooting::new(logs, cut(logs, WINDOW_S), &noise),
+            sample: Sample::of(&shooting),
+            shooting,
             top_speed,
             top_torque,
             identifiability: Identifiability::default(),
@@ -105,6 +136,7 @@ impl<'a> Study<'a> {
     where
         'a: 'b,
     {
+        let shooting = Shooting::new(logs, cut(logs, WINDOW_S), &self.shooting.noise);
         Study {
             system: self.system,
             logs,
@@ -112,7 +144,8 @@ impl<'a> Study<'a> {
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
-            shooting: Shooting::new(logs, cut(logs, WINDOW_S), &self.shooting.noise),
+            sample: Sample::of(&shooting),
+            shooting,
             identifiability: Identifiability::default(),
         }
     }

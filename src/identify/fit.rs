@@ -39,8 +39,10 @@ pub struct Fit {
 
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
 const MOST_STEPS: usize = 40;
-/// A fit ends when a step lowers the cost by less than this share.
+/// A fit that estimates ends when a step lowers the cost by less than this share.
 const ENOUGH: f64 = 1e-6;
+/// A fit at a given scale is for comparing models, which differ by more than this share of the cost or not at all.
+const ENOUGH_TO_COMPARE: f64 = 1e-4;
 
 /// Fit the parameters `active` of `dynamics` to the windows, starting from `values` and `locals`, with
 /// every window's start state (and forces) free: Levenberg-Marquardt with the windows' own values
@@ -118,6 +120,8 @@ struct Search<'a> {
     locals: Vec<Vec<f64>>,
     scale: f64,
     cost: f64,
+    /// The share of the cost by which a step must lower it for another one to follow.
+    enough: f64,
     damping: f64,
     iterations: usize,
 }
@@ -142,6 +146,7 @@ impl<'a> Search<'a> {
             locals,
             scale: scale.unwrap_or(1.0),
             cost: f64::INFINITY,
+            enough: scale.map_or(ENOUGH, |_| ENOUGH_TO_COMPARE),
             damping: 1e-3,
             iterations: 0,
         };
@@ -191,7 +196,7 @@ impl<'a> Search<'a> {
                 let gain = (self.cost - cost) / self.cost.max(f64::MIN_POSITIVE);
                 (self.values, self.locals, self.cost) = (values, locals, cost);
                 self.damping = (self.damping * 0.1).max(1e-12);
-                return gain > ENOUGH;
+                return gain > self.enough;
             }
             self.damping *= 10.0;
         }
