@@ -194,6 +194,35 @@ fn an_effect_that_cannot_act_is_refused() {
 }
 
 #[test]
+fn an_effect_file_says_per_what_a_parameter_differs() {
+    let contents = "[effect]\nname = \"zero\"\nabout = \"zero\"\nangle = \"q - z\"\n\n[parameters]\n\
+                z = { unit = \"rad\", typical = 0.1, per = \"week\" }\n";
+    let effect = scratch("zero.toml", contents);
+    let folder = effect.folder.path();
+    says(
+        &refuses(&["list", "effects", "--effects", text(folder)]),
+        &[
+            "zero.toml, line 7, column 42",
+            "`per` is \"log\"",
+            "\"week\"",
+        ],
+    );
+}
+
+#[test]
+fn values_of_single_logs_are_for_parameters_that_have_them() {
+    let effect = |text: &str| model_message("[energy]", &format!("[[effect]]\n{text}\n\n[energy]"));
+    says(
+        &effect("name = \"viscous_friction\"\njoint = 1\nb = { value = 1, logs = { a = 1 } }"),
+        &["line 16, column 18", "unknown key `logs`"],
+    );
+    says(
+        &effect("name = \"sensor_offset\"\njoint = 1\nq_z = { value = 0, logs = { a = 3 } }"),
+        &["line 13", "q_z = 3 lies outside of -0.5 to 0.5"],
+    );
+}
+
+#[test]
 fn a_model_that_is_not_there_is_met_with_what_is() {
     says(
         &scratch("log.csv", GOOD).closeloop("pendulun"),

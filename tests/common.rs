@@ -29,6 +29,7 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
         effect: effect.clone(),
         joint,
         values: values.iter().map(|value| (*value, None)).collect(),
+        own: Vec::new(),
         fixed: false,
     }
 }

@@ -175,6 +175,38 @@ fn a_tilt_turns_gravity() {
     }
 }
 
+/// In logged angles: whatever the rig's own angle does, the logged one less the offset does.
+#[test]
+fn an_offset_sensor_reads_another_angle_than_the_rig_has() {
+    let library = Library::built_in();
+    let effect = |name: &str, values: &[f64]| fitted(library.effect(name).unwrap(), 0, values);
+    let others = [
+        effect("gravity_tilt", &[0.03]),
+        effect("joint_spring", &[0.4, 0.5]),
+        effect("cogging_torque", &[0.1, 7.0, 0.3]),
+    ];
+    let offset = effect("sensor_offset", &[0.02]);
+    let system = system("pendulum");
+    let bare = dynamics(&system, &others, SignForm::Exact);
+    for place in 0..=others.len() {
+        let mut effects = others.to_vec();
+        effects.insert(place, offset.clone());
+        let read = dynamics(&system, &effects, SignForm::Exact);
+        for point in points(&read, 50, 9) {
+            let at = read
+                .parameters
+                .iter()
+                .position(|p| p.name == "q_z1")
+                .unwrap()
+                + 4;
+            let mut own = point.clone();
+            own[0] -= own.remove(at);
+            let (found, wanted) = (read.program.eval(&point), bare.program.eval(&own));
+            assert_near(found[1], wanted[1], ROUNDING, "pendulum");
+        }
+    }
+}
+
 /// M(q) qdd = tau - bias: the mass matrix's columns are what unit torques reveal, so that the rotor's
 /// inertia is tested by the torque it would take to turn it.
 #[test]
@@ -249,7 +281,7 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 #[test]
 fn every_effect_file_is_tested_here() {
     let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
-    tested.extend(["gravity_tilt", "rotor_inertia"]);
+    tested.extend(["gravity_tilt", "rotor_inertia", "sensor_offset"]);
     tested.sort_unstable();
     let library = Library::built_in();
     let known: Vec<&str> = library.effects().iter().map(|e| e.name.as_str()).collect();

@@ -220,6 +220,71 @@ fn intervals_hold_the_truth_as_often_as_they_say() {
     assert!((mean - 1.0).abs() < 0.05, "{mean}");
 }
 
+/// Three logs of one rig, the zero of its sensor taken anew for each.
+const OFFSETS: [f64; 3] = [0.03, -0.02, 0.04];
+
+fn offset_logs(model: &Dynamics, seed: u64) -> Vec<Log> {
+    let log = |(k, offset): (u64, &f64)| {
+        let mut log = simulate(model, &[3.0, 0.0], 1.0, 1200, 5 + k);
+        log.q[0].iter_mut().for_each(|q| *q += offset);
+        log.path = format!("run{k}.csv").into();
+        add_noise(&mut log, 10 * seed + k);
+        log
+    };
+    (0..).zip(&OFFSETS).map(log).collect()
+}
+
+#[test]
+fn offsets_come_back_log_by_log_with_honest_intervals() {
+    const SEEDS: u64 = 40;
+    let library = Library::built_in();
+    let offset = fitted(library.effect("sensor_offset").unwrap(), 0, &[0.0]);
+    let pendulum = system("pendulum");
+    let rig = dynamics(&pendulum, &[], SignForm::Exact);
+    let model = dynamics(&pendulum, &[offset], SignForm::Exact);
+    let mut hits = Vec::new();
+    for seed in 0..SEEDS {
+        let logs = offset_logs(&rig, seed);
+        let shooting = shooting(&logs, 1);
+        let fit = fit_to(&shooting, &model, &[0, 1, 2], &[12.0, 3.6, 0.0]);
+        assert_eq!(fit.columns.len(), 5);
+        let uncertainty = uncertainty(&shooting, &fit);
+        let truth = [&[15.0, 3.0], OFFSETS.as_slice()].concat();
+        for (i, column) in fit.columns.iter().enumerate() {
+            assert_eq!(column.log, i.checked_sub(2));
+            assert_eq!(
+                fit.value(i),
+                fit.values_of_log(column.log.unwrap_or(0))[column.parameter]
+            );
+            hits.push((fit.value(i) - truth[i]).abs() <= uncertainty.half_width(i));
+        }
+        // The intervals of the offsets are worth having.
+        assert!((2..5).all(|i| uncertainty.half_width(i) < 3e-3));
+    }
+    // Binomial: 190 of 200 expected, deviation 3.1; 182 come about with a chance of 1 %.
+    let held = hits.iter().filter(|hit| **hit).count();
+    assert!((182..200).contains(&held), "{held} of {}", hits.len());
+}
+
+#[test]
+fn a_log_without_windows_has_no_value_of_its_own() {
+    let library = Library::built_in();
+    let offset = fitted(library.effect("sensor_offset").unwrap(), 0, &[0.0]);
+    let pendulum = system("pendulum");
+    let mut logs = offset_logs(&dynamics(&pendulum, &[], SignForm::Exact), 1);
+    logs[1].leave_out.push(Interval {
+        start_s: 0.0,
+        end_s: 100.0,
+    });
+    let model = dynamics(&pendulum, &[offset], SignForm::Exact);
+    let shooting = shooting(&logs, 1);
+    let fit = fit_to(&shooting, &model, &[0, 1, 2], &[12.0, 3.6, 0.0]);
+    let seen: Vec<Option<usize>> = fit.columns.iter().map(|column| column.log).collect();
+    assert_eq!(seen, [None, None, Some(0), Some(2)]);
+    assert_eq!(fit.values_of_log(1)[2], 0.0);
+    assert!((fit.values_of_log(2)[2] - OFFSETS[2]).abs() < 3e-3);
+}
+
 /// 20 s at irregular steps of 5 to 15 ms with three pauses and three intervals left out.
 fn broken_log(seed: u64) -> Log {
     let mut rng = rng(seed);

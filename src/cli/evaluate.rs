@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{Answer, Common, inputs};
 use crate::data::{LeaveOut, Log};
 use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, System, put_own};
 use crate::train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -82,11 +82,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .calibrate
         .map(|share| calibrate(&dynamics, &values, &mut logs, share))
         .transpose()?;
+    let known = |log: &Log| {
+        let mut values = values.clone();
+        put_own(&mut values, system.parameters.len(), &system.effects, log);
+        values
+    };
+    let known: Vec<Vec<f64>> = logs.iter().map(known).collect();
     let assessment = match &offsets {
         Some(Offsets {
             dynamics, values, ..
         }) => assess(dynamics, |log| &values[log], &logs, &arguments.horizon),
-        None => assess(&dynamics, |_| &values, &logs, &arguments.horizon),
+        None => assess(&dynamics, |log| &known[log], &logs, &arguments.horizon),
     };
     let summary = summarise(&assessment.horizons, system.joints);
     if let Some(h) = summary.windows.iter().position(|count| *count == 0) {

@@ -1,8 +1,10 @@
-use super::study::{Fitted, Study, joined};
+use super::per_log::values_on;
+use super::study::{Fitted, Study};
 use crate::identify::{Shooting, promise};
 use crate::model::{Effect, FittedEffect};
 
-/// Every effect of the library on every joint where it can act and where it is not in the model yet.
+/// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
+/// shift of a parameter that the file declares fixed.
 pub fn candidates(
     study: &Study<'_>,
     library: &[Effect],
@@ -26,6 +28,8 @@ pub fn candidates(
             }
         }
     }
+    let absent = |shift: &FittedEffect| !present.iter().any(|p| p.label() == shift.label());
+    all.extend(study.system.shifts().into_iter().filter(absent));
     all
 }
 
@@ -89,9 +93,9 @@ fn promised(
     let mut effects = model.effects.clone();
     effects.push(start.clone());
     let dynamics = study.system.dynamics_with(&effects, &study.sign);
-    let values = joined(&model.declared, &effects);
+    let values = values_on(study.logs, &model.declared, &effects);
     let (active, scale) = (study.active(&dynamics), model.fit.scale);
-    promise(shooting, &dynamics, &active, &values, locals, scale)
+    promise(shooting, &dynamics, &active, values, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares

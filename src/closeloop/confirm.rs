@@ -1,4 +1,5 @@
 use super::evidence::{gain, p_of_gains};
+use super::per_log::values_on;
 use super::study::{Fitted, Study};
 use crate::identify::{blocks, fit};
 use crate::model::FittedEffect;
@@ -78,14 +79,20 @@ fn most_doubtful(
         .map(|(_, taken_back, less)| (taken_back, less))
 }
 
-/// Loss of a model on each stretch set aside, its parameters as they are, the start states free.
+/// Loss of a model on each stretch set aside, its parameters as they are, the start states free; so is what a log
+/// has of its own where the fit has not seen the log.
 fn losses(aside: &Study<'_>, model: &Fitted, scale: f64, members: &[usize]) -> Option<Vec<f64>> {
     let locals = aside.shooting.initial_locals(0);
-    let values = &model.fit.values;
+    let values = values_on(aside.logs, &model.declared, &model.effects);
+    let is_known = |k: &usize| values.own.iter().any(|own| own.parameter == *k);
+    let parameters = &model.dynamics.parameters;
+    let unknown: Vec<usize> = (0..parameters.len())
+        .filter(|k| parameters[*k].per_log && !parameters[*k].fixed && !is_known(k))
+        .collect();
     let found = fit(
         &aside.shooting,
         &model.dynamics,
-        &[],
+        &unknown,
         values,
         locals,
         Some(scale),
@@ -93,7 +100,7 @@ fn losses(aside: &Study<'_>, model: &Fitted, scale: f64, members: &[usize]) -> O
     .ok()?;
     let mut losses = vec![0.0; members.last().map_or(0, |last| last + 1)];
     for (terms, &member) in found.reduced.iter().zip(members) {
-        losses[member] += terms.cost;
+        losses[member] += terms.terms.cost;
     }
     Some(losses)
 }

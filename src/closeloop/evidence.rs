@@ -30,6 +30,16 @@ const AS_GOOD: f64 = 2.0;
 const AS_MUCH: f64 = 0.8;
 
 impl Evidence {
+    /// Number of values, one a log where they differ by log, then of the simpler effects that it contains.
+    pub(super) fn complexity(&self) -> (usize, usize) {
+        let model = &self.model;
+        let range = model.range_of(model.effects.len() - 1);
+        let of_logs = (model.fit.own.iter()).filter(|own| range.contains(&own.parameter));
+        let per_log = (self.effect.effect.parameters.iter()).filter(|p| p.per_log);
+        let values = range.len() - per_log.count() + of_logs.count();
+        (values, self.effect.effect.contains.len())
+    }
+
     /// Judge a model whose last effect is the candidate against the one without it, by their losses on `folds`.
     /// `None` where the fitted values make no sense together.
     pub(super) fn of(
@@ -72,15 +82,12 @@ pub(super) fn gain(before: &[f64], after: &[f64]) -> f64 {
 pub fn p_value(study: &Study<'_>, model: &Fitted, k: usize) -> Option<f64> {
     let effect = &model.effects[k].effect;
     let range = model.range_of(k);
-    let switches: Vec<usize> = (0..effect.parameters.len())
-        .filter(|&i| effect.parameters[i].is_switch())
-        .filter_map(|i| {
-            model
-                .fit
-                .active
-                .iter()
-                .position(|&active| active == range.start + i)
-        })
+    let is_switch = |parameter: usize| {
+        range.contains(&parameter) && effect.parameters[parameter - range.start].is_switch()
+    };
+    let columns = &model.fit.columns;
+    let switches: Vec<usize> = (0..columns.len())
+        .filter(|&i| is_switch(columns[i].parameter))
         .collect();
     if switches.is_empty() {
         return None;
@@ -92,9 +99,7 @@ pub fn p_value(study: &Study<'_>, model: &Fitted, k: usize) -> Option<f64> {
         .select_columns(&switches);
     let values = nalgebra::DVector::from_iterator(
         switches.len(),
-        switches
-            .iter()
-            .map(|&i| model.fit.values[model.fit.active[i]]),
+        switches.iter().map(|&i| model.fit.value(i)),
     );
     let inverse = covariance.pseudo_inverse(1e-300).ok()?;
     let statistic = values.dot(&(inverse * &values));

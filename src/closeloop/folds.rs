@@ -16,32 +16,26 @@ pub fn folds(shooting: &Shooting<'_>) -> Vec<usize> {
 
 /// The loss on each fold of the parameters fitted without it. The fit is not repeated: each window's loss
 /// is taken as quadratic around the joint optimum, where leaving out a fold moves the parameters by
-/// (H - `H_k`)^-1 `g_k`.
+/// (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own: no other log
+/// could tell them.
 pub fn left_out_losses(fit: &Fit, folds: &[usize]) -> Vec<f64> {
     let count = folds.iter().max().map_or(0, |last| last + 1);
-    let size = fit.active.len();
-    let mut parts = vec![(0.0, DVector::zeros(size), DMatrix::zeros(size, size)); count];
-    for (terms, &fold) in fit.reduced.iter().zip(folds) {
-        let part = &mut parts[fold];
-        part.0 += terms.cost;
-        part.1 += &terms.gradient;
-        part.2 += &terms.hessian;
+    let mut parts = vec![fit.nothing(); count];
+    for (window, &fold) in fit.reduced.iter().zip(folds) {
+        window.add_to(&mut parts[fold]);
     }
-    let all = parts
-        .iter()
-        .fold(DMatrix::zeros(size, size), |sum, part| sum + &part.2);
-    let total = parts
-        .iter()
-        .fold(DVector::zeros(size), |sum: DVector<f64>, part| {
-            sum + &part.1
-        });
+    let mut all = fit.nothing();
+    for part in &parts {
+        all.gradient += &part.gradient;
+        all.hessian += &part.hessian;
+    }
     parts
         .iter()
-        .map(|(cost, gradient, hessian)| {
+        .map(|part| {
             // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
-            let own = gradient - &total * share(hessian, &all);
-            let step = free_step(&(&all - hessian), &own);
-            cost + gradient.dot(&step) + 0.5 * step.dot(&(hessian * &step))
+            let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
+            let step = free_step(&(&all.hessian - &part.hessian), &own);
+            part.cost + part.gradient.dot(&step) + 0.5 * step.dot(&(&part.hessian * &step))
         })
         .collect()
 }

@@ -3,10 +3,10 @@ use std::ops::ControlFlow;
 
 use rand_chacha::ChaCha8Rng;
 
-use super::study::{Fitted, Study};
+use super::study::{Fitted, Study, joined};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
+    Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
 };
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
@@ -41,9 +41,12 @@ pub fn learn_residual(
     let Some((training, validation)) = segments(study) else {
         return Ok(None);
     };
-    let mut dynamics = model.dynamics.clone();
-    for (parameter, value) in dynamics.parameters.iter_mut().zip(&model.fit.values) {
-        parameter.value = *value;
+    // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
+    let (declared, effects) = absorbed(&model.declared, &model.effects);
+    let mut dynamics = study.system.dynamics_with(&effects, &study.sign);
+    let values = joined(&declared, &effects);
+    for (parameter, value) in dynamics.parameters.iter_mut().zip(values) {
+        parameter.value = value;
     }
     let settings = MlpSettings {
         hidden: study.system.hidden.clone(),

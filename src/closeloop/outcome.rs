@@ -8,7 +8,7 @@ use super::unexplained::Unexplained;
 use crate::data::{Audit, Log};
 use crate::evaluate::Assessment;
 use crate::identify::Identifiability;
-use crate::model::{FittedEffect, Parameter};
+use crate::model::{FittedEffect, OwnValue, Parameter};
 
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -69,6 +69,29 @@ pub struct Finding {
     pub p_value: f64,
     /// Share of the position error that this effect alone takes away, by a refit without it.
     pub error_reduction: f64,
+}
+
+impl Finding {
+    /// What it says of each parameter: its value or, where it has one per log, its values in single logs.
+    pub fn rows(&self) -> Vec<(Parameter, Option<&OwnValue>)> {
+        let of_parameter = |(k, parameter): (usize, &Parameter)| {
+            if !parameter.per_log {
+                return vec![(parameter.clone(), None)];
+            }
+            let own = self.effect.own.iter().filter(|own| own.parameter == k);
+            own.map(|own| {
+                let parameter = Parameter {
+                    value: own.value,
+                    ci95: own.ci95,
+                    ..parameter.clone()
+                };
+                (parameter, Some(own))
+            })
+            .collect()
+        };
+        let all = self.parameters.iter().enumerate();
+        all.flat_map(of_parameter).collect()
+    }
 }
 
 /// Another explanation that the logs do not tell from the one reported.

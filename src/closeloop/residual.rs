@@ -33,7 +33,7 @@ pub fn residual_force(study: &Study<'_>, model: &Fitted) -> Vec<ForceSample> {
         &shooting,
         &model.dynamics,
         &[],
-        &model.fit.values,
+        model.fit.found(),
         locals,
         None,
     ) else {

@@ -6,6 +6,7 @@ use super::find::{Found, find};
 use super::folds::{folds, left_out_losses};
 use super::learn::learn_residual;
 use super::outcome::{Errors, Finding, Outcome, Verdict};
+use super::per_log::take_over_intervals;
 use super::residual::residual_force;
 use super::split::Split;
 use super::study::{Fitted, Study, StudyError};
@@ -13,7 +14,7 @@ use super::unexplained::Unexplained;
 use crate::data::audit;
 use crate::evaluate::{Assessment, assess, window_count};
 use crate::identify::uncertainty;
-use crate::model::{Dynamics, Library, Parameter, System};
+use crate::model::{Dynamics, FittedEffect, Library, Parameter, System};
 use crate::train::Backend;
 
 /// What closing the loop is asked for.
@@ -92,9 +93,12 @@ pub fn close_loop(
         text: "open-loop errors",
     });
     let judge = |model: &Fitted| {
+        let values: Vec<Vec<f64>> = (split.test.iter())
+            .map(|log| model.values_in(log))
+            .collect();
         assess(
             &model.dynamics,
-            |_| &model.fit.values,
+            |log| &values[log],
             &split.test,
             &horizons_s,
         )
@@ -165,10 +169,19 @@ fn with_intervals(study: &Study<'_>, model: &Fitted) -> Vec<Parameter> {
         parameter.value = *value;
         parameter.ci95 = None;
     }
-    for (i, &k) in model.fit.active.iter().enumerate() {
+    for (i, column) in model.fit.columns.iter().enumerate() {
+        let k = column.parameter;
+        if column.log.is_some() {
+            continue;
+        }
         let (value, half) = (model.fit.values[k], uncertainty.half_width(i));
         let [low, high] = parameters[k].bounds;
         parameters[k].ci95 = Some([(value - half).max(low), (value + half).min(high)]);
+    }
+    for (e, effect) in model.effects.iter().enumerate() {
+        if let Some(k) = effect.shifted() {
+            parameters[k] = parameters[k].shifted_by(&parameters[model.range_of(e).start]);
+        }
     }
     parameters
 }
@@ -181,19 +194,27 @@ fn findings(
     judge: impl Fn(&Fitted) -> Assessment,
 ) -> Vec<Finding> {
     let folds = folds(&study.shooting);
+    let uncertainty = uncertainty(&study.shooting, &model.fit);
     let finding = |k: usize| {
         let own = parameters[model.range_of(k)].to_vec();
-        let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
         let mut effect = model.effects[k].clone();
+        let (expression, reported) = described(study.system, &effect, parameters, &own);
         for (slot, parameter) in effect.values.iter_mut().zip(&own) {
             *slot = (parameter.value, parameter.ci95);
         }
+        take_over_intervals(
+            &mut effect,
+            model.range_of(k),
+            &model.fit,
+            &uncertainty,
+            study.logs,
+        );
         let without = without(study, model, k)?;
         let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
         Some(Finding {
-            expression: effect.expression(&names),
+            expression,
             effect,
-            parameters: own,
+            parameters: reported,
             p_value: p_value(study, model, k)
                 .unwrap_or_else(|| p_of_gains(&losses(&without), &losses(model))),
             error_reduction: 1.0
@@ -204,6 +225,26 @@ fn findings(
     (declared..model.effects.len())
         .filter_map(finding)
         .collect()
+}
+
+/// What an effect with its `own` parameters adds, and the parameters that it is reported with: of a shift, what is
+/// shifted.
+fn described(
+    system: &System,
+    effect: &FittedEffect,
+    parameters: &[Parameter],
+    own: &[Parameter],
+) -> (String, Vec<Parameter>) {
+    match effect.shifted() {
+        Some(k) => {
+            let expression = system.parameters[k].expression_of_shift(parameters[k].value);
+            (expression, vec![parameters[k].clone()])
+        }
+        None => {
+            let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
+            (effect.expression(&names), own.to_vec())
+        }
+    }
 }
 
 /// The model refitted without its k-th effect, its residuals on the same scale.

@@ -279,5 +279,5 @@ fn choose(evidence: &[Evidence], trials: usize) -> Option<usize> {
     let best = evidence.iter().find(|e| sound(e))?;
     (0..evidence.len())
         .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best))
-        .min_by_key(|&i| evidence[i].effect.values.len())
+        .min_by_key(|&i| evidence[i].complexity())
 }

@@ -1,9 +1,10 @@
 use thiserror::Error;
 
+use super::per_log::{take_over, values_on};
 use crate::data::{Audit, Log, audit};
 use crate::expr::SignForm;
 use crate::identify::{Fit, FitError, Identifiability, Shooting, cut, fit, identifiability};
-use crate::model::{Dynamics, FittedEffect, System};
+use crate::model::{Dynamics, FittedEffect, System, put_own};
 
 /// Why the loop could not be closed at all.
 #[derive(Debug, Error)]
@@ -193,12 +194,12 @@ impl<'a> Study<'a> {
             shooting,
             &free.dynamics,
             &active,
-            &free.fit.values,
+            free.fit.found(),
             locals,
             None,
         )?;
         Ok((
-            Fitted::new(free.dynamics, effects, fit, declared.len()),
+            Fitted::new(free.dynamics, effects, fit, declared.len(), self.logs),
             verdict,
         ))
     }
@@ -236,16 +237,22 @@ impl<'a> Study<'a> {
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
         let dynamics = self.system.dynamics_with(effects, &self.sign);
-        let values = joined(declared, effects);
+        let values = values_on(self.logs, declared, effects);
         let fit = fit(
             shooting,
             &dynamics,
             &self.active(&dynamics),
-            &values,
+            values,
             locals,
             scale,
         )?;
-        Ok(Fitted::new(dynamics, effects, fit, declared.len()))
+        Ok(Fitted::new(
+            dynamics,
+            effects,
+            fit,
+            declared.len(),
+            self.logs,
+        ))
     }
 
     /// Parameters that a fit may change.
@@ -256,7 +263,8 @@ impl<'a> Study<'a> {
     }
 }
 
-/// Declared values, then those of the effects: all parameters of the model, in its order.
+/// Declared values, then those of the effects: all parameters of the model, in its order, as they are in a log
+/// without values of its own.
 pub fn joined(declared: &[f64], effects: &[FittedEffect]) -> Vec<f64> {
     let of_effects = effects
         .iter()
@@ -265,7 +273,13 @@ pub fn joined(declared: &[f64], effects: &[FittedEffect]) -> Vec<f64> {
 }
 
 impl Fitted {
-    fn new(dynamics: Dynamics, effects: &[FittedEffect], fit: Fit, declared: usize) -> Self {
+    fn new(
+        dynamics: Dynamics,
+        effects: &[FittedEffect],
+        fit: Fit,
+        declared: usize,
+        logs: &[Log],
+    ) -> Self {
         let mut effects = effects.to_vec();
         let mut values = fit.values[declared..].iter();
         for slot in effects.iter_mut().flat_map(|effect| &mut effect.values) {
@@ -273,12 +287,25 @@ impl Fitted {
                 .next()
                 .expect("the model has a value for each parameter");
         }
+        let mut first = declared;
+        for effect in &mut effects {
+            let range = first..first + effect.values.len();
+            first = range.end;
+            take_over(effect, range, &fit, logs);
+        }
         Self {
             declared: fit.values[..declared].to_vec(),
             effects,
             dynamics,
             fit,
         }
+    }
+
+    /// All parameters as they are in a log; one that the fit has not seen has no values of its own.
+    pub fn values_in(&self, log: &Log) -> Vec<f64> {
+        let mut values = joined(&self.declared, &self.effects);
+        put_own(&mut values, self.declared.len(), &self.effects, log);
+        values
     }
 
     /// Where the parameters of the k-th effect stand among all parameters.

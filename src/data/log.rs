@@ -87,6 +87,11 @@ impl Log {
         name.to_string_lossy().into_owned()
     }
 
+    /// Whether `name` is the log's path as the caller gave it, or its file name.
+    pub fn is_called(&self, name: &str) -> bool {
+        self.path.as_os_str() == name || self.name() == name
+    }
+
     /// Writes the log as CSV with the standard header `time,q1..,qd1..,tau1..`.
     ///
     /// Every number is the shortest text that reads back as the same number. The text goes to a

@@ -87,7 +87,7 @@ fn estimate(dynamics: &Dynamics, values: &[f64], log: Log) -> Result<Vec<f64>, F
     Ok(fit(&shooting, dynamics, &active, &start, locals, None)?.values)
 }
 
-/// The same equations in logged angles: the true angle is the logged one less the offset `q_z`.
+/// The same equations in logged angles: the true angle is the logged one less the offset.
 fn with_offsets(dynamics: &Dynamics) -> Dynamics {
     let n = dynamics.joints;
     let mut graph = Graph::new();
@@ -99,7 +99,8 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         .collect();
     let mut parameters = dynamics.parameters.clone();
     for (joint, input) in inputs[..n].iter_mut().enumerate() {
-        let name = format!("q_z{}", joint + 1);
+        // No formula can hold such a name, so none is taken.
+        let name = format!("offset of q{}", joint + 1);
         let offset = graph.input(&name);
         *input = graph.sub(*input, offset);
         parameters.push(Parameter {
@@ -108,6 +109,7 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
             unit: "rad".into(),
             bounds: [-1.0, 1.0],
             fixed: false,
+            per_log: false,
             ci95: None,
             scale: 0.01,
         });

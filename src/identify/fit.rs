@@ -3,6 +3,7 @@ use thiserror::Error;
 
 use super::sensitivity::{Local, Tangent};
 use super::shooting::{Shooting, WindowTerms};
+use super::values::{Column, Layout, Own, Values, value_of};
 use crate::model::Dynamics;
 
 /// Why parameters could not be fitted.
@@ -21,10 +22,15 @@ pub enum FitError {
 /// The outcome of a fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// All parameters of the model, in its order.
+    /// All parameters of the model, in its order; of a parameter with a value per log, what holds in a log
+    /// that has none of its own.
     pub values: Vec<f64>,
-    /// Which of them were free.
+    /// The values that single logs have of their own.
+    pub own: Vec<Own>,
+    /// Which parameters were free.
     pub active: Vec<usize>,
+    /// The free values: one column for each free parameter, or one for each log where it differs by log.
+    pub columns: Vec<Column>,
     /// Each window's own values: its start state, then forces if they were free.
     pub locals: Vec<Vec<f64>>,
     /// Robust standard deviation of the normalised residuals: 1 where the model explains all but noise.
@@ -32,9 +38,70 @@ pub struct Fit {
     /// Sum of the losses at that scale.
     pub cost: f64,
     /// What each window says about the free parameters, its own values eliminated.
-    pub reduced: Vec<WindowTerms>,
+    pub reduced: Vec<Reduced>,
     /// Steps that were taken.
     pub iterations: usize,
+}
+
+/// What one window says about some of a fit's columns.
+#[derive(Debug, Clone)]
+pub struct Reduced {
+    /// Numbers of these columns, in the order of `terms`.
+    pub columns: Vec<usize>,
+    pub terms: WindowTerms,
+}
+
+impl Fit {
+    /// The values that it found, as another fit takes them.
+    pub fn found(&self) -> Values {
+        Values {
+            common: self.values.clone(),
+            own: self.own.clone(),
+        }
+    }
+
+    /// All parameters as they are in a log.
+    pub fn values_of_log(&self, log: usize) -> Vec<f64> {
+        self.found().of_log(log)
+    }
+
+    /// The value of the i-th column.
+    pub fn value(&self, i: usize) -> f64 {
+        value_of(&self.values, &self.own, self.columns[i])
+    }
+
+    /// What windows that say nothing say about the columns.
+    pub fn nothing(&self) -> WindowTerms {
+        WindowTerms::zeros(self.columns.len())
+    }
+}
+
+impl Reduced {
+    /// Add what this window says to what others say about all columns.
+    pub fn add_to(&self, all: &mut WindowTerms) {
+        all.cost += self.terms.cost;
+        self.add_gradient_to(&mut all.gradient);
+        scatter_matrix(&self.terms.hessian, &mut all.hessian, &self.columns);
+    }
+
+    /// The same for the gradient alone.
+    pub fn add_gradient_to(&self, all: &mut DVector<f64>) {
+        scatter(&self.terms.gradient, all, &self.columns);
+    }
+}
+
+fn scatter(part: &DVector<f64>, all: &mut DVector<f64>, places: &[usize]) {
+    for (value, &place) in part.iter().zip(places) {
+        all[place] += value;
+    }
+}
+
+fn scatter_matrix(part: &DMatrix<f64>, all: &mut DMatrix<f64>, places: &[usize]) {
+    for (j, &column) in places.iter().enumerate() {
+        for (i, &row) in places.iter().enumerate() {
+            all[(row, column)] += part[(i, j)];
+        }
+    }
 }
 
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
@@ -55,7 +122,7 @@ pub fn fit(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    values: &[f64],
+    values: impl Into<Values>,
     locals: Vec<Vec<f64>>,
     scale: Option<f64>,
 ) -> Result<Fit, FitError> {
@@ -65,7 +132,7 @@ pub fn fit(
         Local::State
     };
     let tangent = Tangent::new(dynamics, active, local);
-    let mut search = Search::new(shooting, dynamics, &tangent, values, locals, scale)?;
+    let mut search = Search::new(shooting, dynamics, &tangent, values.into(), locals, scale)?;
     while search.iterations < MOST_STEPS && search.step() {}
     // A last look with a scale that belongs to the final residuals.
     if scale.is_none() {
@@ -81,7 +148,7 @@ pub fn promise(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    values: &[f64],
+    values: impl Into<Values>,
     locals: &[Vec<f64>],
     scale: f64,
 ) -> Option<f64> {
@@ -90,22 +157,20 @@ pub fn promise(
         shooting,
         dynamics,
         &tangent,
-        values,
+        values.into(),
         locals.to_vec(),
         Some(scale),
     )
     .ok()?;
-    let terms = shooting.linearise(&tangent, values, locals, scale);
-    let (mut matrix, mut gradient) = (
-        DMatrix::zeros(active.len(), active.len()),
-        DVector::zeros(active.len()),
-    );
+    let terms = shooting.linearise(&tangent, &search.values, locals, scale);
+    let size = search.layout.columns.len();
+    let (mut matrix, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
     let mut own_gain = 0.0;
-    for terms in &terms {
+    for (terms, window) in terms.iter().zip(&shooting.windows) {
         let part = Eliminated::new(terms, active.len(), search.damping);
         own_gain += part.own_gain;
-        matrix += part.matrix;
-        gradient += part.gradient;
+        scatter_matrix(&part.matrix, &mut matrix, search.layout.places(window));
+        scatter(&part.gradient, &mut gradient, search.layout.places(window));
     }
     let step = search.bounded_solution(matrix.clone(), -&gradient);
     let gain = -gradient.dot(&step) - 0.5 * step.dot(&(matrix * &step)) + own_gain;
@@ -116,7 +181,8 @@ struct Search<'a> {
     shooting: &'a Shooting<'a>,
     dynamics: &'a Dynamics,
     tangent: &'a Tangent,
-    values: Vec<f64>,
+    layout: Layout,
+    values: Values,
     locals: Vec<Vec<f64>>,
     scale: f64,
     cost: f64,
@@ -131,7 +197,7 @@ impl<'a> Search<'a> {
         shooting: &'a Shooting<'a>,
         dynamics: &'a Dynamics,
         tangent: &'a Tangent,
-        values: &[f64],
+        values: Values,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Self, FitError> {
@@ -142,7 +208,8 @@ impl<'a> Search<'a> {
             shooting,
             dynamics,
             tangent,
-            values: values.to_vec(),
+            layout: Layout::new(&dynamics.parameters, &tangent.active, &shooting.windows),
+            values,
             locals,
             scale: scale.unwrap_or(1.0),
             cost: f64::INFINITY,
@@ -176,7 +243,7 @@ impl<'a> Search<'a> {
         self.damping = 1e-3;
     }
 
-    fn total(&self, values: &[f64], locals: &[Vec<f64>]) -> f64 {
+    fn total(&self, values: &Values, locals: &[Vec<f64>]) -> f64 {
         self.shooting
             .costs(self.dynamics, values, locals, self.scale)
             .iter()
@@ -203,36 +270,32 @@ impl<'a> Search<'a> {
         false
     }
 
-    fn propose(&self, terms: &[WindowTerms]) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let shared = self.tangent.active.len();
-        let mut matrix = DMatrix::zeros(shared, shared);
-        let mut right = DVector::zeros(shared);
+    fn propose(&self, terms: &[WindowTerms]) -> (Values, Vec<Vec<f64>>) {
+        let (shared, size) = (self.tangent.active.len(), self.layout.columns.len());
+        let mut matrix = DMatrix::zeros(size, size);
+        let mut gradient = DVector::zeros(size);
         let eliminated: Vec<Eliminated> = terms
             .iter()
             .map(|terms| Eliminated::new(terms, shared, self.damping))
             .collect();
-        for part in &eliminated {
-            matrix += &part.matrix;
-            right -= &part.gradient;
+        let windows = &self.shooting.windows;
+        for (part, window) in eliminated.iter().zip(windows) {
+            scatter_matrix(&part.matrix, &mut matrix, self.layout.places(window));
+            scatter(&part.gradient, &mut gradient, self.layout.places(window));
         }
-        let step = self.bounded_solution(matrix, right);
+        let step = self.bounded_solution(matrix, -gradient);
         let mut values = self.values.clone();
-        for (&k, step) in self.tangent.active.iter().zip(step.iter()) {
-            let [low, high] = self.dynamics.parameters[k].bounds;
-            values[k] = (values[k] + step).clamp(low, high);
+        let mut taken = DVector::zeros(size);
+        for (i, &column) in self.layout.columns.iter().enumerate() {
+            let [low, high] = self.dynamics.parameters[column.parameter].bounds;
+            let before = self.values.get(column);
+            let after = (before + step[i]).clamp(low, high);
+            values.set(column, after);
+            taken[i] = after - before;
         }
-        let taken = DVector::from_iterator(
-            shared,
-            self.tangent
-                .active
-                .iter()
-                .map(|&k| values[k] - self.values[k]),
-        );
-        let locals = eliminated
-            .iter()
-            .zip(&self.locals)
-            .map(|(part, local)| {
-                part.local_step(&taken)
+        let locals = (eliminated.iter().zip(windows).zip(&self.locals))
+            .map(|((part, window), local)| {
+                part.local_step(&taken.select_rows(self.layout.places(window)))
                     .iter()
                     .zip(local)
                     .map(|(d, x)| x + d)
@@ -244,17 +307,18 @@ impl<'a> Search<'a> {
 
     /// The damped step, with parameters that a bound would stop taken out one after the other.
     fn bounded_solution(&self, mut matrix: DMatrix<f64>, right: DVector<f64>) -> DVector<f64> {
-        for (i, &k) in self.tangent.active.iter().enumerate() {
+        for (i, column) in self.layout.columns.iter().enumerate() {
             // Steps are damped against each parameter's own magnitude: a flat direction stays where it is.
-            let floor = 1e-9 / self.dynamics.parameters[k].scale.powi(2);
+            let floor = 1e-9 / self.dynamics.parameters[column.parameter].scale.powi(2);
             matrix[(i, i)] += self.damping * matrix[(i, i)] + floor;
         }
         let mut held = vec![false; right.len()];
         loop {
             let step = solve_with_held(&matrix, &right, &held);
-            let stopped = self.tangent.active.iter().enumerate().position(|(i, &k)| {
-                let [low, high] = self.dynamics.parameters[k].bounds;
-                let at = self.values[k];
+            let columns = &self.layout.columns;
+            let stopped = columns.iter().enumerate().position(|(i, &column)| {
+                let [low, high] = self.dynamics.parameters[column.parameter].bounds;
+                let at = self.values.get(column);
                 !held[i] && ((at <= low && step[i] < 0.0) || (at >= high && step[i] > 0.0))
             });
             match stopped {
@@ -269,20 +333,24 @@ impl<'a> Search<'a> {
             .shooting
             .linearise(self.tangent, &self.values, &self.locals, self.scale);
         let shared = self.tangent.active.len();
-        let reduced = terms
-            .iter()
-            .map(|terms| {
+        let reduced = (terms.iter().zip(&self.shooting.windows))
+            .map(|(terms, window)| {
                 let part = Eliminated::new(terms, shared, 0.0);
-                WindowTerms {
-                    cost: terms.cost,
-                    gradient: part.gradient,
-                    hessian: part.matrix,
+                Reduced {
+                    columns: self.layout.places(window).to_vec(),
+                    terms: WindowTerms {
+                        cost: terms.cost,
+                        gradient: part.gradient,
+                        hessian: part.matrix,
+                    },
                 }
             })
             .collect();
         Fit {
-            values: self.values,
+            values: self.values.common,
+            own: self.values.own,
             active: self.tangent.active.clone(),
+            columns: self.layout.columns,
             locals: self.locals,
             scale: self.scale,
             cost: self.cost,

@@ -29,7 +29,7 @@ const NAMED: f64 = 0.1;
 pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
     let information = relative_information(dynamics, fit);
     let loose = loose_directions(&information);
-    let name = |i: usize| dynamics.parameters[fit.active[i]].name.clone();
+    let name = |i: usize| dynamics.parameters[fit.columns[i].parameter].name.clone();
     let undetermined = loose
         .iter()
         .map(|direction| {
@@ -41,8 +41,8 @@ pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
         })
         .collect();
     Identifiability {
-        free: fit.active.len(),
-        determined: fit.active.len() - loose.len(),
+        free: fit.columns.len(),
+        determined: fit.columns.len() - loose.len(),
         undetermined,
         hold: hold(&information, fit),
     }
@@ -50,7 +50,7 @@ pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
 
 /// Hold the parameter that takes part most in what is loose, until nothing is.
 fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
-    let mut left: Vec<usize> = (0..fit.active.len()).collect();
+    let mut left: Vec<usize> = (0..fit.columns.len()).collect();
     let mut hold = Vec::new();
     loop {
         let part = information.select_rows(&left).select_columns(&left);
@@ -68,22 +68,22 @@ fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
         else {
             return hold;
         };
-        hold.push(fit.active[left.remove(most)]);
+        hold.push(fit.columns[left.remove(most)].parameter);
     }
 }
 
 fn relative_information(dynamics: &Dynamics, fit: &Fit) -> DMatrix<f64> {
-    let size = fit.active.len();
-    let mut information = DMatrix::zeros(size, size);
-    for terms in &fit.reduced {
-        information += &terms.hessian;
-    }
+    let mut all = fit.nothing();
+    fit.reduced
+        .iter()
+        .for_each(|window| window.add_to(&mut all));
     let magnitude = |i: usize| {
-        let k = fit.active[i];
-        fit.values[k].abs().max(1e-3 * dynamics.parameters[k].scale)
+        let scale = dynamics.parameters[fit.columns[i].parameter].scale;
+        fit.value(i).abs().max(1e-3 * scale)
     };
+    let size = fit.columns.len();
     DMatrix::from_fn(size, size, |i, j| {
-        information[(i, j)] * magnitude(i) * magnitude(j)
+        all.hessian[(i, j)] * magnitude(i) * magnitude(j)
     })
 }
 

@@ -7,10 +7,12 @@ use super::shooting::Shooting;
 /// How well a fit determines its free parameters.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
-    /// Covariance of the free parameters, in their order.
+    /// Covariance of the free values, in the order of the fit's columns.
     pub covariance: DMatrix<f64>,
     /// Blocks of windows that count as independent.
     pub blocks: usize,
+    /// The blocks that speak of each column: of a value that one log has of its own, those of that log.
+    blocks_of: Vec<usize>,
 }
 
 /// Windows nearer than this (s) belong to one block: what a model lacks is correlated over a swing or two.
@@ -44,25 +46,32 @@ pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> 
     stretches
 }
 
-/// Covariance of the free parameters by the jackknife over blocks: it holds when residuals within a block are
+/// Covariance of the free values by the jackknife over blocks: it holds when residuals within a block are
 /// correlated, as they are wherever a model lacks something, and when few blocks carry most of what is
 /// known, where the plain sandwich is too sure (Bell and McCaffrey 2002). The fits without a block are not
 /// repeated: each window's loss is taken as quadratic around the joint optimum.
 pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
     let count = blocks.last().map_or(0, |last| last + 1);
-    let size = fit.active.len();
-    let mut hessian = DMatrix::zeros(size, size);
-    let mut parts = vec![(DVector::zeros(size), DMatrix::zeros(size, size)); count];
-    for (terms, &block) in fit.reduced.iter().zip(&blocks) {
-        hessian += &terms.hessian;
-        parts[block].0 += &terms.gradient;
-        parts[block].1 += &terms.hessian;
+    let size = fit.columns.len();
+    let blocks_of = blocks_of(shooting, fit, &blocks);
+    let mut all = fit.nothing();
+    let mut parts = vec![fit.nothing(); count];
+    for (window, &block) in fit.reduced.iter().zip(&blocks) {
+        window.add_to(&mut all);
+        window.add_to(&mut parts[block]);
     }
-    let (_, flat) = inverse(&hessian);
+    let alone: Vec<usize> = (0..size)
+        .filter(|&i| blocks_of[i] < 2 && fit.columns[i].log.is_some())
+        .collect();
+    for part in &mut parts {
+        // Without the only block that speaks of a value nothing is known of it: it stays.
+        alone.iter().for_each(|&i| part.gradient[i] = 0.0);
+    }
+    let (model, flat) = inverse(&all.hessian);
     let steps: Vec<DVector<f64>> = parts
         .iter()
-        .map(|(gradient, part)| inverse(&(&hessian - part)).0 * gradient)
+        .map(|part| inverse(&(&all.hessian - &part.hessian)).0 * &part.gradient)
         .collect();
     #[allow(clippy::cast_precision_loss)] // few blocks
     let share = 1.0 / count.max(1) as f64;
@@ -75,10 +84,28 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         let off = step - &mean;
         spread += &off * off.transpose() * (1.0 - share);
     }
+    // Its interval is then what the model itself says.
+    for i in alone {
+        spread[(i, i)] += model[(i, i)];
+    }
     Uncertainty {
         covariance: spread,
         blocks: count,
+        blocks_of,
     }
+}
+
+fn blocks_of(shooting: &Shooting<'_>, fit: &Fit, blocks: &[usize]) -> Vec<usize> {
+    let count = |log: Option<usize>| {
+        let windows = shooting.windows.iter().zip(blocks);
+        let mut speaking: Vec<usize> = windows
+            .filter(|(window, _)| log.is_none_or(|log| window.log == log))
+            .map(|(_, block)| *block)
+            .collect();
+        speaking.dedup();
+        speaking.len()
+    };
+    fit.columns.iter().map(|column| count(column.log)).collect()
 }
 
 /// Directions with less than this share of the best one's information are flat: what the residuals say about
@@ -116,25 +143,21 @@ fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 }
 
 impl Uncertainty {
-    /// Half width of the 95 % interval of the i-th free parameter: Student's t with one degree of
-    /// freedom a block less one.
+    /// Half width of the 95 % interval of the i-th column: Student's t with one degree of freedom a block that
+    /// speaks of it, less one.
     pub fn half_width(&self, i: usize) -> f64 {
-        self.quantile(0.975) * self.covariance[(i, i)].max(0.0).sqrt()
+        self.student(i).inverse_cdf(0.975) * self.covariance[(i, i)].max(0.0).sqrt()
     }
 
-    /// Two-sided p-value of the hypothesis that the i-th free parameter is `null`, given `value`.
+    /// Two-sided p-value of the hypothesis that the i-th column is `null`, given `value`.
     pub fn p_value(&self, i: usize, value: f64, null: f64) -> f64 {
         let deviation = self.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
-        2.0 * (1.0 - self.student().cdf(((value - null) / deviation).abs()))
+        2.0 * (1.0 - self.student(i).cdf(((value - null) / deviation).abs()))
     }
 
-    fn quantile(&self, share: f64) -> f64 {
-        self.student().inverse_cdf(share)
-    }
-
-    fn student(&self) -> StudentsT {
+    fn student(&self, i: usize) -> StudentsT {
         #[allow(clippy::cast_precision_loss)] // few blocks
-        let freedom = (self.blocks as f64 - 1.0).max(1.0);
+        let freedom = (self.blocks_of[i] as f64 - 1.0).max(1.0);
         StudentsT::new(0.0, 1.0, freedom).expect("freedom is at least one")
     }
 }

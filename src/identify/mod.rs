@@ -9,11 +9,13 @@ mod identifiability;
 mod intervals;
 mod sensitivity;
 mod shooting;
+mod values;
 mod window;
 
-pub use fit::{Fit, FitError, fit, promise};
+pub use fit::{Fit, FitError, Reduced, fit, promise};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
 pub use sensitivity::Local;
 pub use shooting::{Shooting, WindowTerms};
+pub use values::{Column, Own, Values};
 pub use window::{Window, cut, initial_state};

@@ -110,6 +110,12 @@ impl<'t> Flow<'t> {
         }
     }
 
+    /// Let a parameter have another value in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        let first = 3 * self.tangent.joints + 1;
+        self.tape.inputs()[first + parameter][lane] = value;
+    }
+
     /// Start at these states; only the columns of the initial state are sensitive to them.
     pub fn start(&mut self, states: &[Lane]) {
         let (n, columns) = (self.tangent.joints, self.tangent.columns());

@@ -2,6 +2,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::sensitivity::{Flow, LANES, Lane, Tangent};
+use super::values::Values;
 use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
 use crate::model::{Dynamics, Rollout};
@@ -24,7 +25,7 @@ pub struct Shooting<'l> {
     packs: Vec<Pack>,
 }
 
-/// What one window says about the free values, shared ones first, then its own.
+/// What windows say about free values: for one window the parameters first, then its own.
 #[derive(Debug, Clone)]
 pub struct WindowTerms {
     /// Sum of the Huber losses of its residuals.
@@ -33,9 +34,22 @@ pub struct WindowTerms {
     pub hessian: DMatrix<f64>,
 }
 
+impl WindowTerms {
+    /// What windows that say nothing say about this many values.
+    pub fn zeros(values: usize) -> Self {
+        Self {
+            cost: 0.0,
+            gradient: DVector::zeros(values),
+            hessian: DMatrix::zeros(values, values),
+        }
+    }
+}
+
 /// Up to [`LANES`] windows side by side, padded with steps of no length and rows of no weight.
 struct Pack {
     windows: Vec<usize>,
+    /// The log of each lane.
+    logs: [usize; LANES],
     time: Vec<Lane>,
     dt: Vec<Lane>,
     substeps: Vec<usize>,
@@ -86,7 +100,7 @@ impl<'l> Shooting<'l> {
     pub fn residuals(
         &self,
         dynamics: &Dynamics,
-        values: &[f64],
+        values: &Values,
         locals: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let n = dynamics.joints;
@@ -119,7 +133,7 @@ impl<'l> Shooting<'l> {
     pub fn costs(
         &self,
         dynamics: &Dynamics,
-        values: &[f64],
+        values: &Values,
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<f64> {
@@ -140,7 +154,7 @@ impl<'l> Shooting<'l> {
     pub(super) fn linearise(
         &self,
         tangent: &Tangent,
-        values: &[f64],
+        values: &Values,
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<WindowTerms> {
@@ -176,6 +190,7 @@ impl Pack {
         let zeros = || vec![vec![[0.0; LANES]; n]; rows];
         let mut pack = Self {
             windows: members.to_vec(),
+            logs: std::array::from_fn(|lane| windows[members[lane.min(members.len() - 1)]].log),
             time: vec![[0.0; LANES]; rows],
             dt: vec![[0.0; LANES]; rows],
             substeps: Vec::new(),
@@ -219,6 +234,15 @@ impl Pack {
             .collect()
     }
 
+    /// Tell of the values that the logs of single lanes have of their own: parameter, lane, value.
+    fn own_values(&self, values: &Values, mut tell: impl FnMut(usize, usize, f64)) {
+        for own in &values.own {
+            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
+                tell(own.parameter, lane, own.value);
+            }
+        }
+    }
+
     /// The torque at `row` with the windows' own forces, if any, added.
     fn torque(&self, row: usize, forces: &[Lane]) -> Vec<Lane> {
         let mut tau = self.tau[row].clone();
@@ -234,13 +258,16 @@ impl Pack {
     fn roll(
         &self,
         dynamics: &Dynamics,
-        values: &[f64],
+        values: &Values,
         locals: &[Vec<f64>],
         mut see: impl FnMut(usize, &[Lane]),
     ) {
         let mut state = self.gather(locals);
         let forces = state.split_off(dynamics.states());
-        let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
+        let mut rollout = Rollout::<f64, LANES>::new(dynamics, &values.common);
+        self.own_values(values, |parameter, lane, value| {
+            rollout.set_in_lane(parameter, lane, value);
+        });
         for row in 0..self.rows() {
             see(row, &state[..dynamics.joints]);
             let tau = self.torque(row, &forces);
@@ -257,14 +284,17 @@ impl Pack {
     fn linearise(
         &self,
         tangent: &Tangent,
-        values: &[f64],
+        values: &Values,
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, WindowTerms)> {
         let (n, columns) = (tangent.joints, tangent.columns());
         let states = self.gather(locals);
         let mut sums = Sums::new(columns);
-        let mut flow = Flow::new(tangent, values);
+        let mut flow = Flow::new(tangent, &values.common);
+        self.own_values(values, |parameter, lane, value| {
+            flow.set_in_lane(parameter, lane, value);
+        });
         flow.start(&states);
         for row in 0..self.rows() {
             for j in 0..n {

@@ -24,6 +24,7 @@ impl System {
             "one form of the sign for each joint"
         );
         let mut assembly = Assembly::new(self, effects, sign);
+        assembly.apply_sensors();
         assembly.apply_torque_effects();
         assembly.apply_forces();
         let accelerations = assembly.accelerations();
@@ -45,13 +46,14 @@ impl FittedEffect {
             effect: effect.clone(),
             joint,
             values: vec![(0.0, None); effect.parameters.len()],
+            own: Vec::new(),
             fixed: false,
         }
     }
 
     /// What tells this effect from others in one model.
     pub fn label(&self) -> String {
-        format!("{} on joint {}", self.effect.name, self.joint + 1)
+        format!("{} on joint {}", self.title(), self.joint + 1)
     }
 
     /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
@@ -80,9 +82,13 @@ impl FittedEffect {
     /// The names of the effect's parameters on its joint, told apart from names already `taken`.
     pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
         let joint = self.joint + 1;
-        let name = |own: &str| match format!("{own}{joint}") {
+        let plain = |own: &str| match self.shifted() {
+            Some(_) => format!("{own}_shift"),
+            None => format!("{own}{joint}"),
+        };
+        let name = |own: &str| match plain(own) {
             plain if taken.contains(&plain.as_str()) => {
-                format!("{}_{own}{joint}", self.effect.name)
+                format!("{}_{plain}", self.effect.name)
             }
             plain => plain,
         };
@@ -101,6 +107,7 @@ struct Assembly<'a> {
     sign: &'a [SignForm],
     graph: Graph,
     parameters: Vec<Parameter>,
+    /// The angle of the rig, once sensors are accounted for.
     q: Vec<Node>,
     qd: Vec<Node>,
     /// The torque after what has been applied so far.
@@ -147,8 +154,17 @@ impl<'a> Assembly<'a> {
         }
     }
 
+    /// The state's angles are those that the sensors read: everything else sees the rig's own.
+    fn apply_sensors(&mut self) {
+        for (index, joint, formula) in self.entries(Effect::is_of_sensor) {
+            self.q[joint] = self.effect_node(index, formula);
+        }
+    }
+
     fn apply_torque_effects(&mut self) {
-        for (index, joint, formula) in self.entries(|entry| matches!(entry, Entry::Torque(_))) {
+        for (index, joint, formula) in
+            self.entries(|effect| matches!(effect.entry, Entry::Torque(_)))
+        {
             self.tau[joint] = self.effect_node(index, formula);
         }
     }
@@ -156,7 +172,7 @@ impl<'a> Assembly<'a> {
     fn apply_forces(&mut self) {
         // All forces see the torque as it was before any of them.
         let forces: Vec<(usize, Node)> = self
-            .entries(|entry| matches!(entry, Entry::Force(_)))
+            .entries(|effect| matches!(effect.entry, Entry::Force(_)))
             .into_iter()
             .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
             .collect();
@@ -166,9 +182,9 @@ impl<'a> Assembly<'a> {
     }
 
     /// The effects that enter in one way: number, joint and formula.
-    fn entries(&self, is_wanted: impl Fn(&Entry) -> bool) -> Vec<(usize, usize, &'a Formula)> {
+    fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, usize, &'a Formula)> {
         let effects = self.effects.iter().enumerate();
-        let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect.entry));
+        let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect));
         wanted
             .map(|(index, (effect, _))| (index, effect.joint, effect.effect.entry.formula()))
             .collect()
@@ -223,18 +239,28 @@ impl<'a> Assembly<'a> {
     }
 
     fn add_inertia(&mut self, matrix: &mut [Vec<Node>]) {
-        for (index, joint, formula) in self.entries(|entry| matches!(entry, Entry::Inertia(_))) {
+        for (index, joint, formula) in
+            self.entries(|effect| matches!(effect.entry, Entry::Inertia(_)))
+        {
             let extra = self.effect_node(index, formula);
             matrix[joint][joint] = self.graph.add(matrix[joint][joint], extra);
         }
     }
 
+    /// The angles of the declared equations: those of the rig as effects turn them, one after the other.
+    fn declared_angles(&mut self) -> Vec<Node> {
+        let of_rig = self.q.clone();
+        let turns =
+            |effect: &Effect| matches!(effect.entry, Entry::Angle(_)) && !effect.is_of_sensor();
+        for (index, joint, formula) in self.entries(turns) {
+            self.q[joint] = self.effect_node(index, formula);
+        }
+        std::mem::replace(&mut self.q, of_rig)
+    }
+
     /// The names of the declared equations: angles as effects turn them, torques as effects leave them.
     fn declared_scope(&mut self) -> Scope {
-        let mut angles = self.q.clone();
-        for (index, joint, formula) in self.entries(|entry| matches!(entry, Entry::Angle(_))) {
-            angles[joint] = self.effect_node(index, formula);
-        }
+        let angles = self.declared_angles();
         let mut scope = Scope::new(self.narrowest_sign());
         for j in 0..self.system.joints {
             scope.bind(&format!("q{}", j + 1), angles[j]);
@@ -245,12 +271,24 @@ impl<'a> Assembly<'a> {
         for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
             scope.bind(&parameter.name, *node);
         }
+        self.bind_shifted(&mut scope);
         for (name, formula) in &self.system.lets {
             let node = lower(&scope, &mut self.graph, formula);
             self.graph.label(node, name);
             scope.bind(name, node);
         }
         scope
+    }
+
+    /// Shifted parameters take the place of the declared ones.
+    fn bind_shifted(&mut self, scope: &mut Scope) {
+        for (index, _, formula) in self.entries(|e| matches!(e.entry, Entry::Shift(..))) {
+            if let Some(k) = self.effects[index].0.shifted() {
+                let shift = self.effect_node(index, formula);
+                let shifted = self.graph.add(self.declared[k], shift);
+                scope.bind(&self.system.parameters[k].name, shifted);
+            }
+        }
     }
 
     /// A declared formula may mix joints, so the narrowest of their widths is safe for all.
@@ -298,6 +336,7 @@ fn effect_parameters(effect: &FittedEffect, taken: &[&str], prismatic: bool) -> 
                 Measure::Speed | Measure::Torque => [0.0, f64::INFINITY],
             },
             fixed: effect.fixed || parameter.whole,
+            per_log: parameter.per_log,
             ci95: *ci95,
             scale: parameter.typical,
         })

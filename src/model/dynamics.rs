@@ -14,6 +14,8 @@ pub struct Parameter {
     pub bounds: [f64; 2],
     /// Held at `value` in every fit.
     pub fixed: bool,
+    /// Has a value of its own in each log.
+    pub per_log: bool,
     /// 95 % interval, once a fit has found one.
     pub ci95: Option<[f64; 2]>,
     /// The magnitude in which steps are measured: the declared value's, or a typical one where that is zero.

@@ -15,12 +15,18 @@ pub enum Entry {
     Angle(Formula),
     /// Added to the joint's own entry of the mass matrix.
     Inertia(Formula),
+    /// Added to the declared parameter of this number.
+    Shift(usize, Formula),
 }
 
 impl Entry {
     pub fn formula(&self) -> &Formula {
         match self {
-            Self::Force(f) | Self::Torque(f) | Self::Angle(f) | Self::Inertia(f) => f,
+            Self::Force(f)
+            | Self::Torque(f)
+            | Self::Angle(f)
+            | Self::Inertia(f)
+            | Self::Shift(_, f) => f,
         }
     }
 }
@@ -52,6 +58,8 @@ pub struct EffectParameter {
     pub measure: Measure,
     /// Only whole numbers make sense: searched, never refined.
     pub whole: bool,
+    /// Has a value of its own in each log.
+    pub per_log: bool,
 }
 
 impl Effect {
@@ -76,19 +84,42 @@ impl Effect {
 impl Effect {
     /// Whether these values of the parameters, in their order, make sense together.
     pub fn is_valid(&self, values: &[f64]) -> bool {
-        let Some(formula) = &self.valid_if else {
-            return true;
-        };
+        let condition = |formula| self.evaluate(formula, values, 0.0) > 0.0;
+        self.valid_if.as_ref().is_none_or(condition)
+    }
+
+    /// A formula in numbers, for a joint that rests at an angle.
+    fn evaluate(&self, formula: &Formula, values: &[f64], angle: f64) -> f64 {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
-        for (parameter, value) in self.parameters.iter().zip(values) {
-            let node = graph.constant(*value);
-            scope.bind(&parameter.name, node);
+        let of_joint = EFFECT_NAMES.map(|name| (name, if name == "q" { angle } else { 0.0 }));
+        let names = self.parameters.iter().map(|p| p.name.as_str());
+        for (name, value) in of_joint
+            .into_iter()
+            .chain(names.zip(values.iter().copied()))
+        {
+            let node = graph.constant(value);
+            scope.bind(name, node);
         }
-        let condition = scope
+        let node = scope
             .lower(&mut graph, formula)
             .expect("formulas were checked when the file was read");
-        graph.finish(&[condition]).eval(&[])[0] > 0.0
+        graph.finish(&[node]).eval(&[])[0]
+    }
+
+    /// What the sensor reads, by an effect of the sensor with these values, where the joint rests at `angle`.
+    pub fn reading(&self, values: &[f64], angle: f64) -> f64 {
+        let step = |read: f64| read + angle - self.evaluate(self.entry.formula(), values, read);
+        // One step is exact for an offset; a scale that is off by a tenth gains a digit a step.
+        (0..16).fold(angle, |read, _| step(read))
+    }
+}
+
+impl Effect {
+    /// Whether the effect is one of how a joint's angle is read, not of the rig: a rig does not change from log
+    /// to log.
+    pub fn is_of_sensor(&self) -> bool {
+        matches!(self.entry, Entry::Angle(_)) && self.parameters.iter().all(|p| p.per_log)
     }
 }
 
@@ -140,6 +171,7 @@ const PARAMETER_KEYS: &[&str] = &[
     "search",
     "relative_to",
     "whole",
+    "per",
 ];
 /// What a formula of an effect may mention besides its parameters.
 pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
@@ -289,7 +321,21 @@ fn parameter(name: String, section: &Section<'_>) -> Result<EffectParameter, Fil
         starts,
         measure,
         whole: section.flag("whole")?,
+        per_log: per_log(section)?,
     })
+}
+
+fn per_log(section: &Section<'_>) -> Result<bool, FileError> {
+    match section.text_or_empty("per")?.as_str() {
+        "" => Ok(false),
+        "log" => Ok(true),
+        other => Err(section.error_at(
+            "per",
+            format!(
+                "`per` is \"log\" for a parameter with a value of its own in each log, found {other:?}"
+            ),
+        )),
+    }
 }
 
 /// The admissible range that `positive` and `bounds` declare.

@@ -1,9 +1,9 @@
 //! The `[[effect]]` entries of a model file.
 
-use super::effect::Effect;
+use super::effect::{Effect, EffectParameter};
 use super::reader::{FileError, Section};
 use super::sections::interval;
-use super::system::FittedEffect;
+use super::system::{FittedEffect, OwnValue};
 use crate::expr::suggestion;
 
 pub(super) fn read(
@@ -43,22 +43,69 @@ fn fitted(
     let values = effect
         .parameters
         .iter()
-        .map(|p| value(section, &p.name))
+        .map(|p| value(section, p))
         .collect::<Result<_, _>>()?;
+    let own = effect.parameters.iter().enumerate();
+    let own = own
+        .map(|(k, p)| own_values(section, k, p))
+        .collect::<Result<Vec<_>, _>>()?;
     Ok(FittedEffect {
         effect: effect.clone(),
         joint,
         values,
+        own: own.concat(),
         fixed: section.flag("fixed")?,
     })
 }
 
 /// `F_c = 0.16` or `F_c = { value = 0.16, ci95 = [0.15, 0.17] }`.
-fn value(section: &Section<'_>, key: &str) -> Result<(f64, Option<[f64; 2]>), FileError> {
+fn value(
+    section: &Section<'_>,
+    parameter: &EffectParameter,
+) -> Result<(f64, Option<[f64; 2]>), FileError> {
+    let known: &[&str] = if parameter.per_log {
+        &["value", "ci95", "logs"]
+    } else {
+        &["value", "ci95"]
+    };
+    number_or_table(section, &parameter.name, known)
+}
+
+fn number_or_table(
+    section: &Section<'_>,
+    key: &str,
+    known: &[&str],
+) -> Result<(f64, Option<[f64; 2]>), FileError> {
     if !section.is_table(key) {
         return Ok((section.required_number(key)?, None));
     }
     let inner = section.required_section(key)?;
-    inner.only(&["value", "ci95"])?;
+    inner.only(known)?;
     Ok((inner.required_number("value")?, interval(&inner, "ci95")?))
+}
+
+/// `q_z = { value = 0, logs = { "run1.csv" = { value = 0.012, ci95 = [0.011, 0.013] } } }`: what is known of
+/// single logs.
+fn own_values(
+    section: &Section<'_>,
+    k: usize,
+    parameter: &EffectParameter,
+) -> Result<Vec<OwnValue>, FileError> {
+    if !section.is_table(&parameter.name) {
+        return Ok(Vec::new());
+    }
+    let inner = section.required_section(&parameter.name)?;
+    let Some(logs) = inner.section("logs")? else {
+        return Ok(Vec::new());
+    };
+    let own = |log: &str| {
+        let (value, ci95) = number_or_table(&logs, log, &["value", "ci95"])?;
+        Ok(OwnValue {
+            log: log.to_owned(),
+            parameter: k,
+            value,
+            ci95,
+        })
+    };
+    logs.keys().map(own).collect()
 }

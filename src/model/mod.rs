@@ -14,6 +14,7 @@ mod network;
 mod reader;
 mod rollout;
 mod sections;
+mod shift;
 mod system;
 
 pub use dynamics::{Dynamics, Parameter};
@@ -28,4 +29,5 @@ pub use network::{
 };
 pub use reader::FileError;
 pub use rollout::Rollout;
-pub use system::{FittedEffect, System};
+pub use shift::absorbed;
+pub use system::{FittedEffect, OwnValue, System, put_own};

@@ -127,6 +127,11 @@ impl<'a> Section<'a> {
         items.iter().map(|item| self.table_of(key, item)).collect()
     }
 
+    /// Every key, in the order of the file.
+    pub fn keys(&self) -> impl Iterator<Item = &str> {
+        self.table.keys().map(|key| key.get_ref().as_ref())
+    }
+
     /// Every key with its table, in the order of the file.
     pub fn named_sections(&self) -> Result<Vec<(String, Section<'a>)>, FileError> {
         self.table

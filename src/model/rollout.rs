@@ -35,6 +35,13 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
         }
     }
 
+    /// Let a parameter have another value in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        let first = 3 * self.joints + 1;
+        self.tape.inputs()[first + parameter][lane] =
+            T::from_f64(value).expect("every f64 has a nearest float");
+    }
+
     /// Advance `state` (`[2n][lane]`: angles, then velocities) from `time` by `dt` seconds in `substeps`
     /// equal steps under the torque `tau` (`[n][lane]`).
     pub fn advance(

@@ -109,6 +109,7 @@ fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError
         unit: section.text_or_empty("unit")?,
         bounds,
         fixed: section.flag("fixed")?,
+        per_log: false,
         ci95: interval(section, "ci95")?,
         scale: if value == 0.0 { 1.0 } else { value.abs() },
     })

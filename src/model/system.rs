@@ -3,7 +3,7 @@ use std::path::Path;
 use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
 use super::{Parameter, sections};
-use crate::data::Columns;
+use crate::data::{Columns, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// How a model file states the motion.
@@ -33,8 +33,43 @@ pub struct FittedEffect {
     pub joint: usize,
     /// One for each of the effect's parameters: value and 95 % interval.
     pub values: Vec<(f64, Option<[f64; 2]>)>,
+    /// Values that single logs have of their own; where there is none, that of `values` holds.
+    pub own: Vec<OwnValue>,
     /// Held at the values given.
     pub fixed: bool,
+}
+
+/// The value that a parameter of an effect has in one log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnValue {
+    /// The log's path or name.
+    pub log: String,
+    /// Index into the effect's parameters.
+    pub parameter: usize,
+    pub value: f64,
+    pub ci95: Option<[f64; 2]>,
+}
+
+impl OwnValue {
+    /// The log's file name.
+    pub fn log_name(&self) -> String {
+        let name = Path::new(&self.log).file_name();
+        name.map_or_else(
+            || self.log.clone(),
+            |name| name.to_string_lossy().into_owned(),
+        )
+    }
+}
+
+/// Put what a log has of its own into the `values` of all parameters: `declared` ones, then those of the effects.
+pub fn put_own(values: &mut [f64], declared: usize, effects: &[FittedEffect], log: &Log) {
+    let mut first = declared;
+    for effect in effects {
+        for own in effect.own.iter().filter(|own| log.is_called(&own.log)) {
+            values[first + own.parameter] = own.value;
+        }
+        first += effect.values.len();
+    }
 }
 
 /// A declared model: what a model file says, checked.
@@ -221,13 +256,13 @@ impl System {
     pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
         let name = &new.effect.name;
         self.can_carry(&new.effect, new.joint)?;
-        if present
-            .iter()
-            .any(|old| old.joint == new.joint && old.effect.name == *name)
-        {
+        if present.iter().any(|old| old.label() == new.label()) {
             return Err(format!("`{name}` acts on joint {} already", new.joint + 1));
         }
-        for (parameter, (value, _)) in new.effect.parameters.iter().zip(&new.values) {
+        let common = (0..).zip(new.values.iter().map(|(value, _)| value));
+        let own = new.own.iter().map(|own| (own.parameter, &own.value));
+        for (k, value) in common.chain(own) {
+            let parameter = &new.effect.parameters[k];
             let [low, high] = parameter.bounds;
             // Bounds that are multiples of what logs show cannot be checked before there are logs.
             if parameter.measure == Measure::One && !(low..=high).contains(value) {

@@ -221,6 +221,7 @@ impl Plant {
             effect: effect.clone(),
             joint: joint - 1,
             values: own,
+            own: Vec::new(),
             fixed: false,
         };
         self.system

@@ -38,7 +38,7 @@ impl Plant {
             (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1,
             ((dt / STEP_S).ceil() as usize).max(1),
         );
-        let mut state: Vec<[f64; 1]> = self.recording.start.iter().map(|value| [*value]).collect();
+        let mut state: Vec<[f64; 1]> = self.start().iter().map(|value| [*value]).collect();
         let mut log = empty_log(n);
         for row in 0..rows {
             #[allow(clippy::cast_precision_loss)] // a few thousand rows
@@ -52,6 +52,18 @@ impl Plant {
             }
         }
         Ok(log)
+    }
+
+    /// The state at the start as the sensors read it: the plant file gives the true one.
+    fn start(&self) -> Vec<f64> {
+        let mut start = self.recording.start.clone();
+        let sensors = self.effects.iter().filter(|e| e.effect.is_of_sensor());
+        for effect in sensors {
+            let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
+            let angle = &mut start[effect.joint];
+            *angle = effect.effect.reading(&values, *angle);
+        }
+        start
     }
 
     fn measure(

@@ -3,7 +3,7 @@ use serde::Serialize;
 use crate::closeloop::{Alternative, Finding, How, Outcome, TakenBack, Unexplained, Verdict, norm};
 use crate::data::Finding as AuditFinding;
 use crate::evaluate::{Assessment, Summary, summarise};
-use crate::model::{FittedEffect, Parameter};
+use crate::model::{FittedEffect, OwnValue, Parameter};
 
 /// `report.json`: the outcome with fixed names, for other programs.
 #[derive(Debug, Serialize)]
@@ -46,6 +46,9 @@ struct EffectEntry {
 #[derive(Debug, Serialize)]
 struct ParameterEntry {
     name: String,
+    /// Where the parameter has a value per log: in which one this is it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<String>,
     value: f64,
     ci95: Option<[f64; 2]>,
     unit: String,
@@ -56,6 +59,9 @@ struct ParameterEntry {
 struct EffectName {
     name: String,
     joint: usize,
+    /// Of a shift: the parameter that is shifted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameter: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -143,6 +149,8 @@ struct AuditEntry {
 struct TriedEntry {
     name: String,
     joint: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parameter: Option<String>,
     /// Fall of the loss on left-out stretches, as a share.
     gain: f64,
     p_value: f64,
@@ -216,9 +224,16 @@ fn effect(finding: &Finding) -> EffectEntry {
         name: finding.effect.effect.name.clone(),
         joint: finding.effect.joint + 1,
         expression: finding.expression.clone(),
-        parameters: finding.parameters.iter().map(parameter).collect(),
+        parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
         error_reduction: finding.error_reduction,
+    }
+}
+
+fn row((of, own): &(Parameter, Option<&OwnValue>)) -> ParameterEntry {
+    ParameterEntry {
+        log: own.map(OwnValue::log_name),
+        ..parameter(of)
     }
 }
 
@@ -228,6 +243,7 @@ fn parameter(parameter: &Parameter) -> ParameterEntry {
     let narrow = |[low, high]: [f64; 2]| high - low < 2.0 * magnitude;
     ParameterEntry {
         name: parameter.name.clone(),
+        log: None,
         value: parameter.value,
         ci95: parameter.ci95,
         unit: parameter.unit.clone(),
@@ -239,6 +255,7 @@ fn effect_name(effect: &FittedEffect) -> EffectName {
     EffectName {
         name: effect.effect.name.clone(),
         joint: effect.joint + 1,
+        parameter: shifted(effect),
     }
 }
 
@@ -255,6 +272,12 @@ fn alternative(alternative: &Alternative) -> AlternativeEntry {
         reason: alternative.reason.clone(),
         experiment: alternative.experiment.clone(),
     }
+}
+
+fn shifted(effect: &FittedEffect) -> Option<String> {
+    effect
+        .shifted()
+        .map(|_| effect.effect.parameters[0].name.clone())
 }
 
 fn left(unexplained: &Unexplained) -> UnexplainedEntry {
@@ -333,6 +356,7 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
         let entry = |(i, evidence): (usize, &crate::closeloop::Evidence)| TriedEntry {
             name: evidence.effect.effect.name.clone(),
             joint: evidence.effect.joint + 1,
+            parameter: shifted(&evidence.effect),
             gain: evidence.gain,
             p_value: evidence.p_value,
             chosen: round.chosen == Some(i),

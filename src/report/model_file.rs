@@ -1,7 +1,7 @@
 use std::fmt::Write;
 
 use crate::closeloop::Outcome;
-use crate::model::{Parameter, System};
+use crate::model::{FittedEffect, OwnValue, Parameter, System};
 
 /// The declared model with fitted values and the effects that were found, as a model file. What the user
 /// wrote stays as it is, comments included; only numbers of `[parameters]` change.
@@ -12,11 +12,10 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
         env!("CARGO_PKG_VERSION")
     );
     text += &with_values(&system.declaration, declared, &outcome.sign_widths);
-    for (effect, _) in outcome.after.effects.iter().zip(0..) {
-        let finding = outcome
-            .findings
-            .iter()
-            .find(|f| f.effect.joint == effect.joint && f.effect.effect.name == effect.effect.name);
+    // Shifted parameters stand among the declared ones.
+    let effects = outcome.after.effects.iter();
+    for effect in effects.filter(|effect| effect.shifted().is_none()) {
+        let finding = (outcome.findings.iter()).find(|f| f.effect.label() == effect.label());
         let effect = finding.map_or(effect, |finding| &finding.effect);
         let _ = write!(
             text,
@@ -24,18 +23,38 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
             effect.effect.name,
             effect.joint + 1
         );
-        for (parameter, (value, ci95)) in effect.effect.parameters.iter().zip(&effect.values) {
-            let interval = ci95.map_or_else(String::new, |[low, high]| {
-                format!(", ci95 = [{low:?}, {high:?}]")
-            });
-            let _ = writeln!(
-                text,
-                "{} = {{ value = {value:?}{interval} }}",
-                parameter.name
-            );
+        for (k, parameter) in effect.effect.parameters.iter().enumerate() {
+            let (value, ci95) = effect.values[k];
+            let entry = value_and_interval(value, ci95) + &of_logs(effect, k);
+            let _ = writeln!(text, "{} = {{ {entry} }}", parameter.name);
         }
     }
     text
+}
+
+fn value_and_interval(value: f64, ci95: Option<[f64; 2]>) -> String {
+    let interval = ci95.map(|[low, high]| format!(", ci95 = [{low:?}, {high:?}]"));
+    format!("value = {value:?}{}", interval.unwrap_or_default())
+}
+
+/// What is known of single logs, each called by its file name, or by its path where that is not enough.
+fn of_logs(effect: &FittedEffect, k: usize) -> String {
+    let own: Vec<&OwnValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
+    if own.is_empty() {
+        return String::new();
+    }
+    let entry = |of: &&OwnValue| {
+        let alone = own
+            .iter()
+            .filter(|other| other.log_name() == of.log_name())
+            .count()
+            == 1;
+        let name = if alone { of.log_name() } else { of.log.clone() };
+        let value = value_and_interval(of.value, of.ci95);
+        format!("{} = {{ {value} }}", toml_edit::Key::new(name))
+    };
+    let entries: Vec<String> = own.iter().map(entry).collect();
+    format!(", logs = {{ {} }}", entries.join(", "))
 }
 
 /// The declaration with new numbers in place of the declared ones.

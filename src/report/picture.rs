@@ -26,13 +26,13 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             Role::Before,
             "declared model",
             &outcome.before.dynamics,
-            outcome.before.fit.values.clone(),
+            outcome.before.values_in(log),
         ),
         (
             Role::After,
             "with effects",
             &outcome.after.dynamics,
-            outcome.after.fit.values.clone(),
+            outcome.after.values_in(log),
         ),
     ];
     if let Some(learned) = &outcome.learned {

@@ -1,7 +1,7 @@
 use std::fmt::Write;
 
-use super::text::{headline, small, value};
-use crate::closeloop::{Finding, Outcome};
+use super::text::{headline, small, values};
+use crate::closeloop::Outcome;
 use crate::evaluate::{Assessment, summarise};
 
 /// The answer for a terminal: a few lines, and where the rest is.
@@ -11,19 +11,13 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         headline(outcome).replace("**", ""),
         outcome.reason
     );
-    for Finding {
-        effect,
-        expression,
-        parameters,
-        ..
-    } in &outcome.findings
-    {
-        let values: Vec<String> = parameters.iter().map(value).collect();
-        let (name, joint) = (&effect.effect.name, effect.joint + 1);
+    for finding in &outcome.findings {
+        let (name, joint) = (finding.effect.title(), finding.effect.joint + 1);
         let _ = writeln!(
             out,
-            "  {name} on joint {joint}: {expression}\n    {}",
-            values.join("\n    ")
+            "  {name} on joint {joint}: {}\n    {}",
+            finding.expression,
+            values(finding).join("\n    ")
         );
     }
     for &k in &outcome.identifiability.hold {

@@ -3,7 +3,7 @@ use std::fmt::Write;
 use crate::closeloop::{Finding, How, MOST_EFFECTS, Outcome, SIGNIFICANT, Verdict, norm};
 use crate::data::Severity;
 use crate::evaluate::{Summary, summarise};
-use crate::model::Parameter;
+use crate::model::{OwnValue, Parameter};
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
@@ -35,13 +35,7 @@ pub(super) fn headline(outcome: &Outcome) -> String {
     let found: Vec<String> = outcome
         .findings
         .iter()
-        .map(|f| {
-            format!(
-                "**{}** on joint {}",
-                f.effect.effect.name,
-                f.effect.joint + 1
-            )
-        })
+        .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint + 1))
         .collect();
     match (outcome.verdict, found.is_empty()) {
         (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
@@ -77,11 +71,11 @@ fn effects(findings: &[Finding]) -> String {
         "## Effects\n\n| effect | joint | adds | value (95 % interval) | p | cuts the error by |\n|---|---|---|---|---|---|\n",
     );
     for finding in findings {
-        let values: Vec<String> = finding.parameters.iter().map(value).collect();
+        let values = values(finding);
         let _ = writeln!(
             out,
             "| {} | {} | `{}` | {} | {} | {} |",
-            finding.effect.effect.name,
+            finding.effect.title(),
             finding.effect.joint + 1,
             finding.expression,
             values.join("<br>"),
@@ -104,8 +98,17 @@ fn share(part: f64) -> String {
     }
 }
 
+/// One text for each value of a finding; a value of one log alone says so.
+pub(super) fn values(finding: &Finding) -> Vec<String> {
+    let row = |(parameter, log): &(Parameter, Option<&OwnValue>)| match log {
+        Some(own) => format!("{} in {}", value(parameter), own.log_name()),
+        None => value(parameter),
+    };
+    finding.rows().iter().map(row).collect()
+}
+
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
-pub(super) fn value(parameter: &Parameter) -> String {
+fn value(parameter: &Parameter) -> String {
     let digits = parameter
         .ci95
         .map_or(1e-4 * parameter.value.abs(), |[low, high]| {
@@ -246,7 +249,7 @@ fn alternatives(outcome: &Outcome) -> String {
         let _ = writeln!(
             out,
             "- **{}** on joint {}: {}. To tell: {}.",
-            alternative.effect.effect.name,
+            alternative.effect.title(),
             alternative.effect.joint + 1,
             alternative.reason,
             alternative.experiment
@@ -324,7 +327,7 @@ fn tried(outcome: &Outcome) -> String {
             let _ = writeln!(
                 out,
                 "| {} | {} | {} | {} | {} |",
-                evidence.effect.effect.name,
+                evidence.effect.title(),
                 evidence.effect.joint + 1,
                 share(evidence.gain),
                 probability(evidence.p_value),

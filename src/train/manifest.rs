@@ -122,6 +122,7 @@ impl SavedParameter {
                 self.bounds[1].unwrap_or(f64::INFINITY),
             ],
             fixed: self.fixed,
+            per_log: false,
             ci95: None,
             scale: self.scale,
         }

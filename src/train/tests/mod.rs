@@ -26,6 +26,7 @@ pub(super) fn parameter(name: &str, value: f64) -> Parameter {
         unit: String::new(),
         bounds: [f64::NEG_INFINITY, f64::INFINITY],
         fixed: false,
+        per_log: false,
         ci95: None,
         scale: value.abs(),
     }

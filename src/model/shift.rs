@@ -1,0 +1,138 @@
+//! Declared parameters that are held fixed although the rig may have another value.
+
+use super::Parameter;
+use super::effect::{Effect, EffectParameter, Entry, Measure};
+use super::system::{FittedEffect, Motion, System};
+use crate::expr::{Formula, parse};
+
+/// The name of the effect.
+const NAME: &str = "parameter_shift";
+/// Gravity is the same on every rig: parameters in this unit are not asked about.
+const UNIT_OF_GRAVITY: &str = "m/s^2";
+/// What is positive keeps at least this share of its declared value.
+const LEAST: f64 = 1e-3;
+
+impl System {
+    /// For each parameter that the file declares fixed, the effect that it has another value: on the outermost
+    /// joint whose equation it enters, still absent.
+    pub fn shifts(&self) -> Vec<FittedEffect> {
+        let fixed = |p: &&Parameter| p.fixed && p.unit != UNIT_OF_GRAVITY;
+        let all = self.parameters.iter().enumerate();
+        all.filter(|(_, p)| fixed(p))
+            .filter_map(|(k, p)| {
+                let joint = self.outermost_joint(&p.name)?;
+                Some(FittedEffect::absent(&shift(k, p), joint))
+            })
+            .collect()
+    }
+
+    /// The last joint in whose equation a parameter appears, directly or through intermediates.
+    fn outermost_joint(&self, parameter: &str) -> Option<usize> {
+        let mut carriers = vec![parameter];
+        let carries = |formula: &Formula, carriers: &[&str]| {
+            formula
+                .names()
+                .iter()
+                .any(|name| carriers.contains(&&**name))
+        };
+        for (name, formula) in &self.lets {
+            if carries(&formula.value, &carriers) {
+                carriers.push(name);
+            }
+        }
+        let enters = |joint: &usize| match &self.motion {
+            Motion::Accelerations(formulas) => carries(&formulas[*joint].value, &carriers),
+            Motion::MassAndBias { mass, bias } => {
+                let mut row = mass[*joint].iter().chain([&bias[*joint]]);
+                row.any(|formula| carries(&formula.value, &carriers))
+            }
+        };
+        (0..self.joints).rev().find(enters)
+    }
+}
+
+fn shift(k: usize, declared: &Parameter) -> Effect {
+    let formula = parse(&declared.name).expect("a parameter's name is a formula");
+    let [low, high] = declared.bounds;
+    let least = if low == 0.0 {
+        LEAST * declared.value
+    } else {
+        low
+    };
+    Effect {
+        name: NAME.into(),
+        about: format!(
+            "`{}` has another value than the file declares",
+            declared.name
+        ),
+        entry: Entry::Shift(k, formula),
+        parameters: vec![EffectParameter {
+            name: declared.name.clone(),
+            unit: declared.unit.clone(),
+            about: "actual value less the declared one".into(),
+            typical: 0.1 * declared.scale,
+            bounds: [least - declared.value, high - declared.value],
+            starts: vec![0.0],
+            measure: Measure::One,
+            whole: false,
+            per_log: false,
+        }],
+        valid_if: None,
+        contains: Vec::new(),
+        confused_with: vec!["actuator_gain".into(), "rotor_inertia".into()],
+        shown_by: format!(
+            "a measurement of `{}` itself, or motion after it has been changed by a known amount",
+            declared.name
+        ),
+        first_joint_only: false,
+    }
+}
+
+impl FittedEffect {
+    /// The declared parameter that the effect shifts, if it is one of that kind.
+    pub fn shifted(&self) -> Option<usize> {
+        match self.effect.entry {
+            Entry::Shift(k, _) => Some(k),
+            _ => None,
+        }
+    }
+
+    /// The effect's name, with that of the parameter that it shifts.
+    pub fn title(&self) -> String {
+        match self.shifted() {
+            Some(_) => format!("{NAME} of {}", self.effect.parameters[0].name),
+            None => self.effect.name.clone(),
+        }
+    }
+}
+
+/// Shifts put into the declared values: these, and the effects that are left.
+pub fn absorbed(declared: &[f64], effects: &[FittedEffect]) -> (Vec<f64>, Vec<FittedEffect>) {
+    let mut declared = declared.to_vec();
+    for effect in effects {
+        if let Some(k) = effect.shifted() {
+            declared[k] += effect.values[0].0;
+        }
+    }
+    let left = effects.iter().filter(|effect| effect.shifted().is_none());
+    (declared, left.cloned().collect())
+}
+
+impl Parameter {
+    /// A declared parameter whose fitted `shift` stands beside it: with its actual value.
+    #[must_use]
+    pub fn shifted_by(&self, shift: &Self) -> Self {
+        let moved = |[low, high]: [f64; 2]| [self.value + low, self.value + high];
+        Self {
+            value: self.value + shift.value,
+            ci95: shift.ci95.map(moved),
+            ..self.clone()
+        }
+    }
+
+    /// `m2 = 0.62 (declared 0.5)`
+    pub fn expression_of_shift(&self, actual: f64) -> String {
+        let digits: f64 = format!("{actual:.3e}").parse().unwrap_or(actual);
+        format!("{} = {digits} (declared {})", self.name, self.value)
+    }
+}
