@@ -13,7 +13,7 @@ pub fn candidates(
         for joint in 0..study.system.joints {
             let there = present
                 .iter()
-                .any(|p| p.joint == joint && p.effect.name == effect.name);
+                .any(|p| p.joint == joint && p.effect.excludes(effect));
             if !there
                 && is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
@@ -31,9 +31,7 @@ pub fn candidates(
 
 /// Effects of the torque cannot be seen where there is none.
 fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
-    let names = effect.entry.formula().names();
-    let needs_torque = names.iter().any(|name| ["tau", "load"].contains(name));
-    !needs_torque || study.top_torque[joint] > 0.0
+    !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
 }
 
 /// The candidate at each of its starting points, every combination of searched values.

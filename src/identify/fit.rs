@@ -95,7 +95,7 @@ pub fn promise(
         Some(scale),
     )
     .ok()?;
-    let terms = shooting.linearise(&tangent, values, locals, scale);
+    let terms = shooting.linearise(dynamics, &tangent, values, locals, scale);
     let (mut matrix, mut gradient) = (
         DMatrix::zeros(active.len(), active.len()),
         DVector::zeros(active.len()),
@@ -186,9 +186,13 @@ impl<'a> Search<'a> {
     /// One accepted step; false when there is nothing left to gain.
     fn step(&mut self) -> bool {
         self.iterations += 1;
-        let terms = self
-            .shooting
-            .linearise(self.tangent, &self.values, &self.locals, self.scale);
+        let terms = self.shooting.linearise(
+            self.dynamics,
+            self.tangent,
+            &self.values,
+            &self.locals,
+            self.scale,
+        );
         while self.damping < 1e12 {
             let (values, locals) = self.propose(&terms);
             let cost = self.total(&values, &locals);
@@ -265,9 +269,13 @@ impl<'a> Search<'a> {
     }
 
     fn finish(self) -> Fit {
-        let terms = self
-            .shooting
-            .linearise(self.tangent, &self.values, &self.locals, self.scale);
+        let terms = self.shooting.linearise(
+            self.dynamics,
+            self.tangent,
+            &self.values,
+            &self.locals,
+            self.scale,
+        );
         let shared = self.tangent.active.len();
         let reduced = terms
             .iter()

@@ -2,6 +2,7 @@
 //! integrators that run it.
 
 mod assemble;
+mod command;
 mod dynamics;
 mod effect;
 mod effects_in_file;
@@ -16,6 +17,7 @@ mod rollout;
 mod sections;
 mod system;
 
+pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};

@@ -221,11 +221,13 @@ impl System {
     pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
         let name = &new.effect.name;
         self.can_carry(&new.effect, new.joint)?;
-        if present
-            .iter()
-            .any(|old| old.joint == new.joint && old.effect.name == *name)
-        {
-            return Err(format!("`{name}` acts on joint {} already", new.joint + 1));
+        let mut here = present.iter().filter(|old| old.joint == new.joint);
+        if let Some(old) = here.find(|old| old.effect.excludes(&new.effect)) {
+            return Err(format!(
+                "`{}` acts on joint {} already",
+                old.effect.name,
+                new.joint + 1
+            ));
         }
         for (parameter, (value, _)) in new.effect.parameters.iter().zip(&new.values) {
             let [low, high] = parameter.bounds;
