@@ -6,9 +6,12 @@ use std::path::Path;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, Normal};
 use residyn::data::Log;
 use residyn::expr::{Graph, Program, SignForm};
-use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, Rollout, System};
+use residyn::model::{
+    Commands, Dynamics, Effect, Entry, FittedEffect, Library, Rollout, StepTorque, System,
+};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
@@ -200,24 +203,34 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
         .map(|_| [rng.random_range(0.5..12.0), rng.random_range(0.0..TAU)])
         .collect();
     let mut log = empty_log(&format!("{seed}.csv"), n);
+    log.time = (0..=rows).map(|row| 0.01 * row as f64).collect();
+    for (j, tau) in log.tau.iter_mut().enumerate() {
+        let wave = |time: f64| {
+            let tones = tones[4 * j..][..4].iter();
+            tones.map(|[w, p]| (w * time + p).sin()).sum::<f64>()
+        };
+        *tau = log.time.iter().map(|t| 0.25 * torque * wave(*t)).collect();
+    }
+    let commands = Commands::of_log(model, &model.values(), &log);
     let mut rollout = Rollout::<f64, 1>::new(model, &model.values());
     let mut state: Vec<[f64; 1]> = start.iter().map(|x| [*x]).collect();
     for row in 0..=rows {
-        let time = 0.01 * row as f64;
-        let wave = |j: usize| {
-            tones[4 * j..][..4]
-                .iter()
-                .map(|[w, p]| (w * time + p).sin())
-                .sum::<f64>()
-        };
-        let tau: Vec<[f64; 1]> = (0..n).map(|j| [0.25 * torque * wave(j)]).collect();
-        log.time.push(time);
+        let time = log.time[row];
         for j in 0..n {
             log.q[j].push(state[j][0]);
             log.qd[j].push(state[n + j][0]);
-            log.tau[j].push(tau[j][0]);
         }
-        rollout.advance(&mut state, &tau, [time], [0.01], 20);
+        let held: Vec<[f64; 1]> = log.tau.iter().map(|tau| [tau[row]]).collect();
+        let torque = StepTorque::new([&commands], &held, [time], [time + 0.01], 20);
+        rollout.advance(&mut state, &torque.mean, [time], [0.01], 20);
     }
     log
+}
+
+/// Add noise of this standard deviation (rad) to the angles.
+pub fn add_noise(log: &mut Log, deviation: f64, seed: u64) {
+    let (normal, mut rng) = (Normal::new(0.0, deviation).unwrap(), rng(seed));
+    for q in log.q.iter_mut().flatten() {
+        *q += normal.sample(&mut rng);
+    }
 }

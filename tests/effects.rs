@@ -281,7 +281,14 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 #[test]
 fn every_effect_file_is_tested_here() {
     let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
-    tested.extend(["gravity_tilt", "rotor_inertia", "sensor_offset"]);
+    // Those with memory are tested in memory.rs.
+    tested.extend([
+        "gravity_tilt",
+        "rotor_inertia",
+        "sensor_offset",
+        "actuator_delay",
+        "actuator_lag",
+    ]);
     tested.sort_unstable();
     let library = Library::built_in();
     let known: Vec<&str> = library.effects().iter().map(|e| e.name.as_str()).collect();

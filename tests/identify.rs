@@ -1,7 +1,6 @@
 //! Parameters of simulated rigs come back, with honest intervals.
 
 use rand::RngExt;
-use rand_distr::{Distribution, Normal};
 use residyn::data::{Interval, Log};
 use residyn::expr::SignForm;
 use residyn::identify::{
@@ -9,7 +8,7 @@ use residyn::identify::{
 };
 use residyn::model::{Dynamics, Library};
 
-use crate::common::{assert_near, dynamics, fitted, rng, simulate, system};
+use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
 
 /// Windows in s.
 const WINDOW_S: f64 = 0.5;
@@ -174,17 +173,10 @@ fn without_torque_its_gain_is_undetermined_and_held() {
     assert_eq!(fit.values[1], 2.4);
 }
 
-fn add_noise(log: &mut Log, seed: u64) {
-    let (normal, mut rng) = (Normal::new(0.0, NOISE).unwrap(), rng(seed));
-    for q in log.q.iter_mut().flatten() {
-        *q += normal.sample(&mut rng);
-    }
-}
-
 /// Whether the interval of each parameter holds the truth, and the fit's scale of the residuals.
 fn covered(model: &Dynamics, clean: &Log, seed: u64) -> (Vec<bool>, f64) {
     let mut log = clean.clone();
-    add_noise(&mut log, seed);
+    add_noise(&mut log, NOISE, seed);
     let logs = [log];
     let shooting = shooting(&logs, 1);
     let fit = fit_to(&shooting, model, &free(model), &astray(model, &free(model)));
@@ -228,7 +220,7 @@ fn offset_logs(model: &Dynamics, seed: u64) -> Vec<Log> {
         let mut log = simulate(model, &[3.0, 0.0], 1.0, 1200, 5 + k);
         log.q[0].iter_mut().for_each(|q| *q += offset);
         log.path = format!("run{k}.csv").into();
-        add_noise(&mut log, 10 * seed + k);
+        add_noise(&mut log, NOISE, 10 * seed + k);
         log
     };
     (0..).zip(&OFFSETS).map(log).collect()

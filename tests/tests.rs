@@ -12,6 +12,7 @@ mod functions;
 mod gradients;
 mod identify;
 mod measured;
+mod memory;
 mod metric;
 mod oracles;
 mod parity;

@@ -71,7 +71,7 @@ fn systems(library: &Library) -> Result<(String, serde_json::Value)> {
 fn effects(effects: &[Effect]) -> (String, serde_json::Value) {
     let (mut text, mut values) = (String::new(), Vec::new());
     for effect in effects {
-        let formula = effect.entry.formula().text();
+        let formula = effect.text();
         let _ = writeln!(text, "{}: {}\n    {formula}", effect.name, effect.about);
         for p in &effect.parameters {
             let _ = writeln!(

@@ -10,14 +10,10 @@ pub fn candidates(
     library: &[Effect],
     present: &[FittedEffect],
 ) -> Vec<FittedEffect> {
-    let mut all = Vec::new();
+    let mut all: Vec<FittedEffect> = study.system.shifts();
     for effect in library {
         for joint in 0..study.system.joints {
-            let there = present
-                .iter()
-                .any(|p| p.joint == joint && p.effect.name == effect.name);
-            if !there
-                && is_driven_enough(study, effect, joint)
+            if is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
@@ -28,16 +24,13 @@ pub fn candidates(
             }
         }
     }
-    let absent = |shift: &FittedEffect| !present.iter().any(|p| p.label() == shift.label());
-    all.extend(study.system.shifts().into_iter().filter(absent));
+    all.retain(|new| !present.iter().any(|old| old.excludes(new)));
     all
 }
 
 /// Effects of the torque cannot be seen where there is none.
 fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
-    let names = effect.entry.formula().names();
-    let needs_torque = names.iter().any(|name| ["tau", "load"].contains(name));
-    !needs_torque || study.top_torque[joint] > 0.0
+    !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
 }
 
 /// The candidate at each of its starting points, every combination of searched values.

@@ -6,7 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use super::study::{Fitted, Study, joined};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
+    Commands, Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
+    absorbed,
 };
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
@@ -38,7 +39,7 @@ pub fn learn_residual(
     rng: &mut ChaCha8Rng,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Option<Learned>, TrainError> {
-    let Some((training, validation)) = segments(study) else {
+    let Some((training, validation)) = segments(study, model) else {
         return Ok(None);
     };
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
@@ -92,13 +93,17 @@ fn fit_settings() -> FitSettings {
     }
 }
 
-/// Segments to train on and to choose the epoch by; `None` where the logs give too few.
-fn segments(study: &Study<'_>) -> Option<(Segments, Segments)> {
+/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees the
+/// torque that acts, as the model does.
+fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     let thinning = Thinning {
         step_s: STEP_S,
         length_s: STRETCH_S,
     };
-    let of_log = |log: &Log| trajectories(log, thinning);
+    let of_log = |log: &Log| {
+        let commands = Commands::of_log(&model.dynamics, &model.fit.values, log);
+        trajectories(&commands.acting_on(log), thinning)
+    };
     let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
     let stride = (rows / SEGMENTS).max(1);

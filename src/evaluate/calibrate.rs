@@ -120,5 +120,6 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         joints: n,
         parameters,
         program: graph.finish(&outputs),
+        filters: dynamics.filters.clone(),
     }
 }

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
-use crate::model::{Dynamics, Rollout};
+use crate::model::{Commands, Dynamics, Rollout, StepTorque};
 
 /// Squared errors of one window.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,6 +102,9 @@ fn run<'v>(
     horizons_s: &[f64],
     step_s: f64,
 ) -> Vec<OpenLoop> {
+    let commands: Vec<Commands> = (logs.iter().enumerate())
+        .map(|(index, log)| Commands::of_log(dynamics, values(index), log))
+        .collect();
     let one = |&horizon_s: &f64| {
         let windows: Vec<Window> = logs
             .iter()
@@ -118,6 +121,7 @@ fn run<'v>(
                 roll(
                     dynamics,
                     values(pack[0].log),
+                    &commands[pack[0].log],
                     &logs[pack[0].log],
                     pack,
                     step_s,
@@ -176,6 +180,7 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
 fn roll(
     dynamics: &Dynamics,
     values: &[f64],
+    commands: &Commands,
     log: &Log,
     pack: &[Window],
     step_s: f64,
@@ -197,13 +202,15 @@ fn roll(
         let at: [usize; LANES] =
             std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
         let time = at.map(|row| log.time[row]);
-        let dt = at.map(|row| log.time[row + 1] - log.time[row]);
+        let end = at.map(|row| log.time[row + 1]);
+        let dt = std::array::from_fn(|lane| end[lane] - time[lane]);
         let tau: Vec<[f64; LANES]> = log.tau.iter().map(|tau| at.map(|row| tau[row])).collect();
-        let longest = dt.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let longest = dt.iter().fold(0.0_f64, |a: f64, b: &f64| a.max(*b));
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // a small positive number
         let substeps = ((longest / step_s - 1e-6).ceil() as usize).max(1);
-        rollout.advance(&mut state, &tau, time, dt, substeps);
+        let torque = StepTorque::new([commands; LANES], &tau, time, end, substeps);
+        rollout.advance(&mut state, &torque.mean, time, dt, substeps);
         for (l, error) in errors.iter_mut().enumerate() {
             if pack[l].first + row < pack[l].last {
                 error.add(&mut state, l, log, pack[l].first + row + 1);

@@ -1,6 +1,6 @@
 use crate::data::{Log, half_width_s};
-use crate::identify::initial_state;
-use crate::model::{Dynamics, Rollout};
+use crate::identify::{Window, initial_state};
+use crate::model::{Commands, Dynamics, Rollout, StepTorque};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]
@@ -13,35 +13,44 @@ pub struct Trace {
 /// Predictions of `horizon_s` seconds one after the other along a log, each started from the log: what a
 /// picture of an open-loop error shows.
 pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) -> Vec<Trace> {
+    let commands = Commands::of_log(dynamics, values, log);
     // Windows for the error overlap by half; a picture wants each second one.
     super::open_loop::windows(0, log, horizon_s)
         .iter()
         .step_by(2)
-        .map(|window| trace(dynamics, values, log, window.first, window.last))
+        .map(|window| trace(dynamics, values, &commands, log, window))
         .collect()
 }
 
-fn trace(dynamics: &Dynamics, values: &[f64], log: &Log, first: usize, last: usize) -> Trace {
-    let start =
-        initial_state(log, half_width_s(log.median_step()), first).expect("windows() checks this");
+fn trace(
+    dynamics: &Dynamics,
+    values: &[f64],
+    commands: &Commands,
+    log: &Log,
+    window: &Window,
+) -> Trace {
+    let start = initial_state(log, half_width_s(log.median_step()), window.first)
+        .expect("windows() checks this");
     let mut state: Vec<[f64; 1]> = start.iter().map(|value| [*value]).collect();
     let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
     let mut trace = Trace {
         time: Vec::new(),
         q: vec![Vec::new(); dynamics.joints],
     };
-    for row in first..=last {
+    for row in window.first..=window.last {
         trace.time.push(log.time[row]);
         for (q, value) in trace.q.iter_mut().zip(&state) {
             q.push(value[0]);
         }
-        if row < last {
-            let dt = log.time[row + 1] - log.time[row];
+        if row < window.last {
+            let (from, to) = (log.time[row], log.time[row + 1]);
+            let dt = to - from;
             let tau: Vec<[f64; 1]> = log.tau.iter().map(|tau| [tau[row]]).collect();
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             // a small positive number
             let substeps = ((dt / super::open_loop::LONGEST_STEP_S).ceil() as usize).max(1);
-            rollout.advance(&mut state, &tau, [log.time[row]], [dt], substeps);
+            let torque = StepTorque::new([commands], &tau, [from], [to], substeps);
+            rollout.advance(&mut state, &torque.mean, [from], [dt], substeps);
         }
     }
     trace

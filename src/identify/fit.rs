@@ -162,7 +162,7 @@ pub fn promise(
         Some(scale),
     )
     .ok()?;
-    let terms = shooting.linearise(&tangent, &search.values, locals, scale);
+    let terms = shooting.linearise(dynamics, &tangent, &search.values, locals, scale);
     let size = search.layout.columns.len();
     let (mut matrix, mut gradient) = (DMatrix::zeros(size, size), DVector::zeros(size));
     let mut own_gain = 0.0;
@@ -253,9 +253,13 @@ impl<'a> Search<'a> {
     /// One accepted step; false when there is nothing left to gain.
     fn step(&mut self) -> bool {
         self.iterations += 1;
-        let terms = self
-            .shooting
-            .linearise(self.tangent, &self.values, &self.locals, self.scale);
+        let terms = self.shooting.linearise(
+            self.dynamics,
+            self.tangent,
+            &self.values,
+            &self.locals,
+            self.scale,
+        );
         while self.damping < 1e12 {
             let (values, locals) = self.propose(&terms);
             let cost = self.total(&values, &locals);
@@ -329,9 +333,13 @@ impl<'a> Search<'a> {
     }
 
     fn finish(self) -> Fit {
-        let terms = self
-            .shooting
-            .linearise(self.tangent, &self.values, &self.locals, self.scale);
+        let terms = self.shooting.linearise(
+            self.dynamics,
+            self.tangent,
+            &self.values,
+            &self.locals,
+            self.scale,
+        );
         let shared = self.tangent.active.len();
         let reduced = (terms.iter().zip(&self.shooting.windows))
             .map(|(terms, window)| {

@@ -1,5 +1,5 @@
 use crate::expr::{Graph, Program, Tape};
-use crate::model::Dynamics;
+use crate::model::{Dynamics, StepTorque};
 
 /// Lanes of the identification: one AVX-512 register, two AVX2 registers of f64.
 pub(super) const LANES: usize = 8;
@@ -17,7 +17,8 @@ pub enum Local {
 /// The program of a model's accelerations with their derivatives by states, shared parameters and forces.
 ///
 /// Outputs: accelerations (n), then for each joint a row of derivatives by `q`, `qd`, active
-/// parameters and, if they are free, forces. The identification is for physics: dq/dt = qd.
+/// parameters and, if they are free, forces. The identification is for physics: dq/dt = qd. Further inputs
+/// behind the model's own are the derivatives of the torques by the parameters of the model's filters.
 pub(super) struct Tangent {
     pub program: Program,
     pub joints: usize,
@@ -43,7 +44,17 @@ impl Tangent {
         if local == Local::StateAndForce {
             wrt.extend(&inputs[2 * n..3 * n]);
         }
-        let jacobian = graph.jacobian(accelerations, &wrt);
+        let mut jacobian = graph.jacobian(accelerations, &wrt);
+        for filter in &dynamics.filters {
+            let slope = graph.input(&format!("slope of {}", filter.parameter));
+            let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
+                continue;
+            };
+            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint]]);
+            for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
+                row[2 * n + column] = graph.mul(by_torque[0], slope);
+            }
+        }
         let all: Vec<_> = accelerations
             .iter()
             .copied()
@@ -126,13 +137,19 @@ impl<'t> Flow<'t> {
         }
     }
 
-    pub fn advance(&mut self, tau: &[Lane], time: Lane, dt: Lane, substeps: usize) {
+    /// As [`Rollout::advance`](crate::model::Rollout::advance), with the torque's derivatives by the parameters
+    /// of filters.
+    pub fn advance(&mut self, torque: &StepTorque<LANES>, time: Lane, dt: Lane, substeps: usize) {
         let n = self.tangent.joints;
-        self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
         #[allow(clippy::cast_precision_loss)] // few substeps
         let h = dt.map(|dt| dt / substeps as f64);
         let mut now = time;
-        for _ in 0..substeps {
+        for part in 0..substeps {
+            let (tau, slopes) = torque.part(n, part);
+            let inputs = self.tape.inputs();
+            inputs[2 * n..3 * n].copy_from_slice(tau);
+            let own = inputs.len() - slopes.len();
+            inputs[own..].copy_from_slice(slopes);
             self.step(now, h);
             now = std::array::from_fn(|lane| now[lane] + h[lane]);
         }

@@ -5,7 +5,7 @@ use super::sensitivity::{Flow, LANES, Lane, Tangent};
 use super::values::Values;
 use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
-use crate::model::{Dynamics, Rollout};
+use crate::model::{Commands, Dynamics, Rollout, StepTorque};
 
 /// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
 /// stable and accurate with dry friction smoothed to a fraction of a percent of the top speed.
@@ -104,13 +104,14 @@ impl<'l> Shooting<'l> {
         locals: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let n = dynamics.joints;
+        let commands = self.commands(dynamics, values);
         let per_pack: Vec<Vec<(usize, Vec<f64>)>> = self
             .packs
             .par_iter()
             .map(|pack| {
                 let mut all: Vec<(usize, Vec<f64>)> =
                     pack.windows.iter().map(|&w| (w, Vec::new())).collect();
-                pack.roll(dynamics, values, locals, |row, q| {
+                pack.roll(dynamics, values, &commands, locals, |row, q| {
                     for (lane, (window, residuals)) in all.iter_mut().enumerate() {
                         if row < self.windows[*window].rows() {
                             residuals.extend((0..n).map(|j| {
@@ -150,18 +151,26 @@ impl<'l> Shooting<'l> {
             .collect()
     }
 
+    /// What the model's filters make of the torques of each log.
+    fn commands(&self, dynamics: &Dynamics, values: &Values) -> Vec<Commands> {
+        let of_log = |(index, log)| Commands::of_log(dynamics, &values.of_log(index), log);
+        self.logs.iter().enumerate().map(of_log).collect()
+    }
+
     /// Cost, gradient and Gauss-Newton matrix of each window.
     pub(super) fn linearise(
         &self,
+        dynamics: &Dynamics,
         tangent: &Tangent,
         values: &Values,
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<WindowTerms> {
+        let commands = self.commands(dynamics, values);
         let per_pack: Vec<Vec<(usize, WindowTerms)>> = self
             .packs
             .par_iter()
-            .map(|pack| pack.linearise(tangent, values, locals, scale))
+            .map(|pack| pack.linearise(tangent, values, &commands, locals, scale))
             .collect();
         let mut all: Vec<_> = per_pack.into_iter().flatten().collect();
         all.sort_by_key(|(window, _)| *window);
@@ -243,15 +252,22 @@ impl Pack {
         }
     }
 
-    /// The torque at `row` with the windows' own forces, if any, added.
-    fn torque(&self, row: usize, forces: &[Lane]) -> Vec<Lane> {
-        let mut tau = self.tau[row].clone();
-        for (tau, force) in tau.iter_mut().zip(forces) {
+    /// The torque from `row` to the next with the windows' own forces, if any, added.
+    fn torque(&self, commands: &[Commands], row: usize, forces: &[Lane]) -> StepTorque<LANES> {
+        let end = self.time.get(row + 1).unwrap_or(&self.time[row]);
+        let mut torque = StepTorque::new(
+            self.logs.map(|log| &commands[log]),
+            &self.tau[row],
+            self.time[row],
+            *end,
+            self.substeps[row],
+        );
+        for (tau, force) in torque.mean.iter_mut().zip(forces.iter().cycle()) {
             for lane in 0..LANES {
                 tau[lane] += force[lane];
             }
         }
-        tau
+        torque
     }
 
     /// Integrate and show the angles at each row.
@@ -259,6 +275,7 @@ impl Pack {
         &self,
         dynamics: &Dynamics,
         values: &Values,
+        commands: &[Commands],
         locals: &[Vec<f64>],
         mut see: impl FnMut(usize, &[Lane]),
     ) {
@@ -270,10 +287,10 @@ impl Pack {
         });
         for row in 0..self.rows() {
             see(row, &state[..dynamics.joints]);
-            let tau = self.torque(row, &forces);
+            let torque = self.torque(commands, row, &forces);
             rollout.advance(
                 &mut state,
-                &tau,
+                &torque.mean,
                 self.time[row],
                 self.dt[row],
                 self.substeps[row],
@@ -285,6 +302,7 @@ impl Pack {
         &self,
         tangent: &Tangent,
         values: &Values,
+        commands: &[Commands],
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, WindowTerms)> {
@@ -304,8 +322,8 @@ impl Pack {
                 let first = 2 * n + j * columns;
                 sums.add(&residual, &flow.now[first..first + columns], &weight);
             }
-            let tau = self.torque(row, &states[2 * n..]);
-            flow.advance(&tau, self.time[row], self.dt[row], self.substeps[row]);
+            let torque = self.torque(commands, row, &states[2 * n..]);
+            flow.advance(&torque, self.time[row], self.dt[row], self.substeps[row]);
         }
         self.windows
             .iter()
@@ -374,6 +392,65 @@ impl Sums {
             cost: self.cost[lane],
             gradient: DVector::from_iterator(self.columns, self.gradient.iter().map(|g| g[lane])),
             hessian,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::Shooting;
+    use crate::data::Log;
+    use crate::expr::SignForm;
+    use crate::identify::cut;
+    use crate::identify::sensitivity::{Local, Tangent};
+    use crate::model::{FittedEffect, Library};
+
+    /// Two seconds at 100 Hz of some motion under some torque.
+    fn log() -> Log {
+        let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
+        let column = |f: fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];
+        Log {
+            path: "some.csv".into(),
+            q: column(|t| 0.01 * (3.0 * t).sin()),
+            qd: column(|t| 0.03 * (3.0 * t).cos()),
+            tau: column(|t| (20.0 * t).sin() + (31.0 * t).cos()),
+            leave_out: Vec::new(),
+            notes: Vec::new(),
+            time,
+        }
+    }
+
+    #[test]
+    fn gradients_by_a_delay_and_a_lag_are_slopes_of_the_cost() {
+        let library = Library::built_in();
+        let effects = ["actuator_delay", "actuator_lag"]
+            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), 0));
+        let pendulum = library.system(Path::new("pendulum")).unwrap();
+        let model = pendulum.dynamics_with(&effects, &[SignForm::Exact]);
+        let logs = [log()];
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
+        for local in [Local::State, Local::StateAndForce] {
+            let locals = shooting.initial_locals(usize::from(local == Local::StateAndForce));
+            let tangent = Tangent::new(&model, &[1, 2, 3], local);
+            for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
+                let values = [15.0, 3.0, delay, lag];
+                let cost = |values: &[f64]| -> f64 {
+                    shooting.costs(&model, &values.into(), &locals, 1.0).iter().sum()
+                };
+                let terms = shooting.linearise(&model, &tangent, &values.as_slice().into(), &locals, 1.0);
+                for (column, k) in [1, 2, 3].into_iter().enumerate() {
+                    let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
+                    let mut moved = values;
+                    moved[k] += 1e-7;
+                    let wanted = (cost(&moved) - cost(&values)) / 1e-7;
+                    assert!(
+                        (found - wanted).abs() < 1e-4 * wanted.abs(),
+                        "{local:?}, parameter {k} at {delay}, {lag}: {found} {wanted}"
+                    );
+                }
+            }
         }
     }
 }

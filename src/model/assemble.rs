@@ -1,3 +1,4 @@
+use super::command::Filter;
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
@@ -12,8 +13,8 @@ impl System {
 
     /// The declared equations with `effects` in place of the file's own.
     ///
-    /// Effects of the torque act first, in the order given, then forces are added. `load` is the torque
-    /// after the former. `sign` says for each joint how dry friction is written.
+    /// Filters of the command act first, then other effects of the torque, in the order given, then forces are
+    /// added. `load` is the torque before the latter. `sign` says for each joint how dry friction is written.
     ///
     /// # Panics
     /// When an effect names a joint that the system does not have, or `sign` has not one entry a joint.
@@ -35,8 +36,26 @@ impl System {
             joints: self.joints,
             parameters: assembly.parameters,
             program: assembly.graph.finish(&outputs),
+            filters: filters(self.parameters.len(), effects),
         }
     }
+}
+
+/// The filters among `effects`, whose parameters follow the `declared` ones.
+fn filters(declared: usize, effects: &[FittedEffect]) -> Vec<Filter> {
+    let mut parameter = declared;
+    let mut filters = Vec::new();
+    for effect in effects {
+        if let Entry::Command(kind) = effect.effect.entry {
+            filters.push(Filter {
+                joint: effect.joint,
+                kind,
+                parameter,
+            });
+        }
+        parameter += effect.values.len();
+    }
+    filters
 }
 
 impl FittedEffect {
@@ -56,8 +75,25 @@ impl FittedEffect {
         format!("{} on joint {}", self.title(), self.joint + 1)
     }
 
+    /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let filter = matches!(self.effect.entry, Entry::Command(_));
+        let same_filter = filter && self.effect.entry == other.effect.entry;
+        self.label() == other.label() || same_filter && self.joint == other.joint
+    }
+
     /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
     pub fn expression(&self, names: &[String]) -> String {
+        let formula = match &self.effect.entry {
+            Entry::Command(filter) => {
+                return filter.expression(&format!("tau{}", self.joint + 1), &names[0]);
+            }
+            Entry::Force(f)
+            | Entry::Torque(f)
+            | Entry::Angle(f)
+            | Entry::Inertia(f)
+            | Entry::Shift(_, f) => f,
+        };
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         for name in EFFECT_NAMES {
@@ -74,7 +110,7 @@ impl FittedEffect {
             scope.bind(&parameter.name, node);
         }
         let node = scope
-            .lower(&mut graph, self.effect.entry.formula())
+            .lower(&mut graph, formula)
             .expect("formulas were checked when the file was read");
         graph.finish(&[node]).formula(0)
     }
@@ -186,7 +222,9 @@ impl<'a> Assembly<'a> {
         let effects = self.effects.iter().enumerate();
         let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect));
         wanted
-            .map(|(index, (effect, _))| (index, effect.joint, effect.effect.entry.formula()))
+            .filter_map(|(index, (effect, _))| {
+                Some((index, effect.joint, effect.effect.entry.formula()?))
+            })
             .collect()
     }
 

@@ -1,5 +1,6 @@
 use serde::{Deserialize, Serialize};
 
+use super::command::Filter;
 use crate::expr::Program;
 
 /// A physical parameter of a model or an effect.
@@ -26,7 +27,7 @@ pub struct Parameter {
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
 /// (N m or N), `t` (s), then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values),
-/// then `dqd/dt` (n values).
+/// then `dqd/dt` (n values). The torques are those that act: what `filters` make of the commanded ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.
@@ -35,6 +36,8 @@ pub struct Dynamics {
     pub joints: usize,
     pub parameters: Vec<Parameter>,
     pub program: Program,
+    /// What the commanded torques go through first, see [`Commands`](super::Commands).
+    pub filters: Vec<Filter>,
 }
 
 impl Dynamics {

@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use super::command::CommandFilter;
 use super::reader::{Document, FileError, Located, Section};
 use crate::expr::{Formula, Graph, Scope, SignForm};
 
@@ -17,17 +18,29 @@ pub enum Entry {
     Inertia(Formula),
     /// Added to the declared parameter of this number.
     Shift(usize, Formula),
+    /// A filter of the commanded torque, ahead of everything else that becomes of it.
+    Command(CommandFilter),
 }
 
 impl Entry {
-    pub fn formula(&self) -> &Formula {
+    /// What the effect file says; a filter has no formula.
+    pub fn formula(&self) -> Option<&Formula> {
         match self {
             Self::Force(f)
             | Self::Torque(f)
             | Self::Angle(f)
             | Self::Inertia(f)
-            | Self::Shift(_, f) => f,
+            | Self::Shift(_, f) => Some(f),
+            Self::Command(_) => None,
         }
+    }
+
+    /// Whether the effect cannot be seen on a joint without torque.
+    pub fn needs_torque(&self) -> bool {
+        self.formula().is_none_or(|formula| {
+            let mut names = formula.names().into_iter();
+            names.any(|name| ["tau", "load"].contains(&name.as_ref()))
+        })
     }
 }
 
@@ -82,6 +95,18 @@ impl Effect {
 }
 
 impl Effect {
+    /// What the effect does, in the names of its file.
+    pub fn text(&self) -> String {
+        match &self.entry {
+            Entry::Command(filter) => filter.expression("tau", &self.parameters[0].name),
+            Entry::Force(f)
+            | Entry::Torque(f)
+            | Entry::Angle(f)
+            | Entry::Inertia(f)
+            | Entry::Shift(_, f) => f.text().to_owned(),
+        }
+    }
+
     /// Whether these values of the parameters, in their order, make sense together.
     pub fn is_valid(&self, values: &[f64]) -> bool {
         let condition = |formula| self.evaluate(formula, values, 0.0) > 0.0;
@@ -109,7 +134,10 @@ impl Effect {
 
     /// What the sensor reads, by an effect of the sensor with these values, where the joint rests at `angle`.
     pub fn reading(&self, values: &[f64], angle: f64) -> f64 {
-        let step = |read: f64| read + angle - self.evaluate(self.entry.formula(), values, read);
+        let Entry::Angle(formula) = &self.entry else {
+            return angle;
+        };
+        let step = |read: f64| read + angle - self.evaluate(formula, values, read);
         // One step is exact for an offset; a scale that is off by a tenth gains a digit a step.
         (0..16).fold(angle, |read, _| step(read))
     }
@@ -155,6 +183,7 @@ const EFFECT_KEYS: &[&str] = &[
     "torque",
     "angle",
     "inertia",
+    "command",
     "contains",
     "confused_with",
     "shown_by",
@@ -253,21 +282,47 @@ fn entry(
         ("angle", Entry::Angle),
         ("inertia", Entry::Inertia),
     ];
-    let mut found = None;
+    let mut found = command(section, parameters)?;
     for (key, make) in kinds {
         if let Some(formula) = section.formula(key)? {
             if found.is_some() {
-                return Err(
-                    section.error_at(key, "an effect has one of force, torque, angle and inertia")
-                );
+                return Err(section.error_at(
+                    key,
+                    "an effect has one of force, torque, angle, inertia and command",
+                ));
             }
             check_names(document, &formula, &EFFECT_NAMES, parameters)?;
             found = Some(make(formula.value));
         }
     }
     found.ok_or_else(|| {
-        section.error("one of force, torque, angle and inertia is missing in [effect]")
+        section.error("one of force, torque, angle, inertia and command is missing in [effect]")
     })
+}
+
+/// `command = "delay"` or `"lag"`, with the time as the only parameter.
+fn command(
+    section: &Section<'_>,
+    parameters: &[EffectParameter],
+) -> Result<Option<Entry>, FileError> {
+    let filter = match section.text("command")?.map(|text| text.value).as_deref() {
+        None => return Ok(None),
+        Some("delay") => CommandFilter::Delay,
+        Some("lag") => CommandFilter::Lag,
+        Some(other) => {
+            let message = format!("`command` is \"delay\" or \"lag\", found {other:?}");
+            return Err(section.error_at("command", message));
+        }
+    };
+    match parameters {
+        [time] if time.unit == "s" && time.bounds[0] >= 0.0 && !time.whole => {
+            Ok(Some(Entry::Command(filter)))
+        }
+        _ => Err(section.error_at(
+            "command",
+            "a filter of the command has one parameter, with `unit = \"s\"` and `positive = true`",
+        )),
+    }
 }
 
 /// A formula may mention the parameters and these `names`.

@@ -2,6 +2,7 @@
 //! integrators that run it.
 
 mod assemble;
+mod command;
 mod dynamics;
 mod effect;
 mod effects_in_file;
@@ -17,6 +18,7 @@ mod sections;
 mod shift;
 mod system;
 
+pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};

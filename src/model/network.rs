@@ -354,5 +354,6 @@ pub fn network_dynamics(
         joints,
         parameters: Vec::new(),
         program: graph.finish(&outputs),
+        filters: Vec::new(),
     })
 }

@@ -2,7 +2,7 @@ use super::Dynamics;
 use crate::expr::{Real, Tape};
 
 /// Open-loop integration of `W` independent trajectories of one model, by the classical Runge-Kutta
-/// method of order 4 with the torque held over each step.
+/// method of order 4 with the torque held over each step or substep.
 pub struct Rollout<'d, T, const W: usize> {
     tape: Tape<'d, T, W>,
     joints: usize,
@@ -43,7 +43,8 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
     }
 
     /// Advance `state` (`[2n][lane]`: angles, then velocities) from `time` by `dt` seconds in `substeps`
-    /// equal steps under the torque `tau` (`[n][lane]`).
+    /// equal steps under the torque `tau` (`[n][lane]`) or, where it differs, one such after the other for each
+    /// substep.
     pub fn advance(
         &mut self,
         state: &mut [[T; W]],
@@ -53,11 +54,11 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
         substeps: usize,
     ) {
         let n = self.joints;
-        self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
         let parts = T::from_usize(substeps).expect("few substeps");
         let h = dt.map(|dt| dt / parts);
         let mut now = time;
-        for _ in 0..substeps {
+        for tau in tau.chunks(n).cycle().take(substeps) {
+            self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
             self.step(state, now, h);
             now = std::array::from_fn(|lane| now[lane] + h[lane]);
         }

@@ -256,8 +256,13 @@ impl System {
     pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
         let name = &new.effect.name;
         self.can_carry(&new.effect, new.joint)?;
-        if present.iter().any(|old| old.label() == new.label()) {
-            return Err(format!("`{name}` acts on joint {} already", new.joint + 1));
+        let mut others = present.iter();
+        if let Some(old) = others.find(|old| old.excludes(new)) {
+            return Err(format!(
+                "`{}` acts on joint {} already",
+                old.effect.name,
+                new.joint + 1
+            ));
         }
         let common = (0..).zip(new.values.iter().map(|(value, _)| value));
         let own = new.own.iter().map(|own| (own.parameter, &own.value));

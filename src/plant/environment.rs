@@ -23,13 +23,15 @@ impl<'d> Environment<'d> {
     /// `dynamics` with parameters `values`, in its order, in steps of `step_s` seconds.
     ///
     /// # Panics
-    /// When `values` has not one entry a parameter.
+    /// When `values` has not one entry a parameter, or `dynamics` filters its torque, for which a step would have
+    /// to know the steps before.
     pub fn new(
         dynamics: &'d Dynamics,
         values: &[f64],
         integrator: Integrator,
         step_s: f64,
     ) -> Self {
+        assert!(dynamics.filters.is_empty(), "a step has no memory");
         let runge_kutta = |substeps: usize| Method::RungeKutta {
             rollout: Rollout::new(dynamics, values),
             substeps,

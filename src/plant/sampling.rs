@@ -59,6 +59,13 @@ impl Plant {
             .check(self.system.joints)
             .map_err(PlantError::Sampling)?;
         let dynamics = self.dynamics();
+        if !dynamics.filters.is_empty() {
+            return Err(PlantError::Sampling(
+                "the plant has an effect with memory, but random trajectories start without a past; leave the \
+                 effect out, or train on logs that `residyn simulate` wrote"
+                    .into(),
+            ));
+        }
         let values = joined(&self.parameters, &self.effects);
         let mut environment =
             Environment::new(&dynamics, &values, sampling.integrator, sampling.step_s);

@@ -7,7 +7,7 @@ use super::file::{Plant, PlantError};
 use crate::closeloop::joined;
 use crate::data::Log;
 use crate::expr::SignForm;
-use crate::model::{Dynamics, Rollout};
+use crate::model::{Commands, Dynamics, Rollout, StepTorque};
 
 /// The rig moves in steps of this length (s), far below what any fit uses.
 const STEP_S: f64 = 1e-4;
@@ -29,8 +29,8 @@ impl Plant {
         let n = self.system.joints;
         let tones = self.excitation.draw(rng);
         let dynamics = self.dynamics();
-        let mut rollout =
-            Rollout::<f64, 1>::new(&dynamics, &joined(&self.parameters, &self.effects));
+        let values = joined(&self.parameters, &self.effects);
+        let mut rollout = Rollout::<f64, 1>::new(&dynamics, &values);
         let dt = 1.0 / self.sensor.rate_hz;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // checked to be a few thousand
@@ -40,13 +40,15 @@ impl Plant {
         );
         let mut state: Vec<[f64; 1]> = self.start().iter().map(|value| [*value]).collect();
         let mut log = empty_log(n);
-        for row in 0..rows {
-            #[allow(clippy::cast_precision_loss)] // a few thousand rows
-            let time = row as f64 * dt;
-            let tau = tones.at(time);
+        #[allow(clippy::cast_precision_loss)] // a few thousand rows
+        let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
+        let torques: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
+        let commands = Commands::new(&dynamics, &values, &times, &by_joint(&torques, n));
+        for (&time, tau) in times.iter().zip(torques) {
             self.measure(&mut log, time, &state, &tau, rng);
             let held: Vec<[f64; 1]> = tau.iter().map(|tau| [*tau]).collect();
-            rollout.advance(&mut state, &held, [time], [dt], substeps);
+            let torque = StepTorque::new([&commands], &held, [time], [time + dt], substeps);
+            rollout.advance(&mut state, &torque.mean, [time], [dt], substeps);
             if state.iter().any(|value| !value[0].is_finite()) {
                 return Err(PlantError::Diverged { time_s: time });
             }
@@ -95,6 +97,13 @@ impl Plant {
             log.tau[j].push(tau[j]);
         }
     }
+}
+
+/// `[joint][row]` of `[row][joint]`
+fn by_joint(rows: &[Vec<f64>], joints: usize) -> Vec<Vec<f64>> {
+    (0..joints)
+        .map(|j| rows.iter().map(|row| row[j]).collect())
+        .collect()
 }
 
 fn empty_log(joints: usize) -> Log {

@@ -4,9 +4,10 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{Data, Logged, Simulated};
-use super::{Recipe, RecipeError};
+use super::job::equations;
+use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{Library, System};
+use crate::model::{Commands, Library, System};
 use crate::plant::Plant;
 use crate::train::{Segments, SegmentsError};
 
@@ -63,10 +64,17 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
         step_s: logged.step_s,
         length_s: f64::INFINITY,
     };
+    let dynamics = equations(system);
+    let values = dynamics.values();
+    let acting = |log: &Log| match recipe.kind {
+        // A network alone has no filters: it learns from what was commanded.
+        Kind::DataDriven => log.clone(),
+        Kind::Hybrid | Kind::Physics => Commands::of_log(&dynamics, &values, log).acting_on(log),
+    };
     let mut training = Segments::new(system.joints, logged.steps);
     for log in &logs {
         let before = training.len();
-        for trajectory in trajectories(log, thinning) {
+        for trajectory in trajectories(&acting(log), thinning) {
             // A gap may leave a piece that holds no segment; a log without any is refused below.
             if trajectory.time.len() > logged.steps {
                 push(&mut training, &trajectory).map_err(in_file(&log.path))?;

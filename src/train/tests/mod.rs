@@ -48,6 +48,7 @@ pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
         joints: 1,
         parameters,
         program: graph.finish(&[velocity, acceleration]),
+        filters: Vec::new(),
     }
 }
 

@@ -1,0 +1,191 @@
+//! Effects with memory: what they make of a torque, how sensitive motion is to them, and that they are found.
+
+use residyn::data::Log;
+use residyn::expr::SignForm;
+use residyn::identify::{Shooting, cut, fit, uncertainty};
+use residyn::model::{Commands, Dynamics, FittedEffect, Library, StepTorque};
+
+use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
+use rand::RngExt;
+
+const DELAY_S: f64 = 0.0073;
+const LAG_S: f64 = 0.015;
+
+fn effect(name: &str, value: f64) -> FittedEffect {
+    fitted(Library::built_in().effect(name).unwrap(), 0, &[value])
+}
+
+/// A mass of 1 with these filters: acceleration is torque.
+fn drive(effects: &[FittedEffect]) -> Dynamics {
+    dynamics(&system("drive"), effects, SignForm::Exact)
+}
+
+/// Twenty torques, held for 3 to 15 ms each.
+fn history() -> (Vec<f64>, Vec<f64>) {
+    let mut rng = rng(11);
+    let mut time = vec![100.0];
+    for _ in 1..20 {
+        time.push(time[time.len() - 1] + rng.random_range(0.003..0.015));
+    }
+    let tau = time.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
+    (time, tau)
+}
+
+/// Mean torque of the first joint over each part, and its slopes by the filters' parameters.
+fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f64>) {
+    let (time, tau) = history();
+    let commands = Commands::new(model, &model.values(), &time, &[tau]);
+    let torque = StepTorque::new([&commands], &[[f64::NAN]], [from], [to], parts);
+    let first = |lanes: Vec<[f64; 1]>| lanes.into_iter().map(|lane| lane[0]).collect();
+    (first(torque.mean), first(torque.slopes))
+}
+
+/// The filtered torque by steps of 1 us, averaged over each part.
+fn stepped(delay: f64, lag: f64, from: f64, to: f64, parts: usize) -> Vec<f64> {
+    let (time, tau) = history();
+    let held = |t: f64| tau[time.partition_point(|row| *row <= t).max(1) - 1];
+    let h = 1e-6;
+    let (mut now, mut output) = (time[0] - 1e-3, tau[0]);
+    let (mut sums, mut counts) = (vec![0.0; parts], vec![0.0; parts]);
+    while now < to {
+        let command = held(now + 0.5 * h - delay);
+        // Exact over a step in which the command is held.
+        let share = if lag > 0.0 {
+            1.0 - (-h / lag).exp()
+        } else {
+            1.0
+        };
+        let next = output + share * (command - output);
+        let middle = if lag > 0.0 {
+            0.5 * (output + next)
+        } else {
+            next
+        };
+        if now + 0.5 * h > from {
+            let part = ((now + 0.5 * h - from) / (to - from) * parts as f64) as usize;
+            sums[part.min(parts - 1)] += middle;
+            counts[part.min(parts - 1)] += 1.0;
+        }
+        (now, output) = (now + h, next);
+    }
+    sums.iter()
+        .zip(counts)
+        .map(|(sum, count)| sum / count)
+        .collect()
+}
+
+#[test]
+fn mean_torques_are_those_of_fine_steps() {
+    for (delay, lag) in [(DELAY_S, 0.0), (0.0, LAG_S), (DELAY_S, LAG_S), (0.02, 1e-5)] {
+        let model = drive(&[effect("actuator_delay", delay), effect("actuator_lag", lag)]);
+        for (from, to, parts) in [
+            (100.001, 100.013, 6),
+            (100.0, 100.002, 1),
+            (100.07, 100.09, 3),
+        ] {
+            let found = means(&model, from, to, parts).0;
+            for (found, wanted) in found.iter().zip(stepped(delay, lag, from, to, parts)) {
+                // Jumps of up to 4 N m fall within steps of 1 us of parts of 2 ms and more.
+                assert_near(*found, wanted, 4e-3, &format!("{delay} {lag} {from}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn without_delay_and_lag_the_command_acts() {
+    let model = drive(&[effect("actuator_delay", 0.0), effect("actuator_lag", 0.0)]);
+    let (time, tau) = history();
+    for row in 0..time.len() - 1 {
+        for mean in means(&model, time[row], time[row + 1], 4).0 {
+            assert_near(mean, tau[row], 1e-11, "held torque");
+        }
+    }
+}
+
+#[test]
+fn no_time_moves_nothing() {
+    let model = drive(&[effect("actuator_delay", 0.0), effect("actuator_lag", 0.0)]);
+    let (mean, slopes) = means(&model, 100.0, 100.0, 2);
+    assert!(mean.iter().chain(&slopes).all(|x| *x == 0.0));
+}
+
+#[test]
+fn slopes_are_those_of_the_mean_torque() {
+    for (delay, lag) in [(DELAY_S, LAG_S), (0.0, 0.0), (0.0, LAG_S), (DELAY_S, 0.0)] {
+        let at = |delay: f64, lag: f64| {
+            drive(&[effect("actuator_delay", delay), effect("actuator_lag", lag)])
+        };
+        // One row ends within the parts, and the step begins where another does.
+        let (time, _) = history();
+        let (from, to) = (time[4], time[5] + 0.002);
+        let mean = |delay, lag| means(&at(delay, lag), from, to, 4).0;
+        let slopes = means(&at(delay, lag), from, to, 4).1;
+        let step = 1e-7;
+        let now = mean(delay, lag);
+        for (k, moved) in [mean(delay + step, lag), mean(delay, lag + step)]
+            .iter()
+            .enumerate()
+        {
+            for part in 0..4 {
+                let wanted = (moved[part] - now[part]) / step;
+                // The slopes are up to 4 N m / 3 ms, and bend over the step by step / lag or less.
+                let what = format!("filter {k}, part {part} at {delay}, {lag}");
+                assert!(
+                    (slopes[2 * part + k] - wanted).abs() < 0.02 * wanted.abs().max(1.0),
+                    "{what}: {} {wanted}",
+                    slopes[2 * part + k]
+                );
+            }
+        }
+    }
+}
+
+fn pendulum(effects: &[FittedEffect]) -> Dynamics {
+    dynamics(&system("pendulum"), effects, SignForm::Exact)
+}
+
+/// Two logs of 15 s with noise of 1 mrad.
+fn logs(model: &Dynamics) -> Vec<Log> {
+    let log = |seed| {
+        let mut log = simulate(model, &[3.0, 0.0], 1.5, 1500, seed);
+        add_noise(&mut log, 1e-3, 50 + seed);
+        log
+    };
+    vec![log(1), log(2)]
+}
+
+#[test]
+fn a_delay_and_a_lag_come_back_within_their_intervals() {
+    for (name, truth) in [("actuator_delay", DELAY_S), ("actuator_lag", LAG_S)] {
+        let rig = pendulum(&[effect(name, truth)]);
+        let logs = logs(&rig);
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
+        let model = pendulum(&[effect(name, 0.0)]);
+        let start = [14.0, 3.3, 0.0];
+        let found = fit(
+            &shooting,
+            &model,
+            &[0, 1, 2],
+            start.as_slice(),
+            shooting.initial_locals(0),
+            None,
+        )
+        .unwrap();
+        let uncertainty = uncertainty(&shooting, &found);
+        for (i, wanted) in [15.0, 3.0, truth].into_iter().enumerate() {
+            let (value, half) = (found.values[i], uncertainty.half_width(i));
+            println!("{name} {value} +- {half}");
+            assert!(
+                (value - wanted).abs() < half,
+                "{name}: {value} +- {half}, wanted {wanted}"
+            );
+        }
+        // 3000 rows of 1 mrad tell a time to a fraction of a millisecond.
+        assert!(
+            uncertainty.half_width(2) < 1e-3,
+            "{name}: {}",
+            uncertainty.half_width(2)
+        );
+    }
+}
