@@ -165,3 +165,134 @@ impl Machine {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Hidden;
+    use crate::bench::drive::Approach;
+    use crate::bench::machine::{Machine, State};
+    use crate::bench::mechanics::tests::double_pendulum;
+
+    fn hidden(name: &str, values: &[(&str, f64)]) -> Hidden {
+        Hidden {
+            name: name.to_owned(),
+            joint: 1,
+            values: values
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), *value))
+                .collect(),
+        }
+    }
+
+    /// Acceleration of the first joint at a state, under a torque, with this effect less that without.
+    fn adds(effect: &Hidden) -> f64 {
+        let state = State {
+            q: [0.4, 0.3],
+            v: [1.5, -0.5],
+            motor_q: [0.41, 0.3],
+            motor_v: [1.5, -0.5],
+            bristle: [0.01, 0.0],
+        };
+        let command = Approach {
+            target: 2.0,
+            since: -1.0,
+            ..Approach::default()
+        };
+        let acceleration = |effects: &[Hidden]| {
+            let machine = Machine::with(double_pendulum(), effects).unwrap();
+            let commands = [command; 2];
+            let directions = machine.directions(0.2, &state, &commands);
+            machine.slope(0.2, &state, &commands, directions).v[0]
+        };
+        acceleration(std::slice::from_ref(effect)) - acceleration(&[])
+    }
+
+    #[test]
+    fn every_effect_of_the_machine_pushes_the_way_its_definition_says() {
+        let against = [
+            hidden("viscous_friction", &[("b", 0.1)]),
+            hidden("coulomb_friction", &[("F_c", 0.1)]),
+            hidden(
+                "stribeck_friction",
+                &[("F_c", 0.1), ("F_s", 0.2), ("v_s", 1.0)],
+            ),
+            hidden(
+                "asymmetric_friction",
+                &[("F_p", 0.1), ("F_n", 0.2), ("b_p", 0.0), ("b_n", 0.0)],
+            ),
+            hidden("quadratic_drag", &[("c", 0.1)]),
+            hidden("load_friction", &[("k", 0.1)]),
+            hidden("joint_spring", &[("k", 0.1), ("q_0", 0.0)]),
+            hidden("gravity_tilt", &[("delta", 0.1)]),
+            hidden("actuator_deadzone", &[("w", 0.1)]),
+            hidden("actuator_saturation", &[("m", 1.5)]),
+            hidden("cubic_damping", &[("c", 0.1)]),
+            hidden("uneven_friction", &[("F", 0.1), ("a", 0.5)]),
+            hidden("presliding", &[("F_c", 0.2), ("sigma", 10.0)]),
+            hidden("back_emf_limit", &[("m", 2.0), ("k", 0.1)]),
+        ];
+        for effect in &against {
+            assert!(adds(effect) < -1e-3, "{effect:?}: {}", adds(effect));
+        }
+        let along = [
+            hidden("joint_spring", &[("k", 0.1), ("q_0", 1.0)]),
+            hidden("constant_torque", &[("tau_0", 0.1)]),
+            hidden("cogging_torque", &[("A", 0.1), ("N", 3.0), ("phase", 0.0)]),
+            hidden(
+                "fractional_ripple",
+                &[("A", 0.1), ("N", 2.5), ("phase", 0.0)],
+            ),
+            hidden("actuator_gain", &[("g", 0.1)]),
+            hidden(
+                "periodic_disturbance",
+                &[("A", 0.1), ("f", 1.0), ("phase", 0.0)],
+            ),
+        ];
+        for effect in &along {
+            assert!(adds(effect) > 1e-3, "{effect:?}: {}", adds(effect));
+        }
+    }
+
+    #[test]
+    fn a_rotor_is_felt_by_its_own_joint_alone() {
+        let rotor = Machine::with(double_pendulum(), &[hidden("rotor_inertia", &[("J", 0.1)])]);
+        let heavy = rotor.unwrap();
+        let bare = Machine::bare(double_pendulum());
+        let state = State::at_rest([0.4, 0.3]);
+        let commands = [Approach::default(); 2];
+        let slopes = [&bare, &heavy].map(|m| m.slope(0.0, &state, &commands, [0.0; 2]).v);
+        let mass = bare.mechanics.mass(state.q);
+        // M a = (M + diag(J, 0)) a' in both rows.
+        let torque = |a: [f64; 2], row: usize| mass[row][0] * a[0] + mass[row][1] * a[1];
+        let first = torque(slopes[1], 0) + 0.1 * slopes[1][0];
+        assert!((torque(slopes[0], 0) - first).abs() < 1e-12);
+        assert!((torque(slopes[0], 1) - torque(slopes[1], 1)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_shift_changes_the_rig_and_nothing_that_it_has_not() {
+        let shifted = Machine::with(
+            double_pendulum(),
+            &[hidden("parameter_shift", &[("m2", 1.0)])],
+        );
+        assert_ne!(shifted.unwrap().mechanics, double_pendulum());
+        let wrong = Machine::with(
+            double_pendulum(),
+            &[hidden("parameter_shift", &[("m3", 1.0)])],
+        );
+        assert_eq!(wrong.unwrap_err(), "`parameter_shift`: the rig has no `m3`");
+    }
+
+    #[test]
+    fn a_compliant_joint_carries_its_encoder_on_the_motor() {
+        for effect in [
+            hidden("backlash", &[("delta", 0.01)]),
+            hidden("joint_compliance", &[("k", 30.0), ("J", 0.01)]),
+        ] {
+            let machine = Machine::with(double_pendulum(), &[effect]).unwrap();
+            let mut state = State::at_rest([0.4, 0.3]);
+            state.motor_q = [0.5, 0.6];
+            assert_eq!(machine.encoders(&state), [0.5, 0.3]);
+        }
+    }
+}

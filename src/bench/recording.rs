@@ -202,3 +202,149 @@ fn empty(index: usize, joints: usize) -> Log {
         notes: Vec::new(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Condition, Driving, Loop};
+    use crate::bench::force::Force;
+    use crate::bench::friction::DryFriction;
+    use crate::bench::machine::Machine;
+    use crate::bench::mechanics::tests::pendulum;
+    use crate::data::Log;
+
+    fn driving() -> Driving {
+        Driving {
+            band_hz: [0.2, 2.0],
+            torque: vec![1.0],
+            reference: vec![0.8],
+            stiffness: vec![10.0],
+            damping: vec![1.2],
+            limit: vec![4.0],
+        }
+    }
+
+    fn condition(drive: Loop) -> Condition {
+        Condition {
+            drive,
+            rate_hz: 100.0,
+            noise: 0.0,
+            quantum: 0.0,
+            logs: 3,
+            seconds: 4.0,
+        }
+    }
+
+    fn record(machine: &Machine, condition: &Condition, offset: f64) -> Log {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        machine.record(&driving(), condition, 0, [offset, 0.0], &mut rng)
+    }
+
+    fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+        let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_delay_of_whole_steps_shifts_the_motion_exactly() {
+        let sound = Machine::bare(pendulum());
+        let mut late = sound.clone();
+        late.drives[0].delay = 0.03;
+        let open = condition(Loop::Open);
+        let (early, late) = (record(&sound, &open, 0.0), record(&late, &open, 0.0));
+        assert_eq!(early.tau, late.tau);
+        // The same torque on the same rig, three rows later, from the same rest.
+        let rows = early.rows() - 3;
+        assert!(largest_difference(&early.q[0][..rows], &late.q[0][3..]) < 1e-12);
+    }
+
+    #[test]
+    fn a_delay_of_part_of_a_step_mixes_neighbouring_torques() {
+        let mut machine = Machine::bare(crate::bench::mechanics::Mechanics::Pendulum {
+            inertia: 1.0,
+            moment: 0.0,
+            g: 9.81,
+        });
+        machine.drives[0].delay = 0.0137;
+        let mut condition = condition(Loop::Open);
+        condition.seconds = 1.0;
+        let log = record(&machine, &condition, 0.0);
+        // Speed is the sum of torque by time: of step k, 3.7 ms of command k - 2 and 6.3 ms of k - 1.
+        let command = |k: usize, back: usize| k.checked_sub(back).map_or(0.0, |k| log.tau[0][k]);
+        let (mut q, mut v) = (0.0, 0.0);
+        for row in 0..log.rows() {
+            assert!((log.q[0][row] - q).abs() < 1e-12, "row {row}");
+            for (torque, h) in [(command(row, 2), 0.0037), (command(row, 1), 0.0063)] {
+                q += v * h + 0.5 * torque * h * h;
+                v += torque * h;
+            }
+        }
+    }
+
+    #[test]
+    fn a_lag_follows_its_own_equation() {
+        let mut machine = Machine::bare(crate::bench::mechanics::Mechanics::Pendulum {
+            inertia: 1.0,
+            moment: 0.0,
+            g: 9.81,
+        });
+        machine.drives[0].lag = 0.05;
+        let log = record(&machine, &condition(Loop::Open), 0.0);
+        // Forward steps of 10 us of T tau' + tau = u.
+        let (mut q, mut v, mut tau) = (0.0, 0.0, 0.0);
+        for row in 0..log.rows() {
+            assert!((log.q[0][row] - q).abs() < 1e-4, "row {row}");
+            for _ in 0..1000 {
+                tau += 1e-5 / 0.05 * (log.tau[0][row] - tau);
+                v += 1e-5 * tau;
+                q += 1e-5 * v;
+            }
+        }
+    }
+
+    #[test]
+    fn an_offset_is_added_to_what_is_read_and_nothing_else_in_open_loop() {
+        let machine = Machine::bare(pendulum());
+        let open = condition(Loop::Open);
+        let (plain, off) = (record(&machine, &open, 0.0), record(&machine, &open, 0.05));
+        let shifted: Vec<f64> = plain.q[0].iter().map(|q| q + 0.05).collect();
+        assert!(largest_difference(&shifted, &off.q[0]) < 1e-15);
+        assert_eq!(plain.tau, off.tau);
+    }
+
+    #[test]
+    fn in_closed_loop_the_torque_answers_to_the_rig_within_its_limit() {
+        let closed = condition(Loop::Closed);
+        let plain = record(&Machine::bare(pendulum()), &closed, 0.0);
+        let mut rough = Machine::bare(pendulum());
+        rough.dry.push((0, DryFriction::Coulomb { level: 0.3 }));
+        let rough = record(&rough, &closed, 0.0);
+        assert!(largest_difference(&plain.tau[0], &rough.tau[0]) > 0.1);
+        assert!(plain.tau[0].iter().all(|tau| tau.abs() <= 4.0));
+        assert!(plain.q[0].iter().any(|q| q.abs() > 0.3));
+    }
+
+    #[test]
+    fn encoders_are_noisy_or_coarse_as_asked_and_velocities_are_their_differences() {
+        let mut machine = Machine::bare(pendulum());
+        machine.forces.push((0, Force::Viscous { b: 0.1 }));
+        let clean = record(&machine, &condition(Loop::Open), 0.0);
+        let mut noisy = condition(Loop::Open);
+        (noisy.noise, noisy.quantum) = (1e-3, 0.0);
+        let noisy = record(&machine, &noisy, 0.0);
+        let pairs = clean.q[0].iter().zip(&noisy.q[0]);
+        let mean_square = pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 401.0;
+        assert!((mean_square.sqrt() - 1e-3).abs() < 1e-4, "{mean_square}");
+        let mut coarse = condition(Loop::Open);
+        coarse.quantum = 0.01;
+        let coarse = record(&machine, &coarse, 0.0);
+        let whole = |q: &f64| (q / 0.01 - (q / 0.01).round()).abs() < 1e-9;
+        assert!(coarse.q[0].iter().all(whole));
+        for row in 1..noisy.rows() {
+            let difference = (noisy.q[0][row] - noisy.q[0][row - 1]) / 0.01;
+            assert!((noisy.qd[0][row] - difference).abs() < 1e-9);
+        }
+    }
+}
