@@ -1,6 +1,7 @@
 //! The command line: parse, call, print; nothing else.
 
 mod audit;
+mod bench;
 mod closeloop;
 mod evaluate;
 mod fitting;
@@ -39,6 +40,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
+    Bench(bench::Arguments),
 }
 
 /// What every command takes.
@@ -72,6 +74,7 @@ pub fn main() -> ExitCode {
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
     };
     match result {
         Ok(Answer::Yes) => ExitCode::SUCCESS,

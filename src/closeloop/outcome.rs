@@ -11,7 +11,7 @@ use crate::identify::Identifiability;
 use crate::model::{FittedEffect, OwnValue, Parameter};
 
 /// The answer in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Effects were found and nothing significant is left.

@@ -1,0 +1,131 @@
+/// What becomes of a commanded torque: delayed, smoothed, then shaped in the order of the fields of [`Shape`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Drive {
+    /// \[s\], any real number.
+    pub delay: f64,
+    /// Time constant \[s\]; zero follows at once.
+    pub lag: f64,
+    pub shape: Shape,
+}
+
+/// What the drive makes of a torque that it is given at this instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Excess share.
+    pub gain: f64,
+    /// Torque that is swallowed \[N m\].
+    pub deadzone: f64,
+    /// Largest torque \[N m\].
+    pub limit: f64,
+    /// How much the limit falls with speed in the direction of the torque \[N m s/rad\].
+    pub back_emf: f64,
+}
+
+impl Default for Shape {
+    fn default() -> Self {
+        Self {
+            gain: 0.0,
+            deadzone: 0.0,
+            limit: f64::INFINITY,
+            back_emf: 0.0,
+        }
+    }
+}
+
+impl Shape {
+    /// Torque \[N m\] for a commanded one while the motor turns at `v` \[rad/s\].
+    pub fn at(&self, torque: f64, v: f64) -> f64 {
+        let torque = (1.0 + self.gain) * torque;
+        let size = (torque.abs() - self.deadzone).max(0.0);
+        let falls = self.back_emf * (v * torque.signum()).max(0.0);
+        size.min((self.limit - falls).max(0.0)).copysign(torque)
+    }
+}
+
+/// The torque that a drive is given between two changes of its command: it tends to `target`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Approach {
+    /// When it began \[s\].
+    pub since: f64,
+    /// Torque then \[N m\].
+    pub from: f64,
+    pub target: f64,
+}
+
+impl Approach {
+    pub fn at(&self, time: f64, lag: f64) -> f64 {
+        if lag > 0.0 {
+            self.target + (self.from - self.target) * (-(time - self.since) / lag).exp()
+        } else {
+            self.target
+        }
+    }
+}
+
+/// How many whole steps of `dt` s a delay is, and the rest \[s\].
+pub fn whole_steps(delay: f64, dt: f64) -> (usize, f64) {
+    let steps = (delay / dt).floor();
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // delays are not negative
+    (steps as usize, (delay - steps * dt).clamp(0.0, dt))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Approach, Shape, whole_steps};
+
+    fn shape(change: impl Fn(&mut Shape)) -> Shape {
+        let mut shape = Shape::default();
+        change(&mut shape);
+        shape
+    }
+
+    #[test]
+    fn a_sound_drive_gives_what_it_is_told() {
+        assert_eq!(Shape::default().at(-1.5, 3.0), -1.5);
+        assert_eq!(Shape::default().at(0.0, 3.0), 0.0);
+    }
+
+    #[test]
+    fn gain_deadzone_and_saturation_are_those_of_their_definitions() {
+        assert_eq!(shape(|s| s.gain = 0.5).at(-2.0, 0.0), -3.0);
+        let deadzone = shape(|s| s.deadzone = 0.5);
+        assert_eq!(
+            [-2.0, -0.4, 0.4, 2.0].map(|u| deadzone.at(u, 0.0)),
+            [-1.5, 0.0, 0.0, 1.5]
+        );
+        let limited = shape(|s| s.limit = 1.0);
+        assert_eq!(
+            [-2.0, 0.4, 2.0].map(|u| limited.at(u, 9.0)),
+            [-1.0, 0.4, 1.0]
+        );
+    }
+
+    #[test]
+    fn the_limit_falls_with_speed_when_the_motor_drives_not_when_it_brakes() {
+        let motor = shape(|s| (s.limit, s.back_emf) = (2.0, 0.25));
+        assert_eq!(motor.at(3.0, 4.0), 1.0);
+        assert_eq!(motor.at(-3.0, 4.0), -2.0);
+        assert_eq!(motor.at(3.0, 40.0), 0.0);
+    }
+
+    #[test]
+    fn a_lag_has_covered_63_percent_after_its_time_constant() {
+        let step = Approach {
+            since: 1.0,
+            from: 0.0,
+            target: 2.0,
+        };
+        assert!((step.at(1.01, 0.01) - 2.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
+        assert_eq!(step.at(1.01, 0.0), 2.0);
+    }
+
+    #[test]
+    fn a_delay_is_whole_steps_and_a_rest() {
+        assert_eq!(whole_steps(0.02, 0.01), (2, 0.0));
+        let (steps, rest) = whole_steps(0.0137, 0.01);
+        assert!(steps == 1 && (rest - 0.0037).abs() < 1e-15);
+        // Rounding may take a step from the whole ones, not from the sum.
+        let (steps, rest) = whole_steps(0.03, 0.01);
+        assert!((steps as f64 * 0.01 + rest - 0.03).abs() < 1e-15);
+    }
+}

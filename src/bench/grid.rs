@@ -1,0 +1,297 @@
+//! A grid file: plants, conditions, and series of cells that combine them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::hidden::Hidden;
+use super::machine::Machine;
+use super::mechanics::Mechanics;
+use super::recording::{Condition, Driving};
+
+/// Why a grid cannot be run.
+#[derive(Debug, Error)]
+pub enum GridError {
+    #[error("{path}: cannot be read: {source}; give a grid with --grid", path = .path.display())]
+    Open {
+        path: PathBuf,
+        source: std::io::Error,
+    },
+    #[error("{path}: {message}", path = .path.display())]
+    File { path: PathBuf, message: String },
+}
+
+/// What the cells of a series are to show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Group {
+    /// One effect is missing: it is named.
+    Single,
+    /// Two are missing: both are named.
+    Pair,
+    /// Nothing is missing: nothing is named.
+    None,
+    /// Something is missing that the library does not know: it is flagged.
+    Outside,
+}
+
+/// A simulated rig and the model that is declared for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bench {
+    /// A model file, as seen from the grid, or the name of a built-in system.
+    pub model: PathBuf,
+    pub mechanics: Mechanics,
+    pub driving: Driving,
+}
+
+/// Every set of effects under every condition with every seed.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Series {
+    group: Group,
+    plant: String,
+    conditions: Vec<String>,
+    seeds: Vec<u64>,
+    effects: Vec<Vec<Hidden>>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    plants: BTreeMap<String, Bench>,
+    conditions: BTreeMap<String, Condition>,
+    series: Vec<Series>,
+}
+
+/// One test: a rig with its effects, how its logs are taken, and a seed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cell {
+    /// Says all that tells this cell from the others of its grid.
+    pub id: String,
+    pub group: Group,
+    pub plant: String,
+    pub condition_name: String,
+    pub effects: Vec<Hidden>,
+    pub seed: u64,
+    pub bench: Bench,
+    pub condition: Condition,
+}
+
+/// All cells of a grid, in the order of its series.
+///
+/// # Errors
+/// A file that cannot be read, or that asks for what there is not.
+pub fn read(path: &Path) -> Result<Vec<Cell>, GridError> {
+    let text = std::fs::read_to_string(path).map_err(|source| GridError::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    cells(path, &text)
+}
+
+/// The cells of the grid in `text`; files that it names are looked for beside `path`.
+///
+/// # Errors
+/// As [`read`].
+pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
+    let wrong = |message: String| GridError::File {
+        path: path.to_owned(),
+        message,
+    };
+    let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+    file.check().map_err(wrong)?;
+    let mut all = Vec::new();
+    for (number, series) in file.series.iter().enumerate() {
+        let added = file.expand(series, path);
+        all.extend(added.map_err(|message| wrong(format!("series {}: {message}", number + 1)))?);
+    }
+    let mut ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
+    ids.sort_unstable();
+    match ids.windows(2).find(|two| two[0] == two[1]) {
+        Some(two) => Err(wrong(format!("the cell {} stands there twice", two[0]))),
+        None => Ok(all),
+    }
+}
+
+impl File {
+    fn check(&self) -> Result<(), String> {
+        for (name, bench) in &self.plants {
+            let driving = &bench.driving;
+            let joints = bench.mechanics.joints();
+            let lists = [
+                &driving.torque,
+                &driving.reference,
+                &driving.stiffness,
+                &driving.damping,
+                &driving.limit,
+            ];
+            if lists.iter().any(|list| list.len() != joints) {
+                return Err(format!(
+                    "plants.{name}: every list of `driving` has {joints} numbers, one a joint"
+                ));
+            }
+            let [low, high] = driving.band_hz;
+            if !(0.0 < low && low < high) {
+                return Err(format!(
+                    "plants.{name}: `band_hz` is two rising frequencies above zero"
+                ));
+            }
+        }
+        for (name, condition) in &self.conditions {
+            let sound = condition.rate_hz > 0.0
+                && condition.noise >= 0.0
+                && condition.quantum >= 0.0
+                && condition.logs >= 2
+                && condition.seconds * condition.rate_hz >= 10.0;
+            if !sound {
+                return Err(format!(
+                    "conditions.{name}: needs `rate_hz` above zero, `noise` and `quantum` not below, two logs, \
+                     ten rows"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn expand(&self, series: &Series, path: &Path) -> Result<Vec<Cell>, String> {
+        let plant = &series.plant;
+        let bench = self.plants.get(plant);
+        let mut bench = bench.ok_or(format!("no plant `{plant}`"))?.clone();
+        let beside = path.parent().unwrap_or(Path::new("")).join(&bench.model);
+        if beside.is_file() {
+            bench.model = beside;
+        }
+        let mut all = Vec::new();
+        for effects in &series.effects {
+            Machine::with(bench.mechanics.clone(), effects)?;
+            for name in &series.conditions {
+                let condition = self.conditions.get(name);
+                let condition = condition.ok_or(format!("no condition `{name}`"))?;
+                all.extend(series.seeds.iter().map(|&seed| Cell {
+                    id: id(plant, effects, name, seed),
+                    group: series.group,
+                    plant: plant.clone(),
+                    condition_name: name.clone(),
+                    effects: effects.clone(),
+                    seed,
+                    bench: bench.clone(),
+                    condition: condition.clone(),
+                }));
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// `pendulum/coulomb_friction@1(F_c=0.1)/base/1`
+fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) -> String {
+    let effect = |hidden: &Hidden| {
+        let values = hidden.values.iter();
+        let values: Vec<String> = values
+            .map(|(name, value)| format!("{name}={value}"))
+            .collect();
+        format!("{}@{}({})", hidden.name, hidden.joint, values.join(","))
+    };
+    let effects: Vec<String> = effects.iter().map(effect).collect();
+    let effects = match effects.as_slice() {
+        [] => "none".to_owned(),
+        effects => effects.join("+"),
+    };
+    format!("{plant}/{effects}/{condition}/{seed}")
+}
+
+/// The 64-bit FNV-1a hash: the same on every machine and in every version.
+pub fn hash(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: &str = r#"
+        [plants.p]
+        model = "pendulum"
+        mechanics = { form = "pendulum", inertia = 0.15, moment = 0.3, g = 9.81 }
+        [plants.p.driving]
+        band_hz = [0.2, 2.0]
+        torque = [1.0]
+        reference = [1.0]
+        stiffness = [10.0]
+        damping = [1.0]
+        limit = [3.0]
+        [conditions.base]
+        loop = "open"
+        rate_hz = 100
+        noise = 1e-3
+        logs = 4
+        seconds = 20
+        [[series]]
+        group = "single"
+        plant = "p"
+        conditions = ["base"]
+        seeds = [1, 2]
+        effects = [
+            [{ name = "coulomb_friction", joint = 1, F_c = 0.1 }],
+            [{ name = "joint_spring", joint = 1, k = 0.5, q_0 = -0.25 }],
+        ]
+    "#;
+
+    fn message(grid: &str) -> String {
+        cells(Path::new("grid.toml"), grid).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_series_is_every_set_of_effects_with_every_seed() {
+        let all = cells(Path::new("grid.toml"), GRID).unwrap();
+        let ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
+        assert_eq!(
+            ids,
+            [
+                "p/coulomb_friction@1(F_c=0.1)/base/1",
+                "p/coulomb_friction@1(F_c=0.1)/base/2",
+                "p/joint_spring@1(k=0.5,q_0=-0.25)/base/1",
+                "p/joint_spring@1(k=0.5,q_0=-0.25)/base/2",
+            ]
+        );
+        assert_eq!(all[0].bench.model, Path::new("pendulum"));
+    }
+
+    #[test]
+    fn a_grid_that_asks_for_what_there_is_not_is_refused_with_the_place() {
+        let wrong = |from: &str, to: &str| message(&GRID.replace(from, to));
+        assert_eq!(
+            wrong("F_c = 0.1", "f = 0.1"),
+            "grid.toml: series 1: `coulomb_friction` needs `F_c`"
+        );
+        assert_eq!(
+            wrong("F_c = 0.1", "F_c = 0.1, b = 2"),
+            "grid.toml: series 1: `coulomb_friction` has no `b`"
+        );
+        assert_eq!(
+            wrong("joint = 1, F_c", "joint = 2, F_c"),
+            "grid.toml: series 1: `coulomb_friction`: `joint` is from 1 to 1"
+        );
+        assert_eq!(
+            wrong(r#"conditions = ["base"]"#, r#"conditions = ["fast"]"#),
+            "grid.toml: series 1: no condition `fast`"
+        );
+        assert_eq!(
+            wrong("seeds = [1, 2]", "seeds = [1, 1]"),
+            "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 stands there twice"
+        );
+        assert!(wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one a joint"));
+        assert!(wrong("logs = 4", "logs = 1").contains("conditions.base: needs"));
+    }
+
+    #[test]
+    fn the_hash_is_the_published_one() {
+        assert_eq!(hash(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(hash(b"a"), 0xaf63_dc4c_8601_ec8c);
+    }
+}

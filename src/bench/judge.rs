@@ -1,0 +1,376 @@
+//! What was named against what is true.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use serde::{Deserialize, Serialize};
+
+use super::grid::{Cell, Group};
+use crate::closeloop::Verdict;
+
+/// `coulomb_friction@1`, the joint counted from 1; of a shift `parameter_shift(m1)`.
+pub type Label = String;
+
+pub fn label(name: &str, joint: usize, parameter: &str) -> Label {
+    match name {
+        "parameter_shift" => format!("{name}({parameter})"),
+        _ => format!("{name}@{joint}"),
+    }
+}
+
+/// What the rig hides.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Truth {
+    /// With the true value of each parameter that an effect has.
+    pub effects: Vec<(Label, BTreeMap<String, f64>)>,
+    /// True values of declared parameters, where the rig fixes them.
+    pub declared: BTreeMap<String, f64>,
+    /// How much each encoder reads too much \[rad\], `[log][joint]`.
+    pub offsets: Vec<[f64; 2]>,
+}
+
+/// A value with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    pub name: String,
+    pub value: f64,
+    pub ci95: Option<[f64; 2]>,
+}
+
+/// An effect that was named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Named {
+    pub label: Label,
+    /// Called as in the effect's file.
+    pub parameters: Vec<Estimate>,
+    pub p_value: f64,
+    /// Share of the error that comes back without it.
+    pub error_reduction: f64,
+}
+
+/// What closing the loop said.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    pub verdict: Verdict,
+    pub reason: String,
+    pub named: Vec<Named>,
+    /// Whole sets of effects that are said to explain as much.
+    pub alternatives: Vec<Vec<Label>>,
+    pub declared: Vec<Estimate>,
+    /// What is said to be left: its share, how probable in noise alone, and where.
+    pub left: f64,
+    pub left_p_value: f64,
+    pub left_where: String,
+}
+
+/// Whether a 95 % interval holds the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    pub name: String,
+    pub truth: f64,
+    pub value: f64,
+    pub covered: bool,
+}
+
+/// The answer held against the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judgement {
+    /// The true effects were named, each on its joint, and nothing else.
+    pub exact: bool,
+    /// The same after swapping named effects for alternatives that were listed with them.
+    pub within: bool,
+    /// Effects that were named and are not there.
+    pub wrong: Vec<Label>,
+    /// Effects that are there and were not named.
+    pub missed: Vec<Label>,
+    /// Something significant is said to be left.
+    pub flagged: bool,
+    /// Named effects that cut less than half of the error.
+    pub weak: Vec<Label>,
+    /// Of the parameters of true effects that were named; of effects by `name`, of declared parameters as
+    /// they are called.
+    pub coverage: Vec<Coverage>,
+    /// The cell shows what its group is to show.
+    pub passed: bool,
+}
+
+/// An effect that cuts less than this share of the error explains nothing in a rig that hides what no effect
+/// describes.
+const HALF: f64 = 0.5;
+
+impl Truth {
+    pub fn of(cell: &Cell, offsets: &[[f64; 2]]) -> Self {
+        let mut machine = cell.bench.mechanics.clone();
+        for shift in cell.effects.iter().filter(|e| e.name == "parameter_shift") {
+            for (name, value) in &shift.values {
+                machine.set(name, *value);
+            }
+        }
+        let declared = ["C_g", "C_i"].iter();
+        Self {
+            effects: cell
+                .effects
+                .iter()
+                .map(|e| (e.label(), e.values.clone()))
+                .collect(),
+            declared: declared
+                .filter_map(|name| Some(((*name).to_owned(), machine.declared(name)?)))
+                .collect(),
+            offsets: offsets.to_vec(),
+        }
+    }
+
+    fn labels(&self) -> Vec<Label> {
+        self.effects
+            .iter()
+            .map(|(label, _)| label.clone())
+            .collect()
+    }
+}
+
+/// Hold an answer against the truth.
+pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
+    let labels = |named: &Named| named.label.clone();
+    let named: Vec<Label> = answer.named.iter().map(labels).collect();
+    let there = truth.labels();
+    let wrong = without(&named, &there);
+    let missed = without(&there, &named);
+    let exact = wrong.is_empty() && missed.is_empty();
+    let is_truth =
+        |set: &Vec<Label>| without(set, &there).is_empty() && without(&there, set).is_empty();
+    let listed = |label: &Label| answer.alternatives.iter().any(|set| set.contains(label));
+    let swapped = missed.iter().all(listed) && wrong.len() <= missed.len();
+    let within = exact || swapped || answer.alternatives.iter().any(is_truth);
+    let flagged = matches!(
+        answer.verdict,
+        Verdict::Unexplained | Verdict::PartlyExplained
+    );
+    let weak: Vec<Label> = answer
+        .named
+        .iter()
+        .filter(|effect| effect.error_reduction < HALF)
+        .map(labels)
+        .collect();
+    let passed = match group {
+        Group::Single | Group::Pair => exact,
+        Group::None => named.is_empty(),
+        Group::Outside => flagged && weak.is_empty(),
+    };
+    Judgement {
+        exact,
+        within,
+        wrong,
+        missed,
+        flagged,
+        weak,
+        coverage: coverage(truth, answer, exact),
+        passed,
+    }
+}
+
+/// The labels of `a` that are not in `b`.
+fn without(a: &[Label], b: &[Label]) -> Vec<Label> {
+    a.iter()
+        .filter(|label| !b.contains(label))
+        .cloned()
+        .collect()
+}
+
+/// Intervals mean something where the model is right: those of a model with other effects are not asked for.
+fn coverage(truth: &Truth, answer: &Answer, exact: bool) -> Vec<Coverage> {
+    if !exact {
+        return Vec::new();
+    }
+    let mut all = Vec::new();
+    for (label, values) in &truth.effects {
+        let named = answer.named.iter().filter(|named| named.label == *label);
+        for named in named {
+            let mut estimates = named.parameters.clone();
+            if label.starts_with("cogging_torque") {
+                turn_ripple(&mut estimates, values);
+            }
+            all.extend(estimates.iter().filter_map(|estimate| {
+                let truth = *values.get(&estimate.name)?;
+                Coverage::of(&format!("{label}.{}", estimate.name), truth, estimate)
+            }));
+        }
+    }
+    let declared = answer.declared.iter();
+    all.extend(declared.filter_map(|estimate| {
+        let truth = *truth.declared.get(&estimate.name)?;
+        Coverage::of(&estimate.name, truth, estimate)
+    }));
+    all
+}
+
+/// The same ripple can be written with either sign of its amplitude and any number of turns in its phase: write
+/// it as the truth does.
+fn turn_ripple(estimates: &mut [Estimate], truth: &BTreeMap<String, f64>) {
+    let amplitude = estimates.iter().find(|e| e.name == "A");
+    let flipped = amplitude.is_some_and(|e| e.value * truth["A"] < 0.0);
+    for estimate in estimates {
+        if flipped && estimate.name == "A" {
+            estimate.value = -estimate.value;
+            estimate.ci95 = estimate.ci95.map(|[low, high]| [-high, -low]);
+        }
+        if estimate.name == "phase" {
+            let half_turn = if flipped { PI } else { 0.0 };
+            let off = estimate.value + half_turn - truth["phase"];
+            let turn = half_turn - TAU * (off / TAU).round();
+            estimate.value += turn;
+            estimate.ci95 = estimate.ci95.map(|[low, high]| [low + turn, high + turn]);
+        }
+    }
+}
+
+impl Coverage {
+    /// None where there is no interval.
+    fn of(name: &str, truth: f64, estimate: &Estimate) -> Option<Self> {
+        let [low, high] = estimate.ci95?;
+        Some(Self {
+            name: name.to_owned(),
+            truth,
+            value: estimate.value,
+            covered: (low..=high).contains(&truth),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(label: &str, values: &[(&str, f64, [f64; 2])], error_reduction: f64) -> Named {
+        let estimate = |(name, value, interval): &(&str, f64, [f64; 2])| Estimate {
+            name: (*name).to_owned(),
+            value: *value,
+            ci95: Some(*interval),
+        };
+        Named {
+            label: label.to_owned(),
+            parameters: values.iter().map(estimate).collect(),
+            p_value: 1e-6,
+            error_reduction,
+        }
+    }
+
+    fn answer(verdict: Verdict, named: Vec<Named>, alternatives: &[&[&str]]) -> Answer {
+        let set = |set: &&[&str]| set.iter().map(|label| (*label).to_owned()).collect();
+        Answer {
+            verdict,
+            reason: String::new(),
+            named,
+            alternatives: alternatives.iter().map(set).collect(),
+            declared: Vec::new(),
+            left: 0.0,
+            left_p_value: 1.0,
+            left_where: "none".to_owned(),
+        }
+    }
+
+    fn truth(effects: &[(&str, &[(&str, f64)])]) -> Truth {
+        let values = |values: &[(&str, f64)]| {
+            let values = values.iter();
+            values
+                .map(|(name, value)| ((*name).to_owned(), *value))
+                .collect()
+        };
+        Truth {
+            effects: effects
+                .iter()
+                .map(|(label, own)| ((*label).to_owned(), values(own)))
+                .collect(),
+            declared: BTreeMap::new(),
+            offsets: Vec::new(),
+        }
+    }
+
+    fn coulomb() -> Truth {
+        truth(&[("coulomb_friction@1", &[("F_c", 0.1)])])
+    }
+
+    #[test]
+    fn the_same_set_is_exact_and_its_intervals_are_asked() {
+        let values = [("F_c", 0.11, [0.105, 0.115])];
+        let answer = answer(
+            Verdict::Explained,
+            vec![named("coulomb_friction@1", &values, 0.9)],
+            &[],
+        );
+        let judgement = judge(Group::Single, &coulomb(), &answer);
+        assert!(judgement.exact && judgement.within && judgement.passed);
+        assert_eq!(judgement.coverage.len(), 1);
+        assert!(!judgement.coverage[0].covered);
+    }
+
+    #[test]
+    fn the_right_name_on_the_wrong_joint_is_wrong_and_missed() {
+        let answer = answer(
+            Verdict::Explained,
+            vec![named("coulomb_friction@2", &[], 0.9)],
+            &[],
+        );
+        let judgement = judge(Group::Single, &coulomb(), &answer);
+        assert!(!judgement.exact && !judgement.within);
+        assert_eq!(judgement.wrong, ["coulomb_friction@2"]);
+        assert_eq!(judgement.missed, ["coulomb_friction@1"]);
+    }
+
+    #[test]
+    fn a_listed_alternative_is_within_but_an_addition_is_not() {
+        let viscous = || named("viscous_friction@1", &[], 0.9);
+        let listed: &[&[&str]] = &[&["coulomb_friction@1"]];
+        let swapped = answer(Verdict::Explained, vec![viscous()], listed);
+        let judgement = judge(Group::Single, &coulomb(), &swapped);
+        assert!(!judgement.exact && judgement.within && !judgement.passed);
+        let more = vec![viscous(), named("joint_spring@1", &[], 0.1)];
+        let added = answer(
+            Verdict::Explained,
+            more,
+            &[&["coulomb_friction@1", "joint_spring@1"]],
+        );
+        assert!(!judge(Group::Single, &coulomb(), &added).within);
+    }
+
+    #[test]
+    fn two_effects_for_one_are_within_where_that_whole_set_is_listed() {
+        let pair = truth(&[("coulomb_friction@1", &[]), ("viscous_friction@1", &[])]);
+        let one = vec![named("asymmetric_friction@1", &[], 0.9)];
+        let listed: &[&[&str]] = &[&["viscous_friction@1", "coulomb_friction@1"]];
+        let answer = answer(Verdict::Explained, one, listed);
+        assert!(judge(Group::Pair, &pair, &answer).within);
+    }
+
+    #[test]
+    fn outside_the_library_a_flag_counts_and_weak_names_do_not_pass() {
+        let cubic = truth(&[("cubic_damping@1", &[])]);
+        let pass =
+            |verdict, named| judge(Group::Outside, &cubic, &answer(verdict, named, &[])).passed;
+        assert!(pass(Verdict::Unexplained, Vec::new()));
+        assert!(!pass(Verdict::NoMissingEffect, Vec::new()));
+        let drag = |share| vec![named("quadratic_drag@1", &[], share)];
+        assert!(pass(Verdict::PartlyExplained, drag(0.8)));
+        assert!(!pass(Verdict::PartlyExplained, drag(0.4)));
+        assert!(!pass(Verdict::Explained, drag(0.8)));
+    }
+
+    #[test]
+    fn a_ripple_is_the_same_with_the_other_sign_half_a_turn_on() {
+        let ripple = truth(&[(
+            "cogging_torque@1",
+            &[("A", 0.1), ("N", 7.0), ("phase", 1.0)],
+        )]);
+        let values = [
+            ("A", -0.1, [-0.11, -0.09]),
+            ("phase", 1.0 + PI, [0.9 + PI, 1.1 + PI]),
+        ];
+        let found = vec![named("cogging_torque@1", &values, 0.9)];
+        let judgement = judge(
+            Group::Single,
+            &ripple,
+            &answer(Verdict::Explained, found, &[]),
+        );
+        assert_eq!(judgement.coverage.len(), 2);
+        assert!(judgement.coverage.iter().all(|c| c.covered));
+    }
+}

@@ -1,0 +1,238 @@
+use super::drive::{Approach, Drive};
+use super::force::Force;
+use super::friction::{DryFriction, Presliding};
+use super::mechanics::{Mechanics, Pair};
+use super::transmission::Transmission;
+
+/// A rig with everything that nobody declared.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    pub mechanics: Mechanics,
+    /// Gravity is turned by this \[rad\].
+    pub tilt: f64,
+    /// Inertia of each joint's rotor that its own joint alone sees \[kg m^2\].
+    pub rotor: Pair,
+    /// Each with its joint.
+    pub forces: Vec<(usize, Force)>,
+    pub dry: Vec<(usize, DryFriction)>,
+    pub presliding: Vec<(usize, Presliding)>,
+    pub transmissions: [Option<Transmission>; 2],
+    pub drives: [Drive; 2],
+}
+
+/// Positions in rad, speeds in rad/s. A motor's entries mean something where there is a transmission, a
+/// bristle's where there is presliding.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct State {
+    pub q: Pair,
+    pub v: Pair,
+    pub motor_q: Pair,
+    pub motor_v: Pair,
+    pub bristle: Pair,
+}
+
+impl State {
+    /// At rest, motors in the middle of their play.
+    pub fn at_rest(q: Pair) -> Self {
+        Self {
+            q,
+            motor_q: q,
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn plus(&self, slope: &Self, h: f64) -> Self {
+        let add = |a: Pair, b: Pair| [a[0] + h * b[0], a[1] + h * b[1]];
+        Self {
+            q: add(self.q, slope.q),
+            v: add(self.v, slope.v),
+            motor_q: add(self.motor_q, slope.motor_q),
+            motor_v: add(self.motor_v, slope.motor_v),
+            bristle: add(self.bristle, slope.bristle),
+        }
+    }
+}
+
+/// Which way each joint slides: 1, -1, or 0 where it is held.
+pub(super) type Directions = Pair;
+
+/// What acts on the joints at one instant, all but dry friction.
+pub(super) struct Balance {
+    mass: [Pair; 2],
+    /// Torque on each joint \[N m\].
+    free: Pair,
+    /// Torque through each gear \[N m\].
+    load: Pair,
+    motor_acceleration: Pair,
+    bristle_rate: Pair,
+}
+
+impl Machine {
+    pub fn bare(mechanics: Mechanics) -> Self {
+        Self {
+            mechanics,
+            tilt: 0.0,
+            rotor: [0.0; 2],
+            forces: Vec::new(),
+            dry: Vec::new(),
+            presliding: Vec::new(),
+            transmissions: [None, None],
+            drives: [Drive::default(), Drive::default()],
+        }
+    }
+
+    pub fn joints(&self) -> usize {
+        self.mechanics.joints()
+    }
+
+    /// Angles that the encoders see: of the motors where there is play or give behind them.
+    pub fn encoders(&self, state: &State) -> Pair {
+        [0, 1].map(|j| match self.transmissions[j] {
+            Some(_) => state.motor_q[j],
+            None => state.q[j],
+        })
+    }
+
+    pub(super) fn has_dry_friction(&self, joint: usize) -> bool {
+        self.dry.iter().any(|(of, _)| *of == joint)
+    }
+
+    pub(super) fn balance(&self, time: f64, state: &State, commands: &[Approach; 2]) -> Balance {
+        let mut mass = self.mechanics.mass(state.q);
+        let bias = self.mechanics.bias(state.q, state.v, self.tilt);
+        let mut balance = Balance {
+            mass,
+            free: [-bias[0], -bias[1]],
+            load: [0.0; 2],
+            motor_acceleration: [0.0; 2],
+            bristle_rate: [0.0; 2],
+        };
+        for j in 0..self.joints() {
+            mass[j][j] += self.rotor[j];
+            let drive = &self.drives[j];
+            let given = commands[j].at(time, drive.lag);
+            balance.load[j] = match &self.transmissions[j] {
+                None => drive.shape.at(given, state.v[j]),
+                Some(gear) => {
+                    let driving = drive.shape.at(given, state.motor_v[j]);
+                    let ahead = state.motor_q[j] - state.q[j];
+                    let passed = gear.torque(ahead, state.motor_v[j] - state.v[j]);
+                    balance.motor_acceleration[j] = (driving - passed) / gear.inertia;
+                    passed
+                }
+            };
+            balance.free[j] += balance.load[j];
+        }
+        for (j, force) in &self.forces {
+            balance.free[*j] += force.at(state.q[*j], state.v[*j], time);
+        }
+        for (j, friction) in &self.presliding {
+            balance.free[*j] += friction.torque(state.bristle[*j]);
+            balance.bristle_rate[*j] = friction.rate(state.bristle[*j], state.v[*j]);
+        }
+        balance.mass = mass;
+        balance
+    }
+
+    /// The level of all dry friction of a joint against motion in `direction` \[N m\].
+    fn level(&self, joint: usize, direction: f64, state: &State, load: f64) -> f64 {
+        let own = self.dry.iter().filter(|(of, _)| *of == joint);
+        own.map(|(_, friction)| friction.level(direction, state.q[joint], state.v[joint], load))
+            .sum()
+    }
+
+    /// Accelerations while the joints slide in these directions; those that are held have none.
+    fn accelerations(
+        &self,
+        balance: &Balance,
+        state: &State,
+        directions: Directions,
+    ) -> (Pair, Pair) {
+        let acting = [0, 1].map(|j| {
+            let direction = directions[j];
+            balance.free[j] - direction * self.level(j, direction, state, balance.load[j])
+        });
+        let free = [0, 1].map(|j| directions[j] != 0.0 || !self.has_dry_friction(j));
+        let a = solve(&balance.mass, acting, free);
+        let held =
+            [0, 1].map(|j| acting[j] - balance.mass[j][0] * a[0] - balance.mass[j][1] * a[1]);
+        (a, held)
+    }
+
+    /// The directions of joints in motion, and for those at rest the only ones that agree with the forces: held
+    /// where friction can carry what the other torques leave, else sliding the way they push.
+    pub(super) fn directions(
+        &self,
+        time: f64,
+        state: &State,
+        commands: &[Approach; 2],
+    ) -> Directions {
+        let options = |j: usize| -> &[f64] {
+            match state.v[j] {
+                _ if !self.has_dry_friction(j) => &[0.0],
+                v if v > 0.0 => &[1.0],
+                v if v < 0.0 => &[-1.0],
+                _ => &[0.0, 1.0, -1.0],
+            }
+        };
+        let all = options(0)
+            .iter()
+            .flat_map(|a| options(1).iter().map(move |b| [*a, *b]));
+        let balance = self.balance(time, state, commands);
+        let agrees = |directions: &Directions| self.agrees(&balance, state, *directions);
+        // The matrix is positive definite, so one choice always agrees, up to rounding at its very edge.
+        all.clone()
+            .find(agrees)
+            .or_else(|| all.clone().next())
+            .expect("there is at least one choice")
+    }
+
+    fn agrees(&self, balance: &Balance, state: &State, directions: Directions) -> bool {
+        let (a, held) = self.accelerations(balance, state, directions);
+        (0..2).all(|j| {
+            if state.v[j] != 0.0 || !self.has_dry_friction(j) {
+                return true;
+            }
+            if directions[j] != 0.0 {
+                return directions[j] * a[j] > 0.0;
+            }
+            let push = held[j].signum();
+            held[j].abs() <= self.level(j, push, state, balance.load[j])
+        })
+    }
+
+    /// Derivative of the state by time, in units of the state per second.
+    pub(super) fn slope(
+        &self,
+        time: f64,
+        state: &State,
+        commands: &[Approach; 2],
+        directions: Directions,
+    ) -> State {
+        let balance = self.balance(time, state, commands);
+        let (v, _) = self.accelerations(&balance, state, directions);
+        State {
+            q: state.v,
+            v,
+            motor_q: state.motor_v,
+            motor_v: balance.motor_acceleration,
+            bristle: balance.bristle_rate,
+        }
+    }
+}
+
+/// Accelerations under `acting` torques, of the joints that are free; the others have none.
+fn solve(mass: &[Pair; 2], acting: Pair, free: [bool; 2]) -> Pair {
+    match free {
+        [true, true] => {
+            let determinant = mass[0][0] * mass[1][1] - mass[0][1] * mass[1][0];
+            [
+                (mass[1][1] * acting[0] - mass[0][1] * acting[1]) / determinant,
+                (mass[0][0] * acting[1] - mass[1][0] * acting[0]) / determinant,
+            ]
+        }
+        [true, false] => [acting[0] / mass[0][0], 0.0],
+        [false, true] => [0.0, acting[1] / mass[1][1]],
+        [false, false] => [0.0, 0.0],
+    }
+}

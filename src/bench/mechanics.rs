@@ -1,0 +1,177 @@
+use serde::{Deserialize, Serialize};
+
+/// Numbers of the two joints. A rig of one joint carries an idle second one.
+pub type Pair = [f64; 2];
+
+/// The bare mechanism: `mass(q) a + bias(q, v) = torque`, written by hand. Angles in rad, q = 0 hangs down, the
+/// second joint is relative to the first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "form", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Mechanics {
+    /// A rod on a pivot.
+    Pendulum {
+        /// About the pivot \[kg m^2\].
+        inertia: f64,
+        /// Mass times distance of its centre \[kg m\].
+        moment: f64,
+        /// \[m/s^2\]
+        g: f64,
+    },
+    /// Two links, both joints driven; SI units.
+    DoublePendulum {
+        m1: f64,
+        m2: f64,
+        l1: f64,
+        lc1: f64,
+        lc2: f64,
+        #[serde(rename = "I1")]
+        i1: f64,
+        #[serde(rename = "I2")]
+        i2: f64,
+        g: f64,
+    },
+}
+
+impl Mechanics {
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        match self {
+            Self::Pendulum { .. } => 1,
+            Self::DoublePendulum { .. } => 2,
+        }
+    }
+
+    /// Mass matrix \[kg m^2\].
+    pub fn mass(&self, q: Pair) -> [Pair; 2] {
+        match *self {
+            Self::Pendulum { inertia, .. } => [[inertia, 0.0], [0.0, 1.0]],
+            Self::DoublePendulum {
+                m1,
+                m2,
+                l1,
+                lc1,
+                lc2,
+                i1,
+                i2,
+                ..
+            } => {
+                let outer = i2 + m2 * lc2 * lc2;
+                let coupling = m2 * l1 * lc2 * q[1].cos();
+                let inner = i1 + m1 * lc1 * lc1 + m2 * l1 * l1;
+                [
+                    [inner + outer + 2.0 * coupling, outer + coupling],
+                    [outer + coupling, outer],
+                ]
+            }
+        }
+    }
+
+    /// Torques of gravity, turned by `tilt` rad, and of inertia that hold the motion back \[N m\].
+    pub fn bias(&self, q: Pair, v: Pair, tilt: f64) -> Pair {
+        match *self {
+            Self::Pendulum { moment, g, .. } => [moment * g * (q[0] + tilt).sin(), 0.0],
+            Self::DoublePendulum {
+                m1,
+                m2,
+                l1,
+                lc1,
+                lc2,
+                g,
+                ..
+            } => {
+                let shoulder = (m1 * lc1 + m2 * l1) * g * (q[0] + tilt).sin();
+                let elbow = m2 * lc2 * g * (q[0] + q[1] + tilt).sin();
+                let turning = m2 * l1 * lc2 * q[1].sin();
+                [
+                    shoulder + elbow - turning * v[1] * (2.0 * v[0] + v[1]),
+                    elbow + turning * v[0] * v[0],
+                ]
+            }
+        }
+    }
+
+    /// Give a parameter another value; `None` where there is no such parameter.
+    pub fn set(&mut self, name: &str, value: f64) -> Option<()> {
+        let slot = match (self, name) {
+            (Self::Pendulum { inertia, .. }, "inertia") => inertia,
+            (Self::Pendulum { moment, .. }, "moment") => moment,
+            (Self::DoublePendulum { m1, .. }, "m1") => m1,
+            (Self::DoublePendulum { m2, .. }, "m2") => m2,
+            (Self::DoublePendulum { l1, .. }, "l1") => l1,
+            (Self::DoublePendulum { lc1, .. }, "lc1") => lc1,
+            (Self::DoublePendulum { lc2, .. }, "lc2") => lc2,
+            (Self::DoublePendulum { i1, .. }, "I1") => i1,
+            (Self::DoublePendulum { i2, .. }, "I2") => i2,
+            (Self::Pendulum { g, .. } | Self::DoublePendulum { g, .. }, "g") => g,
+            _ => return None,
+        };
+        *slot = value;
+        Some(())
+    }
+
+    /// The true value of a parameter as the declared model writes it, where that is a function of the rig.
+    pub fn declared(&self, name: &str) -> Option<f64> {
+        match *self {
+            Self::Pendulum { inertia, moment, g } => match name {
+                "C_g" => Some(-moment * g / inertia),
+                "C_i" => Some(1.0 / inertia),
+                _ => None,
+            },
+            Self::DoublePendulum { .. } => None,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::{Mechanics, Pair};
+
+    pub fn pendulum() -> Mechanics {
+        Mechanics::Pendulum {
+            inertia: 0.15,
+            moment: 0.3,
+            g: 9.81,
+        }
+    }
+
+    pub fn double_pendulum() -> Mechanics {
+        Mechanics::DoublePendulum {
+            m1: 1.2,
+            m2: 0.9,
+            l1: 0.8,
+            lc1: 0.45,
+            lc2: 0.45,
+            i1: 0.5,
+            i2: 0.4,
+            g: 9.8,
+        }
+    }
+
+    /// Energy from the places and speeds of the two centres of mass \[J\]: knows no mass matrix.
+    pub fn energy(mechanics: &Mechanics, q: Pair, v: Pair) -> f64 {
+        match *mechanics {
+            Mechanics::Pendulum { inertia, moment, g } => {
+                0.5 * inertia * v[0] * v[0] - moment * g * q[0].cos()
+            }
+            Mechanics::DoublePendulum {
+                m1,
+                m2,
+                l1,
+                lc1,
+                lc2,
+                i1,
+                i2,
+                g,
+            } => {
+                let (a, w) = (q[0] + q[1], v[0] + v[1]);
+                let speed1 = (lc1 * v[0]).powi(2);
+                let across = l1 * v[0] * q[0].cos() + lc2 * w * a.cos();
+                let up = l1 * v[0] * q[0].sin() + lc2 * w * a.sin();
+                let height1 = -lc1 * q[0].cos();
+                let height2 = -l1 * q[0].cos() - lc2 * a.cos();
+                let moving = m1 * speed1 + m2 * (across * across + up * up);
+                0.5 * (moving + i1 * v[0] * v[0] + i2 * w * w) + g * (m1 * height1 + m2 * height2)
+            }
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! Whether closing the loop names what is missing: a grid of simulated rigs that hide effects.
+//!
+//! The rigs share nothing with what is measured: equations of motion, friction with exact stiction, drives,
+//! gears and encoders are written by hand here, and no model file, formula or integrator of the program is used
+//! until the logs are recorded.
+
+mod cell;
+mod drive;
+mod excitation;
+mod force;
+mod friction;
+mod grid;
+mod hidden;
+mod judge;
+mod machine;
+mod mechanics;
+mod motion;
+mod recording;
+mod table;
+mod transmission;
+
+pub use cell::{Errors, Findings};
+pub use grid::{Bench, Cell, GridError, Group, cells, hash, read};
+pub use hidden::Hidden;
+pub use judge::{Answer, Coverage, Estimate, Judgement, Label, Named, Truth, judge};
+pub use machine::{Machine, State};
+pub use mechanics::{Mechanics, Pair};
+pub use recording::{Condition, Driving, Loop};
+pub use table::{Line, Rate, Row, Summary, markdown, summarise};

@@ -1,0 +1,350 @@
+//! A rig is driven and its encoders are read: one log.
+
+use std::path::PathBuf;
+
+use rand::Rng;
+use rand_distr::{Distribution, Normal};
+use serde::{Deserialize, Serialize};
+
+use super::drive::{Approach, whole_steps};
+use super::excitation::{Controller, Multisine};
+use super::machine::{Machine, State};
+use super::mechanics::Pair;
+use super::motion::STEP_S;
+use crate::data::Log;
+
+/// How a rig is driven: numbers of its joints.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Driving {
+    /// Band of torques and references \[Hz\].
+    pub band_hz: [f64; 2],
+    /// Open loop: root mean square of the torque \[N m\].
+    pub torque: Vec<f64>,
+    /// Closed loop: root mean square of the reference \[rad\].
+    pub reference: Vec<f64>,
+    /// Gains of the controller \[N m/rad\], \[N m s/rad\].
+    pub stiffness: Vec<f64>,
+    pub damping: Vec<f64>,
+    /// Largest torque that it commands \[N m\].
+    pub limit: Vec<f64>,
+}
+
+/// Whether the torque answers to what is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Loop {
+    Open,
+    Closed,
+}
+
+/// How logs are taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Condition {
+    #[serde(rename = "loop")]
+    pub drive: Loop,
+    pub rate_hz: f64,
+    /// Standard deviation of white noise on positions \[rad\].
+    pub noise: f64,
+    /// Step of the encoder \[rad\]; zero for a fine one.
+    #[serde(default)]
+    pub quantum: f64,
+    pub logs: usize,
+    pub seconds: f64,
+}
+
+/// Logs differ in how hard the rig is driven; the last of them lies within the range of the others where there
+/// are more than two.
+const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
+
+/// Where the torque comes from.
+enum Source {
+    Open(Multisine),
+    Closed(Multisine, Controller),
+}
+
+impl Source {
+    fn draw(driving: &Driving, how: Loop, strength: f64, j: usize, rng: &mut impl Rng) -> Self {
+        match how {
+            Loop::Open => {
+                let size = strength * driving.torque[j];
+                Self::Open(Multisine::draw(size, driving.band_hz, rng))
+            }
+            Loop::Closed => {
+                let size = strength * driving.reference[j];
+                let reference = Multisine::draw(size, driving.band_hz, rng);
+                let controller =
+                    Controller::new(driving.stiffness[j], driving.damping[j], driving.limit[j]);
+                Self::Closed(reference, controller)
+            }
+        }
+    }
+
+    fn command(&mut self, measured: f64, time: f64, dt: f64) -> f64 {
+        match self {
+            Self::Open(torque) => torque.at(time),
+            Self::Closed(reference, controller) => {
+                let wanted = [reference.at(time), reference.rate(time)];
+                controller.command(measured, wanted, dt)
+            }
+        }
+    }
+}
+
+/// Reads one encoder: offset, white noise, rounding.
+fn read(angle: f64, condition: &Condition, rng: &mut impl Rng) -> f64 {
+    let noise = Normal::new(0.0, condition.noise).expect("the grid was checked");
+    let angle = angle + noise.sample(rng);
+    match condition.quantum {
+        quantum if quantum > 0.0 => (angle / quantum).round() * quantum,
+        _ => angle,
+    }
+}
+
+/// Commands of a rig and what its drives are given of them.
+struct Wires {
+    /// One each step from the start.
+    commands: Vec<Pair>,
+    given: [Approach; 2],
+}
+
+impl Wires {
+    /// The command of joint `j` that is `steps` old in step `row`; before the start there was none.
+    fn command(&self, row: usize, steps: usize, j: usize) -> f64 {
+        row.checked_sub(steps).map_or(0.0, |k| self.commands[k][j])
+    }
+
+    /// Each joint's drive gets the target that its delay brings from `at` s after the start of step `row` on.
+    fn set(&mut self, machine: &Machine, row: usize, dt: f64, at: f64) {
+        for j in 0..machine.joints() {
+            let drive = &machine.drives[j];
+            let (steps, rest) = whole_steps(drive.delay, dt);
+            let target = self.command(row, steps + usize::from(at < rest), j);
+            #[allow(clippy::cast_precision_loss)] // rows are few
+            let now = row as f64 * dt + at;
+            self.given[j] = Approach {
+                since: now,
+                from: self.given[j].at(now, drive.lag),
+                target,
+            };
+        }
+    }
+}
+
+impl Machine {
+    /// Record the `index`-th log of a rig that starts at rest, hanging down; encoders read too much by `offset`
+    /// rad. Velocities are backward differences of what the encoders read.
+    pub fn record(
+        &self,
+        driving: &Driving,
+        condition: &Condition,
+        index: usize,
+        offset: Pair,
+        rng: &mut impl Rng,
+    ) -> Log {
+        let joints = self.joints();
+        let strength = STRENGTHS[index % STRENGTHS.len()];
+        let mut sources: Vec<Source> = (0..joints)
+            .map(|j| Source::draw(driving, condition.drive, strength, j, rng))
+            .collect();
+        let dt = 1.0 / condition.rate_hz;
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
+        let rows = (condition.seconds * condition.rate_hz).round() as usize + 1;
+        let mut wires = Wires {
+            commands: Vec::with_capacity(rows),
+            given: [Approach::default(); 2],
+        };
+        let mut state = State::at_rest([0.0; 2]);
+        let mut log = empty(index, joints);
+        for row in 0..rows {
+            #[allow(clippy::cast_precision_loss)] // rows are few
+            let time = row as f64 * dt;
+            let encoders = self.encoders(&state);
+            let mut command = [0.0; 2];
+            for j in 0..joints {
+                let q = read(encoders[j] + offset[j], condition, rng);
+                command[j] = sources[j].command(q, time, dt);
+                let qd = log.q[j].last().map_or(0.0, |last| (q - last) / dt);
+                log.q[j].push(q);
+                log.qd[j].push(qd);
+                log.tau[j].push(command[j]);
+            }
+            log.time.push(time);
+            wires.commands.push(command);
+            self.hold(&mut state, &mut wires, row, dt);
+        }
+        log
+    }
+
+    /// Move over one step of the log, halting where a delay brings in the next command.
+    fn hold(&self, state: &mut State, wires: &mut Wires, row: usize, dt: f64) {
+        let changes = [0, 1].map(|j| whole_steps(self.drives[j].delay, dt).1);
+        let mut cuts = vec![0.0, changes[0], changes[1], dt];
+        cuts.sort_by(f64::total_cmp);
+        for span in cuts.windows(2).filter(|span| span[1] > span[0]) {
+            wires.set(self, row, dt, span[0]);
+            #[allow(clippy::cast_precision_loss)] // rows are few
+            let from = row as f64 * dt + span[0];
+            self.advance(state, from, span[1] - span[0], &wires.given, STEP_S);
+        }
+    }
+}
+
+fn empty(index: usize, joints: usize) -> Log {
+    Log {
+        path: PathBuf::from(format!("log{}.csv", index + 1)),
+        time: Vec::new(),
+        q: vec![Vec::new(); joints],
+        qd: vec![Vec::new(); joints],
+        tau: vec![Vec::new(); joints],
+        leave_out: Vec::new(),
+        notes: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Condition, Driving, Loop};
+    use crate::bench::force::Force;
+    use crate::bench::friction::DryFriction;
+    use crate::bench::machine::Machine;
+    use crate::bench::mechanics::tests::pendulum;
+    use crate::data::Log;
+
+    fn driving() -> Driving {
+        Driving {
+            band_hz: [0.2, 2.0],
+            torque: vec![1.0],
+            reference: vec![0.8],
+            stiffness: vec![10.0],
+            damping: vec![1.2],
+            limit: vec![4.0],
+        }
+    }
+
+    fn condition(drive: Loop) -> Condition {
+        Condition {
+            drive,
+            rate_hz: 100.0,
+            noise: 0.0,
+            quantum: 0.0,
+            logs: 3,
+            seconds: 4.0,
+        }
+    }
+
+    fn record(machine: &Machine, condition: &Condition, offset: f64) -> Log {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        machine.record(&driving(), condition, 0, [offset, 0.0], &mut rng)
+    }
+
+    fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+        let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+        differences.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_delay_of_whole_steps_shifts_the_motion_exactly() {
+        let sound = Machine::bare(pendulum());
+        let mut late = sound.clone();
+        late.drives[0].delay = 0.03;
+        let open = condition(Loop::Open);
+        let (early, late) = (record(&sound, &open, 0.0), record(&late, &open, 0.0));
+        assert_eq!(early.tau, late.tau);
+        // The same torque on the same rig, three rows later, from the same rest.
+        let rows = early.rows() - 3;
+        assert!(largest_difference(&early.q[0][..rows], &late.q[0][3..]) < 1e-12);
+    }
+
+    #[test]
+    fn a_delay_of_part_of_a_step_mixes_neighbouring_torques() {
+        let mut machine = Machine::bare(crate::bench::mechanics::Mechanics::Pendulum {
+            inertia: 1.0,
+            moment: 0.0,
+            g: 9.81,
+        });
+        machine.drives[0].delay = 0.0137;
+        let mut condition = condition(Loop::Open);
+        condition.seconds = 1.0;
+        let log = record(&machine, &condition, 0.0);
+        // Speed is the sum of torque by time: of step k, 3.7 ms of command k - 2 and 6.3 ms of k - 1.
+        let command = |k: usize, back: usize| k.checked_sub(back).map_or(0.0, |k| log.tau[0][k]);
+        let (mut q, mut v) = (0.0, 0.0);
+        for row in 0..log.rows() {
+            assert!((log.q[0][row] - q).abs() < 1e-12, "row {row}");
+            for (torque, h) in [(command(row, 2), 0.0037), (command(row, 1), 0.0063)] {
+                q += v * h + 0.5 * torque * h * h;
+                v += torque * h;
+            }
+        }
+    }
+
+    #[test]
+    fn a_lag_follows_its_own_equation() {
+        let mut machine = Machine::bare(crate::bench::mechanics::Mechanics::Pendulum {
+            inertia: 1.0,
+            moment: 0.0,
+            g: 9.81,
+        });
+        machine.drives[0].lag = 0.05;
+        let log = record(&machine, &condition(Loop::Open), 0.0);
+        // Forward steps of 10 us of T tau' + tau = u.
+        let (mut q, mut v, mut tau) = (0.0, 0.0, 0.0);
+        for row in 0..log.rows() {
+            assert!((log.q[0][row] - q).abs() < 1e-4, "row {row}");
+            for _ in 0..1000 {
+                tau += 1e-5 / 0.05 * (log.tau[0][row] - tau);
+                v += 1e-5 * tau;
+                q += 1e-5 * v;
+            }
+        }
+    }
+
+    #[test]
+    fn an_offset_is_added_to_what_is_read_and_nothing_else_in_open_loop() {
+        let machine = Machine::bare(pendulum());
+        let open = condition(Loop::Open);
+        let (plain, off) = (record(&machine, &open, 0.0), record(&machine, &open, 0.05));
+        let shifted: Vec<f64> = plain.q[0].iter().map(|q| q + 0.05).collect();
+        assert!(largest_difference(&shifted, &off.q[0]) < 1e-15);
+        assert_eq!(plain.tau, off.tau);
+    }
+
+    #[test]
+    fn in_closed_loop_the_torque_answers_to_the_rig_within_its_limit() {
+        let closed = condition(Loop::Closed);
+        let plain = record(&Machine::bare(pendulum()), &closed, 0.0);
+        let mut rough = Machine::bare(pendulum());
+        rough.dry.push((0, DryFriction::Coulomb { level: 0.3 }));
+        let rough = record(&rough, &closed, 0.0);
+        assert!(largest_difference(&plain.tau[0], &rough.tau[0]) > 0.1);
+        assert!(plain.tau[0].iter().all(|tau| tau.abs() <= 4.0));
+        assert!(plain.q[0].iter().any(|q| q.abs() > 0.3));
+    }
+
+    #[test]
+    fn encoders_are_noisy_or_coarse_as_asked_and_velocities_are_their_differences() {
+        let mut machine = Machine::bare(pendulum());
+        machine.forces.push((0, Force::Viscous { b: 0.1 }));
+        let clean = record(&machine, &condition(Loop::Open), 0.0);
+        let mut noisy = condition(Loop::Open);
+        (noisy.noise, noisy.quantum) = (1e-3, 0.0);
+        let noisy = record(&machine, &noisy, 0.0);
+        let pairs = clean.q[0].iter().zip(&noisy.q[0]);
+        let mean_square = pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 401.0;
+        assert!((mean_square.sqrt() - 1e-3).abs() < 1e-4, "{mean_square}");
+        let mut coarse = condition(Loop::Open);
+        coarse.quantum = 0.01;
+        let coarse = record(&machine, &coarse, 0.0);
+        let whole = |q: &f64| (q / 0.01 - (q / 0.01).round()).abs() < 1e-9;
+        assert!(coarse.q[0].iter().all(whole));
+        for row in 1..noisy.rows() {
+            let difference = (noisy.q[0][row] - noisy.q[0][row - 1]) / 0.01;
+            assert!((noisy.qd[0][row] - difference).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,386 @@
+//! Many cells in a few numbers, and those as a table.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use serde::{Deserialize, Serialize};
+
+use super::cell::Findings;
+use super::grid::{Cell, Group};
+use super::judge::Judgement;
+use crate::closeloop::Verdict;
+
+/// One cell and what came of it; one line of `cells.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Tells one configuration of a cell from another.
+    pub configuration: String,
+    /// Tells one build of the program from another.
+    pub program: String,
+    pub seconds: f64,
+    pub cell: Cell,
+    /// Or why the loop could not be closed.
+    pub findings: Result<Findings, String>,
+}
+
+/// How often something was so.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    pub hits: usize,
+    pub of: usize,
+}
+
+/// Normal quantile of a two-sided 95 % interval.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+impl Rate {
+    fn count(all: impl Iterator<Item = bool>) -> Self {
+        all.fold(Self { hits: 0, of: 0 }, |rate, hit| Self {
+            hits: rate.hits + usize::from(hit),
+            of: rate.of + 1,
+        })
+    }
+
+    /// Share; NaN of nothing.
+    #[allow(clippy::cast_precision_loss)] // counts are small
+    pub fn share(self) -> f64 {
+        self.hits as f64 / self.of as f64
+    }
+
+    /// 95 % interval of the share (Wilson 1927).
+    #[allow(clippy::cast_precision_loss)] // counts are small
+    pub fn wilson(self) -> [f64; 2] {
+        if self.of == 0 {
+            return [0.0, 1.0];
+        }
+        let (n, p, z2) = (self.of as f64, self.share(), NORMAL_95 * NORMAL_95);
+        let middle = (p + 0.5 * z2 / n) / (1.0 + z2 / n);
+        let half = NORMAL_95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + 0.25 * z2 / (n * n)).sqrt();
+        [(middle - half).max(0.0), (middle + half).min(1.0)]
+    }
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    pub what: String,
+    pub rate: Rate,
+    pub wilson: [f64; 2],
+}
+
+impl Row {
+    fn new(what: impl Into<String>, rate: Rate) -> Self {
+        Self {
+            what: what.into(),
+            rate,
+            wilson: rate.wilson(),
+        }
+    }
+}
+
+/// What a run of the grid shows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    pub cells: usize,
+    /// Cells from which the loop could not be closed.
+    pub errors: Vec<(String, String)>,
+    pub rows: Vec<Row>,
+    /// Error after over error of the true structure, 0.5 s ahead: median, 90 % quantile and largest over the
+    /// cells with an effect that the library knows.
+    pub held_out_ratio: Option<[f64; 3]>,
+    /// Cells of which the library cannot fit the true structure.
+    pub not_told: usize,
+    /// Passed, by the name of each effect that was hidden.
+    pub by_effect: Vec<Row>,
+    /// Passed, by plant and condition.
+    pub by_condition: Vec<Row>,
+    /// Intervals that hold the truth, by parameter.
+    pub by_parameter: Vec<Row>,
+    pub failures: Vec<Failure>,
+    pub seconds: Seconds,
+}
+
+/// A cell that did not show what it was to show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failure {
+    pub cell: String,
+    pub group: Group,
+    pub named: Vec<String>,
+    pub within: bool,
+    pub verdict: Verdict,
+    pub ratio: Option<f64>,
+}
+
+/// Run time of a cell \[s\].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Seconds {
+    pub median: f64,
+    pub longest: f64,
+    pub total: f64,
+}
+
+/// The error after is as small as that of the true structure when it exceeds it by no more than this.
+const AS_GOOD: f64 = 1.1;
+
+struct Done<'l> {
+    cell: &'l Cell,
+    findings: &'l Findings,
+}
+
+impl Done<'_> {
+    fn judgement(&self) -> &Judgement {
+        &self.findings.judgement
+    }
+}
+
+/// Count.
+pub fn summarise(lines: &[Line]) -> Summary {
+    let done: Vec<Done<'_>> = lines
+        .iter()
+        .filter_map(|line| {
+            let findings = line.findings.as_ref().ok()?;
+            let cell = &line.cell;
+            Some(Done { cell, findings })
+        })
+        .collect();
+    let failed = lines.iter().filter_map(|line| {
+        let error = line.findings.as_ref().err()?;
+        Some((line.cell.id.clone(), error.clone()))
+    });
+    let known: Vec<&Done<'_>> = done
+        .iter()
+        .filter(|d| matches!(d.cell.group, Group::Single | Group::Pair))
+        .collect();
+    let ratios: Vec<f64> = known
+        .iter()
+        .filter_map(|d| d.findings.errors.ratio())
+        .collect();
+    Summary {
+        cells: lines.len(),
+        errors: failed.collect(),
+        rows: rows(&done, &ratios),
+        not_told: known.len() - ratios.len(),
+        held_out_ratio: (!ratios.is_empty()).then(|| [0.5, 0.9, 1.0].map(|q| quantile(&ratios, q))),
+        by_effect: by(&done, |d| {
+            d.cell.effects.iter().map(|e| e.name.clone()).collect()
+        }),
+        by_condition: by(&done, |d| {
+            vec![format!("{}, {}", d.cell.plant, d.cell.condition_name)]
+        }),
+        by_parameter: by_parameter(&done),
+        failures: done.iter().filter_map(failure).collect(),
+        seconds: seconds(lines),
+    }
+}
+
+fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
+    let of = |group: Group, hit: &dyn Fn(&Done<'_>) -> bool| {
+        Rate::count(done.iter().filter(|d| d.cell.group == group).map(hit))
+    };
+    let exact = |d: &Done<'_>| d.judgement().exact;
+    let within = |d: &Done<'_>| d.judgement().within;
+    let named = |d: &Done<'_>| !d.findings.answer.named.is_empty();
+    let flagged = |d: &Done<'_>| d.judgement().flagged;
+    let passed = |d: &Done<'_>| d.judgement().passed;
+    let covered = |of_effects: bool| {
+        let all = done.iter().flat_map(|d| &d.judgement().coverage);
+        let wanted = all.filter(|c| c.name.contains('@') == of_effects);
+        Rate::count(wanted.map(|c| c.covered))
+    };
+    vec![
+        Row::new("one effect: exact", of(Group::Single, &exact)),
+        Row::new(
+            "one effect: exact or a listed alternative",
+            of(Group::Single, &within),
+        ),
+        Row::new("two effects: exact", of(Group::Pair, &exact)),
+        Row::new(
+            "two effects: exact or listed alternatives",
+            of(Group::Pair, &within),
+        ),
+        Row::new("no effect: something is named", of(Group::None, &named)),
+        Row::new("no effect: something is flagged", of(Group::None, &flagged)),
+        Row::new("outside the library: flagged", of(Group::Outside, &flagged)),
+        Row::new(
+            "outside the library: flagged, and no name that cuts less than half of the error",
+            of(Group::Outside, &passed),
+        ),
+        Row::new(
+            "95 % intervals of effects that hold the truth",
+            covered(true),
+        ),
+        Row::new(
+            "95 % intervals of declared parameters that hold the truth",
+            covered(false),
+        ),
+        Row::new(
+            "error after within a tenth of that of the true structure",
+            Rate::count(ratios.iter().map(|ratio| *ratio <= AS_GOOD)),
+        ),
+    ]
+}
+
+fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
+    let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
+    for d in done {
+        for key in keys(d) {
+            groups.entry(key).or_default().push(d.judgement().passed);
+        }
+    }
+    counted(groups)
+}
+
+fn by_parameter(done: &[Done<'_>]) -> Vec<Row> {
+    let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
+    for coverage in done.iter().flat_map(|d| &d.judgement().coverage) {
+        let name = match coverage.name.split_once('@') {
+            // The joint says nothing about a parameter.
+            Some((effect, rest)) => {
+                format!("{effect}{}", rest.trim_start_matches(char::is_numeric))
+            }
+            None => coverage.name.clone(),
+        };
+        groups.entry(name).or_default().push(coverage.covered);
+    }
+    counted(groups)
+}
+
+fn counted(groups: BTreeMap<String, Vec<bool>>) -> Vec<Row> {
+    let row = |(name, hits): (String, Vec<bool>)| Row::new(name, Rate::count(hits.into_iter()));
+    groups.into_iter().map(row).collect()
+}
+
+fn failure(d: &Done<'_>) -> Option<Failure> {
+    let (judgement, answer) = (d.judgement(), &d.findings.answer);
+    (!judgement.passed).then(|| Failure {
+        cell: d.cell.id.clone(),
+        group: d.cell.group,
+        named: answer
+            .named
+            .iter()
+            .map(|named| named.label.clone())
+            .collect(),
+        within: judgement.within,
+        verdict: answer.verdict,
+        ratio: d.findings.errors.ratio(),
+    })
+}
+
+fn seconds(lines: &[Line]) -> Seconds {
+    let all: Vec<f64> = lines.iter().map(|line| line.seconds).collect();
+    Seconds {
+        median: quantile(&all, 0.5),
+        longest: quantile(&all, 1.0),
+        total: all.iter().sum(),
+    }
+}
+
+/// Nearest rank; zero of nothing.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss
+    )] // an index
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.max(1) - 1).copied().unwrap_or(0.0)
+}
+
+/// The summary as Markdown.
+pub fn markdown(summary: &Summary) -> String {
+    let mut text = format!(
+        "{} cells, {:.0} s; a cell takes {:.1} s (median) to {:.1} s.\n\n",
+        summary.cells, summary.seconds.total, summary.seconds.median, summary.seconds.longest
+    );
+    text += "| | cells | share | 95 % interval |\n|---|---|---|---|\n";
+    summary.rows.iter().for_each(|row| push_row(&mut text, row));
+    if let Some([median, high, largest]) = summary.held_out_ratio {
+        let _ = writeln!(
+            text,
+            "\nError after over that of the true structure, 0.5 s ahead: median {median:.3}, 90 % quantile \
+             {high:.3}, largest {largest:.3}; of {} cells the library cannot fit the true structure.",
+            summary.not_told
+        );
+    }
+    let tables = [
+        ("effect hidden", "passed", &summary.by_effect),
+        ("plant, condition", "passed", &summary.by_condition),
+        (
+            "parameter",
+            "intervals that hold the truth",
+            &summary.by_parameter,
+        ),
+    ];
+    for (what, of_what, rows) in tables {
+        let _ = write!(
+            text,
+            "\n| {what} | {of_what} | share | 95 % interval |\n|---|---|---|---|\n"
+        );
+        rows.iter().for_each(|row| push_row(&mut text, row));
+    }
+    push_failures(&mut text, summary);
+    text
+}
+
+fn push_row(text: &mut String, row: &Row) {
+    let (Rate { hits, of }, [low, high]) = (row.rate, row.wilson);
+    if of > 0 {
+        let share = 100.0 * row.rate.share();
+        let (low, high) = (100.0 * low, 100.0 * high);
+        let _ = writeln!(
+            text,
+            "| {} | {hits} of {of} | {share:.0} % | {low:.0} to {high:.0} % |",
+            row.what
+        );
+    }
+}
+
+fn push_failures(text: &mut String, summary: &Summary) {
+    if !summary.failures.is_empty() {
+        *text += "\n| cell that failed | named | verdict | within alternatives | error ratio |\n|---|---|---|---|---|\n";
+    }
+    for failure in &summary.failures {
+        let named = match failure.named.as_slice() {
+            [] => "nothing".to_owned(),
+            named => named.join(", "),
+        };
+        let ratio = failure
+            .ratio
+            .map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
+        let within = if failure.within { "yes" } else { "no" };
+        let _ = writeln!(
+            text,
+            "| {} | {named} | {:?} | {within} | {ratio} |",
+            failure.cell, failure.verdict
+        );
+    }
+    for (cell, error) in &summary.errors {
+        let _ = writeln!(text, "\n{cell}: {error}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Rate, quantile};
+
+    #[test]
+    fn wilson_intervals_are_those_of_the_formula() {
+        // Newcombe 1998, table I: 81 of 263 and 0 of 20.
+        let [low, high] = Rate { hits: 81, of: 263 }.wilson();
+        assert!((low - 0.2553).abs() < 5e-5 && (high - 0.3662).abs() < 5e-5);
+        let [low, high] = Rate { hits: 0, of: 20 }.wilson();
+        assert!(low == 0.0 && (high - 0.1611).abs() < 5e-5);
+    }
+
+    #[test]
+    fn quantiles_are_values_that_occur() {
+        let values = [3.0, 1.0, 2.0, 4.0];
+        assert_eq!(
+            [0.0, 0.5, 0.9, 1.0].map(|q| quantile(&values, q)),
+            [1.0, 2.0, 4.0, 4.0]
+        );
+        assert_eq!(quantile(&[], 0.5), 0.0);
+    }
+}

@@ -1,0 +1,77 @@
+/// What lies between a motor with an inertia of its own, which carries the encoder, and the link: a spring with
+/// play. Stiff with play it is backlash; soft without play it is joint compliance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transmission {
+    /// Free angle between the two contacts \[rad\].
+    pub play: f64,
+    /// Of the contacts \[N m/rad\].
+    pub stiffness: f64,
+    /// Of the contacts \[N m s/rad\].
+    pub damping: f64,
+    /// Of the motor, seen at the joint \[kg m^2\].
+    pub inertia: f64,
+}
+
+/// Contacts of a gear: they give way by half a milliradian under 1 N m.
+const CONTACT_STIFFNESS: f64 = 2000.0;
+/// Of the critical damping of motor and contact.
+const DAMPING_RATIO: f64 = 0.3;
+/// Reflected inertia of the rotor behind a play: that of a small geared motor.
+const ROTOR_INERTIA: f64 = 0.002;
+
+impl Transmission {
+    /// Real two-sided play of `play` rad.
+    pub fn backlash(play: f64) -> Self {
+        Self::new(play, CONTACT_STIFFNESS, ROTOR_INERTIA)
+    }
+
+    /// A soft shaft.
+    pub fn compliance(stiffness: f64, inertia: f64) -> Self {
+        Self::new(0.0, stiffness, inertia)
+    }
+
+    fn new(play: f64, stiffness: f64, inertia: f64) -> Self {
+        Self {
+            play,
+            stiffness,
+            damping: 2.0 * DAMPING_RATIO * (stiffness * inertia).sqrt(),
+            inertia,
+        }
+    }
+
+    /// Torque on the link \[N m\] when the motor is `ahead` rad and gains `gaining` rad/s; contacts push, they
+    /// never pull.
+    pub fn torque(&self, ahead: f64, gaining: f64) -> f64 {
+        let side = ahead.signum();
+        let pressed = ahead.abs() - 0.5 * self.play;
+        if self.play == 0.0 {
+            return self.stiffness * ahead + self.damping * gaining;
+        }
+        if pressed <= 0.0 {
+            return 0.0;
+        }
+        side * (self.stiffness * pressed + self.damping * side * gaining).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Transmission;
+
+    #[test]
+    fn nothing_passes_within_the_play_and_contacts_push_only() {
+        let gear = Transmission::backlash(0.01);
+        assert_eq!(gear.torque(0.0049, 5.0), 0.0);
+        assert_eq!(gear.torque(-0.0049, -5.0), 0.0);
+        assert!((gear.torque(0.0055, 0.0) - 1.0).abs() < 1e-9);
+        assert!((gear.torque(-0.0055, 0.0) + 1.0).abs() < 1e-9);
+        assert_eq!(gear.torque(0.0055, -100.0), 0.0);
+    }
+
+    #[test]
+    fn a_soft_shaft_is_a_spring_in_both_directions() {
+        let shaft = Transmission::compliance(30.0, 0.01);
+        assert!((shaft.torque(0.1, 0.0) - 3.0).abs() < 1e-12);
+        assert!((shaft.torque(-0.1, 0.0) + 3.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,167 @@
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, Subcommand};
+
+use super::{Answer, Common, inputs, progress};
+use crate::bench::{Cell, Line, hash, markdown, read, summarise};
+use crate::model::Library;
+
+/// Measure the program itself on simulated rigs
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    Effects(Effects),
+}
+
+/// Whether closing the loop names hidden effects: a grid of rigs that no part of the program knows
+///
+/// Each cell is one line of DIR/cells.jsonl; a run that is broken off goes on where it was. DIR/summary.json and
+/// DIR/table.md say how often the answer was right.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  residyn bench effects --only pendulum/coulomb --out bench-effects"
+)]
+struct Effects {
+    /// Grid file; the full one has some hundred cells, which take hours
+    #[arg(
+        long,
+        default_value = "configs/bench/effects.toml",
+        value_name = "FILE"
+    )]
+    grid: PathBuf,
+    /// Folder of the results
+    #[arg(long, default_value = "bench-effects", value_name = "DIR")]
+    out: PathBuf,
+    /// Only cells whose name contains one of these: PLANT/EFFECT@JOINT(SIZES)/CONDITION/SEED
+    #[arg(long, num_args = 1.., value_name = "TEXT")]
+    only: Vec<String>,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let What::Effects(arguments) = &arguments.what;
+    effects(arguments)
+}
+
+fn effects(arguments: &Effects) -> Result<Answer> {
+    let cells = wanted(arguments)?;
+    fs::create_dir_all(&arguments.out).with_context(|| {
+        format!(
+            "{} cannot be made; give another --out",
+            arguments.out.display()
+        )
+    })?;
+    let store = Store::open(&arguments.out)?;
+    let lines = store.run(&cells)?;
+    let summary = summarise(&lines);
+    let text = markdown(&summary);
+    let json = serde_json::to_string_pretty(&summary)? + "\n";
+    write(&arguments.out.join("summary.json"), &json)?;
+    write(&arguments.out.join("table.md"), &text)?;
+    inputs::print(if arguments.common.json { &json } else { &text })?;
+    Ok(Answer::Yes)
+}
+
+fn wanted(arguments: &Effects) -> Result<Vec<Cell>> {
+    let mut all = read(&arguments.grid)?;
+    let only = &arguments.only;
+    all.retain(|cell| only.is_empty() || only.iter().any(|text| cell.id.contains(text)));
+    if all.is_empty() {
+        bail!("no cell's name contains what --only asks for");
+    }
+    Ok(all)
+}
+
+/// The results that are there, and where new ones go.
+struct Store {
+    path: PathBuf,
+    /// Of this build of the program: another one gives other results.
+    program: String,
+    known: Vec<Line>,
+}
+
+impl Store {
+    fn open(folder: &Path) -> Result<Self> {
+        let path = folder.join("cells.jsonl");
+        let program =
+            fs::read(std::env::current_exe()?).context("the program cannot read itself")?;
+        let mut known = Vec::new();
+        if path.is_file() {
+            let lines = BufReader::new(File::open(&path)?).lines();
+            // A line that was broken off, or that another version wrote, is no result.
+            known.extend(lines.filter_map(|line| serde_json::from_str(&line.ok()?).ok()));
+        }
+        Ok(Self {
+            path,
+            program: format!("{:016x}", hash(&program)),
+            known,
+        })
+    }
+
+    /// Results of all cells, those that are there taken as they are.
+    fn run(&self, cells: &[Cell]) -> Result<Vec<Line>> {
+        let bar = progress::bar(cells.len());
+        let library = Library::built_in();
+        let mut lines = Vec::with_capacity(cells.len());
+        for cell in cells {
+            bar.set_message(cell.id.clone());
+            lines.push(match self.find(cell)? {
+                Some(line) => line,
+                None => self.add(cell, &library)?,
+            });
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(lines)
+    }
+
+    fn find(&self, cell: &Cell) -> Result<Option<Line>> {
+        let configuration = configuration(cell)?;
+        let same =
+            |line: &&Line| line.configuration == configuration && line.program == self.program;
+        Ok(self.known.iter().find(same).cloned())
+    }
+
+    fn add(&self, cell: &Cell, library: &Library) -> Result<Line> {
+        let begun = Instant::now();
+        let findings = cell.run(library).map_err(|error| format!("{error:#}"));
+        let line = Line {
+            configuration: configuration(cell)?,
+            program: self.program.clone(),
+            seconds: begun.elapsed().as_secs_f64(),
+            cell: cell.clone(),
+            findings,
+        };
+        let mut file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(&self.path)
+            .with_context(|| format!("{} cannot be written", self.path.display()))?;
+        // A line break before as well: the line before may have been broken off.
+        file.write_all(format!("\n{}\n", serde_json::to_string(&line)?).as_bytes())?;
+        Ok(line)
+    }
+}
+
+/// Of the cell and of the model file that it uses, which may change without the grid.
+fn configuration(cell: &Cell) -> Result<String> {
+    let mut bytes = serde_json::to_vec(cell)?;
+    if cell.bench.model.is_file() {
+        bytes.extend(fs::read(&cell.bench.model)?);
+    }
+    Ok(format!("{:016x}", hash(&bytes)))
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
+}
