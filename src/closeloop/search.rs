@@ -29,6 +29,14 @@ pub struct Rival {
     pub gain_of_chosen: f64,
 }
 
+impl Rival {
+    /// Whether the chosen effect is a special case of the rival.
+    pub fn contains_chosen(&self) -> bool {
+        let (own, chosen) = (&self.effect, &self.instead_of);
+        own.joint == chosen.joint && own.effect.contains.contains(&chosen.effect.name)
+    }
+}
+
 /// The outcome of the search.
 #[derive(Debug, Clone)]
 pub struct Selection {

@@ -249,7 +249,7 @@ fn alternatives(outcome: &Outcome) -> String {
             alternative.effect.effect.name,
             alternative.effect.joint + 1,
             alternative.reason,
-            alternative.experiment
+            alternative.experiment()
         );
     }
     out + "\n"
