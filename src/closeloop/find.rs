@@ -61,8 +61,9 @@ pub fn find(
         after = before.clone();
         left = unexplained(study, library.probes(), &before, &after);
     }
+    let alternatives = Alternative::of_rivals(study, rivals, &after, &mut |text| stage(3, text));
     Ok(Found {
-        alternatives: Alternative::of_rivals(rivals, &after),
+        alternatives,
         before,
         after,
         rounds,

@@ -46,6 +46,9 @@ fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
 }
 
 fn free_step(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    if right.is_empty() {
+        return right.clone();
+    }
     // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
     let scale = matrix
         .diagonal()

@@ -4,6 +4,7 @@ mod bootstrap;
 mod candidate;
 mod confirm;
 mod evidence;
+mod experiment;
 mod find;
 mod folds;
 mod learn;
@@ -19,6 +20,7 @@ mod unexplained;
 
 pub use confirm::TakenBack;
 pub use evidence::{Evidence, p_value};
+pub use experiment::Separation;
 pub use find::{Found, find};
 pub use learn::Learned;
 pub use outcome::{Alternative, Errors, Finding, Outcome, Verdict};

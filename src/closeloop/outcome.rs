@@ -1,9 +1,10 @@
 use super::confirm::TakenBack;
+use super::experiment::{Separation, separation};
 use super::learn::Learned;
 use super::residual::ForceSample;
 use super::search::{Rival, Round};
 use super::split::How;
-use super::study::Fitted;
+use super::study::{Fitted, Study};
 use super::unexplained::Unexplained;
 use crate::data::{Audit, Log};
 use crate::evaluate::Assessment;
@@ -102,8 +103,12 @@ pub struct Alternative {
     /// The one of them that the set reported does not have.
     pub effect: FittedEffect,
     pub reason: String,
-    pub experiment: String,
+    /// What would tell it from the one reported; simulated for the few best alternatives.
+    pub separation: Option<Separation>,
 }
+
+/// Experiments are simulated for so many alternatives, the best ones: each costs as much as a few fits.
+const SIMULATED: usize = 3;
 
 /// Open-loop errors on the test logs.
 pub struct Errors {
@@ -116,7 +121,13 @@ pub struct Errors {
 
 impl Alternative {
     /// The sets of effects that do as well as the one that stood; those of which a part was taken back are none.
-    pub(super) fn of_rivals(rivals: Vec<Rival>, model: &Fitted) -> Vec<Self> {
+    /// `progress` is told what is being simulated.
+    pub(super) fn of_rivals(
+        study: &Study<'_>,
+        rivals: Vec<Rival>,
+        model: &Fitted,
+        progress: &mut dyn FnMut(&str),
+    ) -> Vec<Self> {
         let stands = |effect: &FittedEffect| {
             let same = |other: &FittedEffect| other.label() == effect.label();
             model.effects.iter().any(same)
@@ -126,20 +137,20 @@ impl Alternative {
             .filter(|rival| stands(&rival.instead_of))
             .collect();
         rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        rivals.into_iter().map(Self::from).collect()
+        let mut all: Vec<Self> = Vec::new();
+        for rival in rivals {
+            let separation = (all.len() < SIMULATED).then(|| {
+                progress(&format!("simulating what tells {}", rival.effect.label()));
+                separation(study, model, &rival)
+            });
+            all.push(Self::of(rival, separation.flatten()));
+        }
+        all
     }
-}
 
-impl From<Rival> for Alternative {
-    fn from(rival: Rival) -> Self {
+    fn of(rival: Rival, separation: Option<Separation>) -> Self {
         let chosen = rival.instead_of.label();
-        let contains = rival.effect.joint == rival.instead_of.joint
-            && rival
-                .effect
-                .effect
-                .contains
-                .contains(&rival.instead_of.effect.name);
-        let reason = if contains {
+        let reason = if rival.contains_chosen() {
             format!("contains {chosen} and explains these logs no better")
         } else {
             format!(
@@ -150,10 +161,18 @@ impl From<Rival> for Alternative {
             )
         };
         Self {
-            experiment: rival.effect.effect.shown_by.clone(),
             effects: rival.model.effects,
             effect: rival.effect,
             reason,
+            separation,
         }
+    }
+
+    /// The experiment that tells, in a sentence.
+    pub fn experiment(&self) -> String {
+        self.separation.as_ref().map_or_else(
+            || "not simulated: others do as well and come first".to_owned(),
+            Separation::text,
+        )
     }
 }

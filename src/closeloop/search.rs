@@ -29,6 +29,14 @@ pub struct Rival {
     pub gain_of_chosen: f64,
 }
 
+impl Rival {
+    /// Whether the chosen effect is a special case of the rival.
+    pub fn contains_chosen(&self) -> bool {
+        let (own, chosen) = (&self.effect, &self.instead_of);
+        own.joint == chosen.joint && own.effect.contains.contains(&chosen.effect.name)
+    }
+}
+
 /// Probability of a false alarm that a look admits, over all candidates and all their starting points.
 const FALSE_ALARM: f64 = 0.05;
 /// Few stretches cannot prove so much. There an effect is admitted that takes away half of the loss on stretches

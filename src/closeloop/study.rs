@@ -24,7 +24,7 @@ pub enum StudyError {
 /// Length in s of the windows of the first fit: even a poor start does not diverge in them.
 const SHORT_S: f64 = 0.15;
 /// Length in s of the windows over which models are fitted and compared: most effects show in them.
-const WINDOW_S: f64 = 0.5;
+pub(super) const WINDOW_S: f64 = 0.5;
 
 /// Dry friction is smoothed over this share of a joint's top speed in the logs, so that the width means the
 /// same on a slow axis and on a fast arm.

@@ -115,6 +115,9 @@ const FLAT: f64 = 1e-9;
 /// The inverse of an information matrix, and what it says of flat directions alone: there the sandwich, a
 /// product of two roundings, must not pretend to know anything.
 fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    if hessian.is_empty() {
+        return (hessian.clone(), hessian.clone());
+    }
     // Unit diagonal, so that "flat" does not depend on units.
     let scale = hessian
         .diagonal()

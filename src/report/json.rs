@@ -1,6 +1,8 @@
 use serde::Serialize;
 
-use crate::closeloop::{Alternative, Finding, How, Outcome, TakenBack, Unexplained, Verdict, norm};
+use crate::closeloop::{
+    Alternative, Finding, How, Outcome, Separation, TakenBack, Unexplained, Verdict, norm,
+};
 use crate::data::Finding as AuditFinding;
 use crate::evaluate::{Assessment, Summary, summarise};
 use crate::model::{FittedEffect, OwnValue, Parameter};
@@ -69,6 +71,7 @@ struct AlternativeEntry {
     effects: Vec<EffectName>,
     reason: String,
     experiment: String,
+    separation: Option<Separation>,
 }
 
 /// An effect that was chosen and did not stand.
@@ -270,7 +273,8 @@ fn alternative(alternative: &Alternative) -> AlternativeEntry {
     AlternativeEntry {
         effects: alternative.effects.iter().map(effect_name).collect(),
         reason: alternative.reason.clone(),
-        experiment: alternative.experiment.clone(),
+        experiment: alternative.experiment(),
+        separation: alternative.separation.clone(),
     }
 }
 

@@ -252,7 +252,7 @@ fn alternatives(outcome: &Outcome) -> String {
             alternative.effect.title(),
             alternative.effect.joint + 1,
             alternative.reason,
-            alternative.experiment
+            alternative.experiment()
         );
     }
     out + "\n"

@@ -1,0 +1,56 @@
+use crate::expr::{Binary, Graph};
+use crate::model::Dynamics;
+
+/// A parameter of the declared equations that a payload raises by a known amount.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Payload {
+    /// Index of the parameter.
+    pub parameter: usize,
+    /// In the parameter's unit.
+    pub extra: f64,
+    /// Logs with the payload are this much (s) later than they would be.
+    pub delay_s: f64,
+}
+
+/// Units of what a payload adds to.
+const OF_MASS: [&str; 2] = ["kg", "kg m^2"];
+/// Share of the parameter that the payload adds.
+pub(super) const SHARE: f64 = 0.5;
+
+impl Payload {
+    /// A payload for each of the first `declared` parameters that one can add to.
+    pub fn all(dynamics: &Dynamics, values: &[f64], declared: usize, delay_s: f64) -> Vec<Self> {
+        let carries = |k: &usize| OF_MASS.contains(&dynamics.parameters[*k].unit.as_str());
+        let of = |parameter: usize| Self {
+            parameter,
+            extra: SHARE * values[parameter],
+            delay_s,
+        };
+        (0..declared).filter(carries).map(of).collect()
+    }
+
+    /// The model of a rig that carries the payload in the later logs and not in the others: one program for both, so
+    /// that one fit can use both.
+    pub fn on(&self, dynamics: &Dynamics) -> Dynamics {
+        let mut graph = Graph::new();
+        let mut inputs: Vec<_> = (dynamics.program.inputs().iter())
+            .map(|name| graph.input(name))
+            .collect();
+        let (time, parameter) = (
+            3 * dynamics.joints,
+            3 * dynamics.joints + 1 + self.parameter,
+        );
+        let switch = graph.constant(0.5 * self.delay_s);
+        let carried = graph.binary(Binary::Less, switch, inputs[time]);
+        for (input, change) in [(time, -self.delay_s), (parameter, self.extra)] {
+            let change = graph.constant(change);
+            let changed = graph.add(inputs[input], change);
+            inputs[input] = graph.select(carried, changed, inputs[input]);
+        }
+        let outputs = graph.append(&dynamics.program, &inputs);
+        Dynamics {
+            program: graph.finish(&outputs),
+            ..dynamics.clone()
+        }
+    }
+}
