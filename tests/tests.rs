@@ -3,6 +3,7 @@
 // In tests a panic is the message.
 #![allow(clippy::unwrap_used)]
 
+mod against;
 mod bad_input;
 mod clients;
 mod common;
@@ -18,5 +19,6 @@ mod parity;
 mod physics;
 mod printers;
 mod recipes;
+mod rigs;
 mod support;
 mod train;

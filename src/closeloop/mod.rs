@@ -3,6 +3,7 @@
 mod bootstrap;
 mod candidate;
 mod confirm;
+mod contradicted;
 mod evidence;
 mod find;
 mod folds;
@@ -17,10 +18,11 @@ mod study;
 mod unexplained;
 
 pub use confirm::TakenBack;
+pub use contradicted::Contradicted;
 pub use evidence::{Evidence, p_value};
 pub use find::{Found, find};
 pub use learn::Learned;
-pub use outcome::{Alternative, Errors, Finding, Outcome, Verdict};
+pub use outcome::{Alternative, Contender, Errors, Finding, Outcome, Verdict};
 pub use residual::{ForceSample, norm, residual_force};
 pub use run::{Request, STAGES, Stage, close_loop};
 pub use search::{MOST_EFFECTS, Rival, Round, Selection, select};
