@@ -3,6 +3,7 @@
 // In tests a panic is the message.
 #![allow(clippy::unwrap_used)]
 
+mod against;
 mod bad_input;
 mod clients;
 mod common;
@@ -20,6 +21,7 @@ mod per_log;
 mod physics;
 mod printers;
 mod recipes;
+mod rigs;
 mod shift;
 mod support;
 mod train;

@@ -14,7 +14,6 @@ use crate::closeloop::{Finding, Outcome, Request, Split, Study, StudyError, clos
 use crate::data::Log;
 use crate::evaluate::{Assessment, assess};
 use crate::model::{FittedEffect, Library, Parameter, System};
-use crate::train::Backend;
 
 /// Errors are compared at the middle one \[s\].
 const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
@@ -112,7 +111,8 @@ fn close(
         library,
         split,
         horizons_s: HORIZONS_S,
-        backend: Backend::default(),
+        against: Vec::new(),
+        backend: None,
     };
     close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &mut |_| ())
 }

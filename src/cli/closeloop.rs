@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Answer, Common, inputs, progress};
-use crate::closeloop::{Outcome, Request, STAGES, Split, Verdict, close_loop};
+use crate::closeloop::{Contender, Outcome, Request, STAGES, Split, Verdict, close_loop};
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, System};
 use crate::plant::Plant;
@@ -18,7 +18,7 @@ use crate::train::Origin;
 /// Without arguments: a simulated demo rig whose logs carry an effect that its model does not declare.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report"
+    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report\n  residyn closeloop --model pendulum --train run1.csv --test run3.csv --against published.toml old/model.toml"
 )]
 pub(super) struct Arguments {
     /// Model file, or the name of a built-in system
@@ -30,6 +30,9 @@ pub(super) struct Arguments {
     /// Logs to judge by; without them, the last logs or the end of each are set apart
     #[arg(long, num_args = 1.., value_name = "LOG", requires = "train")]
     test: Vec<PathBuf>,
+    /// Other models of the same rig to score as they are, without a fit: files or names of built-in systems
+    #[arg(long, num_args = 1.., value_name = "MODEL")]
+    against: Vec<PathBuf>,
     /// Folder for report.json, report.md, model.toml, plots and checkpoint
     #[arg(long, default_value = "closeloop-report", value_name = "DIR")]
     out: PathBuf,
@@ -54,6 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         Some(model) => measured(arguments, model, &library)?,
         None => demo(&library, &mut rng)?,
     };
+    let against = contenders(&arguments.against, &system, &library)?;
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
@@ -63,8 +67,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         system: &system,
         library: &library,
         split,
+        against,
         horizons_s: HORIZONS_S,
-        backend: arguments.common.device,
+        backend: Some(arguments.common.device),
     };
     let outcome = close_loop(request, &mut rng, &mut |stage| {
         bar.set_position(stage.number as u64);
@@ -109,6 +114,34 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
     Ok((library.system(Path::new("pendulum"))?, Split::of(logs)))
 }
 
+/// Models that predict the same joints, in the same units.
+fn contenders(paths: &[PathBuf], system: &System, library: &Library) -> Result<Vec<Contender>> {
+    let contender = |path: &PathBuf| {
+        let other = library.system(path)?;
+        if other.prismatic != system.prismatic {
+            bail!(
+                "--against {}: it has {}, {} has {}; give models of the same rig",
+                path.display(),
+                joints(&other),
+                system.name,
+                joints(system)
+            );
+        }
+        Ok(Contender {
+            name: path.display().to_string(),
+            dynamics: other.dynamics(&other.sign()),
+        })
+    };
+    paths.iter().map(contender).collect()
+}
+
+/// `2 joint(s) (slide, turn)`
+fn joints(system: &System) -> String {
+    let kind = |slides: &bool| if *slides { "slide" } else { "turn" };
+    let kinds: Vec<&str> = system.prismatic.iter().map(kind).collect();
+    format!("{} joint(s) ({})", system.joints, kinds.join(", "))
+}
+
 fn origin(arguments: &Arguments, system: &System) -> Origin {
     let paths = |paths: &[PathBuf]| {
         paths
@@ -126,6 +159,7 @@ fn origin(arguments: &Arguments, system: &System) -> Origin {
             "model": arguments.model.as_ref().map(|p| p.display().to_string()),
             "train": paths(&arguments.train),
             "test": paths(&arguments.test),
+            "against": paths(&arguments.against),
             "leave_out": spans.collect::<Vec<_>>(),
             "effects": paths(&arguments.effects),
             "device": arguments.common.device.name(),

@@ -3,6 +3,7 @@
 mod bootstrap;
 mod candidate;
 mod confirm;
+mod contradicted;
 mod evidence;
 mod experiment;
 mod find;
@@ -19,11 +20,12 @@ mod study;
 mod unexplained;
 
 pub use confirm::TakenBack;
+pub use contradicted::Contradicted;
 pub use evidence::{Evidence, p_value};
 pub use experiment::Separation;
 pub use find::{Found, find};
 pub use learn::Learned;
-pub use outcome::{Alternative, Errors, Finding, Outcome, Verdict};
+pub use outcome::{Alternative, Contender, Errors, Finding, Outcome, Verdict};
 pub use per_log::values_on;
 pub use residual::{ForceSample, norm, residual_force};
 pub use run::{Request, STAGES, Stage, close_loop};

@@ -1,4 +1,5 @@
 use super::confirm::TakenBack;
+use super::contradicted::Contradicted;
 use super::experiment::{Separation, separation};
 use super::learn::Learned;
 use super::residual::ForceSample;
@@ -9,7 +10,7 @@ use super::unexplained::Unexplained;
 use crate::data::{Audit, Log};
 use crate::evaluate::Assessment;
 use crate::identify::Identifiability;
-use crate::model::{FittedEffect, OwnValue, Parameter};
+use crate::model::{Dynamics, FittedEffect, OwnValue, Parameter};
 
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -39,6 +40,8 @@ pub struct Outcome {
     pub identifiability: Identifiability,
     pub before: Fitted,
     pub after: Fitted,
+    /// Values in the model file that the fit of `before` contradicts.
+    pub contradicted: Vec<Contradicted>,
     /// All parameters of `after`, with their intervals.
     pub parameters: Vec<Parameter>,
     pub findings: Vec<Finding>,
@@ -110,11 +113,24 @@ pub struct Alternative {
 /// Experiments are simulated for so many alternatives, the best ones: each costs as much as a few fits.
 const SIMULATED: usize = 3;
 
+/// A model that is scored as it is, beside those that are fitted.
+#[derive(Debug, Clone)]
+pub struct Contender {
+    /// As the user calls it.
+    pub name: String,
+    /// With the same joints as the declared model.
+    pub dynamics: Dynamics,
+}
+
 /// Open-loop errors on the test logs.
 pub struct Errors {
+    /// The declared model with the values in its file, before any fit.
+    pub declared: Assessment,
     pub before: Assessment,
     pub after: Assessment,
     pub hybrid: Option<Assessment>,
+    /// Other models as they are, by name.
+    pub against: Vec<(String, Assessment)>,
     /// 95 % interval of the relative reduction of the position error, before to after.
     pub reduction_ci95: Option<[f64; 2]>,
 }

@@ -1,11 +1,12 @@
 use rand_chacha::ChaCha8Rng;
 
 use super::bootstrap::reduction_interval;
+use super::contradicted::contradicted;
 use super::evidence::{p_of_gains, p_value};
 use super::find::{Found, find};
 use super::folds::{folds, left_out_losses};
 use super::learn::learn_residual;
-use super::outcome::{Errors, Finding, Outcome, Verdict};
+use super::outcome::{Contender, Errors, Finding, Outcome, Verdict};
 use super::per_log::take_over_intervals;
 use super::residual::residual_force;
 use super::split::Split;
@@ -22,9 +23,12 @@ pub struct Request<'a> {
     pub system: &'a System,
     pub library: &'a Library,
     pub split: Split,
+    /// Models to score as they are on the same test logs.
+    pub against: Vec<Contender>,
     /// Horizons of the reported errors in s; the effect of an effect is reported at the middle one.
     pub horizons_s: [f64; 3],
-    pub backend: Backend,
+    /// Where the residual network is trained; without one there is none.
+    pub backend: Option<Backend>,
 }
 
 /// Where the work stands, for a progress display.
@@ -59,6 +63,7 @@ pub fn close_loop(
         system,
         library,
         split,
+        against,
         horizons_s,
         backend,
     } = request;
@@ -85,9 +90,12 @@ pub fn close_loop(
     });
     let residual_before = residual_force(&study, &before);
     let residual_after = residual_force(&study, &after);
-    let learned = learn_residual(&study, &after, backend, rng, &mut |text| {
-        progress(Stage { number: 4, text });
-    })?;
+    let learned = match backend {
+        Some(backend) => learn_residual(&study, &after, backend, rng, &mut |text| {
+            progress(Stage { number: 4, text });
+        })?,
+        None => None,
+    };
     progress(Stage {
         number: 5,
         text: "open-loop errors",
@@ -103,16 +111,21 @@ pub fn close_loop(
             &horizons_s,
         )
     };
-    let hybrid = learned.as_ref().map(|learned| learned.hybrid.clone());
-    let errors = errors(
-        &before,
-        &after,
-        hybrid.as_ref(),
-        judge,
-        &split,
-        &horizons_s,
-        rng,
-    );
+    let as_written = system.dynamics(&system.sign());
+    let judge_as_is = |model: &Dynamics| {
+        let values = model.values();
+        assess(model, |_| &values, &split.test, &horizons_s)
+    };
+    let scored = |other: &Contender| (other.name.clone(), judge_as_is(&other.dynamics));
+    let (error_before, error_after) = (judge(&before), judge(&after));
+    let errors = Errors {
+        declared: judge_as_is(&as_written),
+        hybrid: learned.as_ref().map(|model| judge_as_is(&model.hybrid)),
+        against: against.iter().map(scored).collect(),
+        reduction_ci95: reduction_interval(error_before.middle(), error_after.middle(), rng),
+        before: error_before,
+        after: error_after,
+    };
     let parameters = with_intervals(&study, &after);
     let findings = findings(&study, &after, &parameters, &errors.after, judge);
     let (verdict, reason) = verdict(&study, &after, &left, &errors);
@@ -127,6 +140,7 @@ pub fn close_loop(
         alternatives,
         taken_back,
         confirmed_on,
+        contradicted: contradicted(&as_written.values(), &with_intervals(&study, &before)),
         before,
         after,
         parameters,
@@ -140,25 +154,6 @@ pub fn close_loop(
         train: split.train.clone(),
         test: split.test,
     })
-}
-
-fn errors(
-    before: &Fitted,
-    after: &Fitted,
-    hybrid: Option<&Dynamics>,
-    judge: impl Fn(&Fitted) -> Assessment,
-    split: &Split,
-    horizons_s: &[f64],
-    rng: &mut ChaCha8Rng,
-) -> Errors {
-    let (before, after) = (judge(before), judge(after));
-    let values = hybrid.map(Dynamics::values).unwrap_or_default();
-    Errors {
-        hybrid: hybrid.map(|model| assess(model, |_| &values, &split.test, horizons_s)),
-        reduction_ci95: reduction_interval(before.middle(), after.middle(), rng),
-        before,
-        after,
-    }
 }
 
 /// Fitted values with their 95 % intervals; parameters that were not free have none.

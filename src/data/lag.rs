@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use super::projection::{dot, free_of, orthonormal};
+
 /// How far one series trails another, and how well they agree there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lag {
@@ -65,35 +67,6 @@ fn parabola_peak([before, middle, after]: [f64; 3]) -> f64 {
     }
 }
 
-/// Columns of unit length at right angles that span the same space; those that the others span
-/// already are dropped.
-fn orthonormal(columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
-    let mut basis: Vec<Vec<f64>> = vec![];
-    for column in columns {
-        basis.extend(free_of(&basis, &column));
-    }
-    basis
-}
-
-/// The part of a series at right angles to an orthonormal basis, scaled to unit length; `None` if
-/// nothing but rounding is left.
-fn free_of(basis: &[Vec<f64>], series: &[f64]) -> Option<Vec<f64>> {
-    let whole = dot(series, series).sqrt();
-    let mut rest = series.to_vec();
-    for column in basis {
-        let share = dot(column, &rest);
-        rest.iter_mut()
-            .zip(column)
-            .for_each(|(value, c)| *value -= share * c);
-    }
-    let length = dot(&rest, &rest).sqrt();
-    if length <= 1e-6 * whole {
-        return None;
-    }
-    rest.iter_mut().for_each(|value| *value /= length);
-    Some(rest)
-}
-
 /// Correlation of a series with an `effect` that is already free of the basis and of unit length. The
 /// series itself need not be freed: only the length of what would remain is asked for.
 fn correlation(basis: &[Vec<f64>], effect: &[f64], series: &[f64]) -> f64 {
@@ -104,10 +77,6 @@ fn correlation(basis: &[Vec<f64>], effect: &[f64], series: &[f64]) -> f64 {
         return 0.0;
     }
     dot(effect, series) / rest.sqrt()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

@@ -24,6 +24,14 @@ pub struct LocalCubic {
 }
 
 impl LocalCubic {
+    /// The frequency above which the value loses more than 3 dB of what was logged \[Hz\].
+    ///
+    /// The value is the mean over s = -1..1 with the weight (9 - 15 s^2) / 8, whose transform falls to 0.707 at
+    /// 3.34 rad a half width: 3.34 / (2 pi) = 0.53.
+    pub(super) fn cutoff_hz(half_width_s: f64) -> f64 {
+        0.53 / half_width_s
+    }
+
     /// Standard deviation of the slope per standard deviation of white noise on the values \[1/s\],
     /// for about `rows` evenly spread rows within `half_width_s` on either side.
     ///
@@ -137,6 +145,15 @@ mod tests {
         let gap = [0.0, 0.001, 0.5, 1.0, 1.001];
         assert!(!fits(&gap, 2));
         assert!(!fits(&[0.0, 1.0], 0));
+    }
+
+    #[test]
+    fn a_wave_at_the_cutoff_keeps_seven_tenths() {
+        let time: Vec<f64> = (0..401).map(|i| i as f64 * 0.001).collect();
+        let omega = std::f64::consts::TAU * LocalCubic::cutoff_hz(0.05);
+        let wave: Vec<f64> = time.iter().map(|t| (omega * (t - 0.2)).cos()).collect();
+        let kept = local_cubic(&time, &wave, 200, 0.05).unwrap().value;
+        assert!((kept - 0.707).abs() < 0.02, "{kept}");
     }
 
     #[test]

@@ -15,12 +15,14 @@ mod lag;
 pub mod leave_out;
 mod local_cubic;
 mod log;
+mod projection;
 mod read;
 mod signal;
 mod trajectory;
 
 pub use audit::{
-    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueLag, VelocityCheck, audit,
+    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueDemand, TorqueLag,
+    VelocityCheck, audit,
 };
 pub use columns::Columns;
 pub use error::{CellFault, LogError};

@@ -1,7 +1,8 @@
 use serde::Serialize;
 
 use crate::closeloop::{
-    Alternative, Finding, How, Outcome, Separation, TakenBack, Unexplained, Verdict, norm,
+    Alternative, Contradicted, Finding, How, Outcome, Separation, TakenBack, Unexplained, Verdict,
+    norm,
 };
 use crate::data::Finding as AuditFinding;
 use crate::evaluate::{Assessment, Summary, summarise};
@@ -26,6 +27,7 @@ pub struct Report {
     confirmed_on: usize,
     unexplained: UnexplainedEntry,
     parameters: Vec<ParameterEntry>,
+    contradicted: Vec<ContradictedEntry>,
     identifiability: IdentifiabilityEntry,
     error: ErrorEntry,
     residual_norm: NormEntry,
@@ -55,6 +57,14 @@ struct ParameterEntry {
     ci95: Option<[f64; 2]>,
     unit: String,
     identifiable: bool,
+}
+
+/// A value in the model file outside of the interval of the declared model's fit.
+#[derive(Debug, Serialize)]
+struct ContradictedEntry {
+    declared: f64,
+    #[serde(flatten)]
+    fitted: ParameterEntry,
 }
 
 #[derive(Debug, Serialize)]
@@ -104,11 +114,21 @@ struct IdentifiabilityEntry {
 struct ErrorEntry {
     logs: &'static str,
     horizons_s: Vec<f64>,
+    declared: ModelError,
     before: ModelError,
     after: ModelError,
     hybrid: Option<ModelError>,
+    against: Vec<ContenderEntry>,
     reduction_ci95: Option<[f64; 2]>,
     integrator_step_s: f64,
+}
+
+/// A model that was scored as it is.
+#[derive(Debug, Serialize)]
+struct ContenderEntry {
+    name: String,
+    #[serde(flatten)]
+    error: ModelError,
 }
 
 #[derive(Debug, Serialize)]
@@ -196,6 +216,7 @@ impl Report {
                 .iter()
                 .map(parameter)
                 .collect(),
+            contradicted: outcome.contradicted.iter().map(contradicted).collect(),
             identifiability: identifiability(outcome),
             error: errors(outcome),
             residual_norm: NormEntry {
@@ -254,6 +275,13 @@ fn parameter(parameter: &Parameter) -> ParameterEntry {
     }
 }
 
+fn contradicted(contradicted: &Contradicted) -> ContradictedEntry {
+    ContradictedEntry {
+        declared: contradicted.declared,
+        fitted: parameter(&contradicted.fitted),
+    }
+}
+
 fn effect_name(effect: &FittedEffect) -> EffectName {
     EffectName {
         name: effect.effect.name.clone(),
@@ -306,13 +334,19 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
 fn errors(outcome: &Outcome) -> ErrorEntry {
     let joints = outcome.after.dynamics.joints;
     let model = |assessment: &Assessment| model_error(summarise(&assessment.horizons, joints));
+    let contender = |(name, assessment): &(String, Assessment)| ContenderEntry {
+        name: name.clone(),
+        error: model(assessment),
+    };
     let errors = &outcome.errors;
     ErrorEntry {
         logs: "test",
         horizons_s: errors.before.horizons.iter().map(|h| h.horizon_s).collect(),
+        declared: model(&errors.declared),
         before: model(&errors.before),
         after: model(&errors.after),
         hybrid: errors.hybrid.as_ref().map(model),
+        against: errors.against.iter().map(contender).collect(),
         reduction_ci95: errors.reduction_ci95,
         integrator_step_s: errors.before.step_s.min(errors.after.step_s),
     }

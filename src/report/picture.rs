@@ -2,7 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::plot::{ErrorRow, JointKind, Panel, PlotError, Role, ShapePanel, ShapeSample, Track};
+use super::plot::{
+    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapePanel, ShapeSample, Track,
+};
 use crate::closeloop::{ForceSample, Outcome};
 use crate::data::Log;
 use crate::evaluate::{Assessment, summarise, traces};
@@ -137,25 +139,38 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
     super::plot::residual_shape(&panels, "What the model lacks, before and after")
 }
 
-/// Open-loop errors at each horizon.
+/// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
+/// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     let joints = outcome.after.dynamics.joints;
-    let numbers = |assessment: &Assessment| summarise(&assessment.horizons, joints).position_rmse;
-    let (before, after) = (
-        numbers(&outcome.errors.before),
-        numbers(&outcome.errors.after),
-    );
-    let hybrid = outcome.errors.hybrid.as_ref().map(numbers);
+    let errors = &outcome.errors;
+    let named = |role: Role, label: &str, model: &Assessment| {
+        let rmse = summarise(&model.horizons, joints).position_rmse;
+        (role, label.to_owned(), rmse)
+    };
+    let mut models = vec![
+        named(Role::Before, "before: declared model", &errors.before),
+        named(Role::After, "after: with the effects found", &errors.after),
+    ];
+    let hybrid = errors.hybrid.iter();
+    models.extend(hybrid.map(|m| named(Role::Hybrid, "hybrid: with a network for the rest", m)));
+    let others = errors.against.iter().enumerate();
+    models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
     let row = |joint: usize, h: usize| ErrorRow {
         joint: joint + 1,
         kind: kind(outcome, joint),
-        horizon_s: outcome.errors.before.horizons[h].horizon_s,
-        before: Some(before[h][joint]),
-        after: Some(after[h][joint]),
-        hybrid: hybrid.as_ref().map(|hybrid| hybrid[h][joint]),
+        horizon_s: errors.before.horizons[h].horizon_s,
+        bars: models
+            .iter()
+            .map(|(role, label, rmse)| Bar {
+                role: *role,
+                label: label.clone(),
+                error: rmse[h][joint],
+            })
+            .collect(),
     };
     let rows: Vec<ErrorRow> = (0..joints)
-        .flat_map(|joint| (0..before.len()).map(move |h| (joint, h)))
+        .flat_map(|joint| (0..errors.before.horizons.len()).map(move |h| (joint, h)))
         .map(|(j, h)| row(j, h))
         .collect();
     super::plot::error_bars(&rows, "Open-loop position error on the test logs")

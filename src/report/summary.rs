@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use super::text::{headline, small, values};
 use crate::closeloop::Outcome;
-use crate::evaluate::{Assessment, summarise};
+use crate::evaluate::{Assessment, Summary, summarise};
 
 /// The answer for a terminal: a few lines, and where the rest is.
 pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
@@ -45,6 +45,30 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             );
         }
     }
+    let declared = ("declared model as written", &outcome.errors.declared);
+    let against = outcome.errors.against.iter();
+    let as_they_are = std::iter::once(declared).chain(against.map(|(name, m)| (name.as_str(), m)));
+    for (name, model) in as_they_are {
+        let _ = writeln!(out, "  {name}, no fit: {}", errors(outcome, model));
+    }
     let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
     out
+}
+
+/// `joint 1 0.00942, 0.157, 0.375 rad at 0.1, 0.5, 1 s`
+fn errors(outcome: &Outcome, model: &Assessment) -> String {
+    let joints = outcome.after.dynamics.joints;
+    let Summary {
+        horizons_s,
+        position_rmse,
+        ..
+    } = summarise(&model.horizons, joints);
+    let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(", ");
+    let joint = |j: usize| {
+        let unit = if outcome.prismatic[j] { "m" } else { "rad" };
+        let errors = list(&mut position_rmse.iter().map(|row| small(row[j])));
+        format!("joint {} {errors} {unit}", j + 1)
+    };
+    let seconds = list(&mut horizons_s.iter().map(f64::to_string));
+    format!("{} at {seconds} s", list(&mut (0..joints).map(joint)))
 }

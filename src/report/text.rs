@@ -13,6 +13,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
         confirmed(outcome),
         errors(outcome),
         parameters(outcome),
+        contradicted(outcome),
         alternatives(outcome),
         left(outcome),
         tried(outcome),
@@ -109,6 +110,11 @@ pub(super) fn values(finding: &Finding) -> Vec<String> {
 
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
 fn value(parameter: &Parameter) -> String {
+    format!("{} = {}", parameter.name, amount(parameter))
+}
+
+/// `0.1598 N m (0.1593 to 0.1603)`
+fn amount(parameter: &Parameter) -> String {
     let digits = parameter
         .ci95
         .map_or(1e-4 * parameter.value.abs(), |[low, high]| {
@@ -124,15 +130,14 @@ fn value(parameter: &Parameter) -> String {
         || " (not fitted)".to_owned(),
         |[low, high]| format!(" ({} to {})", number(low), number(high)),
     );
-    format!(
-        "{} = {}{unit}{interval}",
-        parameter.name,
-        number(parameter.value)
-    )
+    number(parameter.value) + &unit + &interval
 }
 
 /// As many digits as the resolution is worth.
 fn rounded(x: f64, resolution: f64) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
     let resolution = resolution.max(1e-9 * x.abs()).max(1e-12);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12
     let digits = (-resolution.log10()).ceil().clamp(0.0, 12.0) as usize;
@@ -149,49 +154,64 @@ fn probability(p: f64) -> String {
     }
 }
 
-fn errors(outcome: &Outcome) -> String {
+/// Every model that was scored on the test logs, with its name in a table.
+fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
+    let errors = &outcome.errors;
+    let mut models = vec![
+        ("declared model as written", &errors.declared),
+        ("declared model, fitted", &errors.before),
+        ("with effects", &errors.after),
+    ];
+    let hybrid = errors.hybrid.iter();
+    models.extend(hybrid.map(|m| ("with effects and network", m)));
+    models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
     let joints = outcome.after.dynamics.joints;
-    let (before, after) = (
-        summarise(&outcome.errors.before.horizons, joints),
-        summarise(&outcome.errors.after.horizons, joints),
+    models
+        .into_iter()
+        .map(|(name, model)| (name, summarise(&model.horizons, joints)))
+        .collect()
+}
+
+fn errors(outcome: &Outcome) -> String {
+    let models = scored(outcome);
+    let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
+    let mut out = format!(
+        "## Open-loop error on the test logs\n\nRoot mean square of the position error; in brackets the median over windows.{}\n\n\
+         | horizon | joint | windows | {} | after / before |\n|---|---|---|{}---|\n",
+        if outcome.errors.against.is_empty() {
+            ""
+        } else {
+            " Models after those with effects are other files, scored as they are."
+        },
+        names.join(" | "),
+        "---|".repeat(names.len())
     );
-    let hybrid = outcome
-        .errors
-        .hybrid
-        .as_ref()
-        .map(|h| summarise(&h.horizons, joints));
-    let mut out = String::from(
-        "## Open-loop error on the test logs\n\nRoot mean square of the position error; in brackets the median over windows.\n\n\
-         | horizon | joint | windows | declared model, fitted | with effects | with effects and network | after / before |\n|---|---|---|---|---|---|---|\n",
-    );
+    let (before, after) = (&models[1].1, &models[2].1);
     for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for j in 0..joints {
-            let cell = |s: &Summary| {
-                format!(
-                    "{} ({})",
-                    small(s.position_rmse[h][j]),
-                    small(s.position_median[h][j])
-                )
+        for j in 0..outcome.after.dynamics.joints {
+            let rmse = |s: &Summary| s.position_rmse[h][j];
+            let cell = |(_, s): &(&str, Summary)| {
+                format!("{} ({})", small(rmse(s)), small(s.position_median[h][j]))
             };
-            let ratio =
-                after.position_rmse[h][j] / before.position_rmse[h][j].max(f64::MIN_POSITIVE);
+            let cells: Vec<String> = models.iter().map(cell).collect();
             let _ = writeln!(
                 out,
-                "| {horizon} s | {} | {} | {} | {} | {} | {ratio:.2} |",
+                "| {horizon} s | {} | {} | {} | {:.2} |",
                 j + 1,
                 before.windows[h],
-                cell(&before),
-                cell(&after),
-                hybrid.as_ref().map_or_else(|| "-".to_owned(), cell)
+                cells.join(" | "),
+                rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
             );
         }
     }
-    let diverged: usize = before.diverged.iter().chain(&after.diverged).sum();
-    if diverged > 0 {
-        let _ = writeln!(
-            out,
-            "\n{diverged} windows diverged; they count with the error they had reached."
-        );
+    for (name, model) in &models {
+        let diverged: usize = model.diverged.iter().sum();
+        if diverged > 0 {
+            let _ = writeln!(
+                out,
+                "\n{name}: {diverged} windows diverged; they count with the error they had reached."
+            );
+        }
     }
     if let Some([low, high]) = outcome.errors.reduction_ci95 {
         let _ = writeln!(
@@ -238,6 +258,36 @@ fn parameters(outcome: &Outcome) -> String {
         );
     }
     out + "\n"
+}
+
+/// Why the numbers in the file do not predict these logs, parameter by parameter.
+fn contradicted(outcome: &Outcome) -> String {
+    if outcome.contradicted.is_empty() {
+        return String::new();
+    }
+    let errors = &outcome.errors;
+    let (written, fitted) = (errors.declared.position_rms(), errors.before.position_rms());
+    let mut out = format!(
+        "## Declared values that these logs contradict\n\nWith the values in its file the declared model is off by {} on the test \
+         logs at {} s (root mean square over the joints); its equations with the values fitted to the training logs by {}: \
+         {:.2} of that. Outside of the fitted 95 % intervals lie:\n\n",
+        small(written),
+        errors.before.middle().horizon_s,
+        small(fitted),
+        fitted / written.max(f64::MIN_POSITIVE)
+    );
+    for one in &outcome.contradicted {
+        let _ = writeln!(
+            out,
+            "- {}: declared {}, fitted {}: {}",
+            one.fitted.name,
+            one.declared,
+            amount(&one.fitted),
+            one.comparison()
+        );
+    }
+    out + "\nmodel.toml holds the fitted values. Where the declared ones come from another log, `residyn audit` says what that \
+           log is good for; where they come from a drawing, look for a unit, a gear ratio or a torque constant.\n\n"
 }
 
 fn alternatives(outcome: &Outcome) -> String {

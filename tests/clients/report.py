@@ -20,11 +20,12 @@ faults = [f"{fault.json_path}: {fault.message}" for fault in validator(schema).i
 assert not faults, "\n".join(faults)
 
 horizons, joints = len(report["error"]["horizons_s"]), report["joints"]
-for model in ("before", "after", "hybrid"):
+named = {name: report["error"][name] or {} for name in ("declared", "before", "after", "hybrid")}
+for name, error in [*named.items(), *((other["name"], other) for other in report["error"]["against"])]:
     for measure in ("position_rmse", "position_median", "velocity_rmse"):
-        rows = (report["error"][model] or {}).get(measure)
+        rows = error.get(measure)
         if rows is not None:
-            assert [len(row) for row in rows] == [joints] * horizons, f"shape of error.{model}.{measure}"
+            assert [len(row) for row in rows] == [joints] * horizons, f"shape of {measure} of {name}"
 
 for name in ("model", "report", "checkpoint"):
     file = report["files"][name]

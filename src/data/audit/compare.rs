@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use super::channel::{Channel, SPIKE_MADS, SPIKE_RESOLUTION_STEPS, SPIKE_SHARE_OF_RANGE};
 use super::motion::Motion;
+use super::regressors::regressors;
 use crate::data::lag::{Lag, lag};
+use crate::data::projection::{explained_by, orthonormal};
 use crate::data::signal::{SIGMA_PER_MAD, interpolate, mad, median, resample};
 
 /// The longest lag looked for \[s\]. Filters and buses of real rigs stay below 40 ms; a longer search
@@ -14,6 +16,10 @@ pub const MAX_LAG_S: f64 = 0.05;
 /// Below this correlation of acceleration and torque, the lag between them means little: on measured
 /// logs of one rig it scattered by several steps.
 const MIN_TORQUE_CORRELATION: f64 = 0.5;
+
+/// Where gravity, friction and the other joints explain all but this share of an acceleration, what is left is the
+/// error of that explanation and shows lags that are none: a single sine is the usual case.
+const MIN_UNEXPLAINED: f64 = 0.02;
 
 /// An acceleration cannot come before its torque but for the time stamps, which are off by less than
 /// this many samples. A controller's torque does trail the motion, which is not what is asked.
@@ -148,24 +154,15 @@ pub(super) fn torque_lag(
     step_s: f64,
 ) -> Option<TorqueLag> {
     let uniform = |values: &[f64]| resample(&motions[joint].time, values, lag_step_s(step_s));
-    let mut basis = vec![vec![1.0; uniform(&motions[joint].q).len()]];
-    for (other, motion) in motions.iter().enumerate() {
-        let angle = uniform(&motion.q);
-        let velocity = uniform(&motion.velocity);
-        // Smooth over a tenth of the working speed, as a jump would be a feature of the noise at rest.
-        let width = 0.1 * fast_rad_s[other] + f64::MIN_POSITIVE;
-        basis.push(velocity.iter().map(|v| (v / width).tanh()).collect());
-        basis.push(angle.iter().map(|q| q.sin()).collect());
-        basis.push(angle.iter().map(|q| q.cos()).collect());
-        basis.push(velocity);
-        if other != joint {
-            basis.push(uniform(&motion.acceleration));
-        }
-    }
+    let columns = regressors(motions, fast_rad_s, joint);
+    let basis: Vec<Vec<f64>> = columns.iter().map(|column| uniform(column)).collect();
     let (tau, acceleration) = (
         uniform(&motions[joint].tau),
         uniform(&motions[joint].acceleration),
     );
+    if unexplained_share(&basis, &acceleration) < MIN_UNEXPLAINED {
+        return None;
+    }
     let found = lag(
         &tau,
         &acceleration,
@@ -177,6 +174,16 @@ pub(super) fn torque_lag(
         lag_s: found.samples * lag_step_s(step_s) - 0.5 * step_s,
         correlation: found.correlation,
     })
+}
+
+/// Share of a series' variance that the columns do not explain; the first of them is a constant.
+fn unexplained_share(columns: &[Vec<f64>], series: &[f64]) -> f64 {
+    let left = |columns: &[Vec<f64>]| {
+        let part = explained_by(&orthonormal(columns.iter().cloned()), series);
+        let rest = series.iter().zip(part).map(|(all, part)| all - part);
+        rest.map(|x| x * x).sum::<f64>()
+    };
+    left(columns) / left(&columns[..1]).max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]
@@ -266,6 +273,20 @@ mod tests {
                 "{delay}: {found:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_motion_that_gravity_explains_shows_no_torque_lag() {
+        let mut log = swing();
+        // A small swing alone: its acceleration is that of a spring, whatever the torque does.
+        let over = |f: &dyn Fn(f64) -> f64| log.time.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+        let (q, qd) = (
+            over(&|t| 0.1 * (5.0 * t).sin()),
+            over(&|t| 0.5 * (5.0 * t).cos()),
+        );
+        let tau = over(&|t| (5.0 * t - 0.1).cos() + 0.1 * (15.0 * t - 0.3).cos());
+        (log.q[0], log.qd[0], log.tau[0]) = (q, qd, tau);
+        assert_eq!(joint(&log).torque_lag, None);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::channel::{Channel, isolated_spikes};
 use super::compare::{Speeds, TorqueLag, VelocityCheck, torque_lag, velocity_check};
+use super::demand::{TorqueDemand, torque_demand};
 use super::motion::Motion;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
 use crate::data::log::Log;
@@ -11,6 +12,10 @@ use crate::data::signal::quantile;
 
 /// Slower than this share of the fast speed counts as rest.
 const REST_SHARE_OF_FAST: f64 = 0.01;
+
+/// Torque and acceleration are compared after smoothing over this on either side \[s\]: accelerations from an encoder
+/// of a few mrad are mostly noise over less.
+const SLOW_S: f64 = 0.05;
 
 /// One joint of a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,6 +34,8 @@ pub struct JointAudit {
     /// How the acceleration trails the torque; `None` where the torque is constant, or too little of
     /// the acceleration follows it to tell.
     pub torque_lag: Option<TorqueLag>,
+    /// How the torque compares with what the motion needs; `None` where it is constant or the log is too short.
+    pub torque_demand: Option<TorqueDemand>,
     /// How often the motion changes direction, jitter about rest not counted.
     pub reversals: usize,
     /// Share of the rows at rest: slower than 1 % of the fast speed, or than three standard deviations
@@ -45,21 +52,27 @@ pub struct JointAudit {
 
 /// Audits every joint of a log.
 pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
-    let motions: Vec<Motion> = (0..log.joints())
-        .map(|joint| Motion::of(log, joint))
-        .collect();
+    let smoothed = |half_width_s: f64| -> Vec<Motion> {
+        (0..log.joints())
+            .map(|joint| Motion::of(log, joint, half_width_s))
+            .collect()
+    };
+    let motions = smoothed(half_width_s(log.median_step()));
+    let slow_s = half_width_s(log.median_step()).max(SLOW_S);
+    let slow = smoothed(slow_s);
     let mut joints: Vec<JointAudit> = (0..log.joints())
         .map(|joint| JointAudit::of(log, joint, &motions[joint]))
         .collect();
     for joint in 0..log.joints() {
         let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
-        joints[joint].torque_lag = torque_lag(&motions, &fast, joint, log.median_step());
+        joints[joint].torque_lag = torque_lag(&slow, &fast, joint, log.median_step());
+        joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
     }
     joints
 }
 
 impl JointAudit {
-    /// All but the torque's lag, which needs the other joints as well.
+    /// All but the torque's lag and demand, which need the other joints as well.
     fn of(log: &Log, joint: usize, motion: &Motion) -> Self {
         let number = joint + 1;
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
@@ -86,6 +99,7 @@ impl JointAudit {
             joint: number,
             velocity: check,
             torque_lag: None,
+            torque_demand: None,
             reversals: reversals(velocity, rest_rad_s),
             share_at_rest: at_rest as f64 / speeds.len().max(1) as f64,
             fast_rad_s,

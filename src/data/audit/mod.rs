@@ -5,15 +5,18 @@
 
 mod channel;
 mod compare;
+mod demand;
 mod findings;
 mod joint;
 mod motion;
+mod regressors;
 mod table;
 
 use serde::Serialize;
 
 pub use channel::Channel;
 pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
+pub use demand::TorqueDemand;
 pub use joint::JointAudit;
 
 use super::log::{Interval, Log};

@@ -1,6 +1,6 @@
 //! The motion of one joint as its angles tell it.
 
-use crate::data::local_cubic::{half_width_s, local_cubic};
+use crate::data::local_cubic::local_cubic;
 use crate::data::log::Log;
 
 /// One joint's channels at the rows where the motion around them is known.
@@ -18,6 +18,8 @@ pub(super) struct Motion {
     pub acceleration: Vec<f64>,
     /// Torque smoothed as the angles are \[N m\].
     pub tau: Vec<f64>,
+    /// Torque as logged \[N m\], not smoothed.
+    pub tau_logged: Vec<f64>,
     /// Velocity as logged \[rad/s\], not smoothed.
     pub qd: Vec<f64>,
     /// Change of the logged angle since the row before \[rad\].
@@ -25,20 +27,20 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Follows joint `joint` (from 0) through the log.
-    pub fn of(log: &Log, joint: usize) -> Self {
-        let half_width = half_width_s(log.median_step());
+    /// Follows joint `joint` (from 0) through the log, smoothed over `half_width_s` on either side.
+    pub fn of(log: &Log, joint: usize, half_width_s: f64) -> Self {
         let mut motion = Self {
             time: vec![],
             q: vec![],
             velocity: vec![],
             acceleration: vec![],
             tau: vec![],
+            tau_logged: vec![],
             qd: vec![],
             moved: vec![],
         };
         for row in 1..log.rows() {
-            let fit = |values: &[f64]| local_cubic(&log.time, values, row, half_width);
+            let fit = |values: &[f64]| local_cubic(&log.time, values, row, half_width_s);
             let (Some(q), Some(tau)) = (fit(&log.q[joint]), fit(&log.tau[joint])) else {
                 continue;
             };
@@ -47,6 +49,7 @@ impl Motion {
             motion.velocity.push(q.slope);
             motion.acceleration.push(q.curvature);
             motion.tau.push(tau.value);
+            motion.tau_logged.push(log.tau[joint][row]);
             motion.qd.push(log.qd[joint][row]);
             motion.moved.push(log.q[joint][row] - log.q[joint][row - 1]);
         }

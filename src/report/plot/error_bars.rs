@@ -24,7 +24,7 @@ const MIDDLE_PX: f64 = BAR_PX / 2.0 + TO_BASELINE;
 const QUANTITY: &str = "position error, RMS";
 
 /// Position errors of one joint at one horizon.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ErrorRow {
     /// Number of the joint, from 1.
     pub joint: usize,
@@ -32,33 +32,17 @@ pub struct ErrorRow {
     pub kind: JointKind,
     /// How far ahead the models predict.
     pub horizon_s: f64,
-    /// Error of the declared model.
-    pub before: Option<f64>,
-    /// Error of the model with the effects.
-    pub after: Option<f64>,
-    /// Error of the model with a network.
-    pub hybrid: Option<f64>,
+    /// One a model, from the top.
+    pub bars: Vec<Bar>,
 }
 
-impl ErrorRow {
-    fn bars(&self) -> impl Iterator<Item = (Role, f64)> {
-        let Self {
-            joint: _,
-            kind: _,
-            horizon_s: _,
-            before,
-            after,
-            hybrid,
-        } = *self;
-        let errors = [
-            (Role::Before, before),
-            (Role::After, after),
-            (Role::Hybrid, hybrid),
-        ];
-        errors
-            .into_iter()
-            .filter_map(|(role, error)| Some((role, error?)))
-    }
+/// The error of one model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bar {
+    pub role: Role,
+    /// Its name in the key.
+    pub label: String,
+    pub error: f64,
 }
 
 /// Draws one panel a joint, in the order of the rows: for each horizon a bar a model, with its number at the end.
@@ -88,20 +72,14 @@ pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
 }
 
 fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
-    let named = [
-        (Role::Before, "before: declared model"),
-        (Role::After, "after: with the effects found"),
-        (Role::Hybrid, "hybrid: with a network for the rest"),
-    ];
-    let is_shown = |role| {
-        rows.iter()
-            .flat_map(ErrorRow::bars)
-            .any(|bar| bar.0 == role)
-    };
-    let shown = named.into_iter().filter(|(role, _)| is_shown(*role));
-    shown
-        .map(|(role, label)| Entry::new(Sample::Bar(role), label))
-        .collect()
+    let mut entries: Vec<Entry> = Vec::new();
+    for bar in rows.iter().flat_map(|row| &row.bars) {
+        let entry = Entry::new(Sample::Bar(bar.role), &bar.label);
+        if !entries.contains(&entry) {
+            entries.push(entry);
+        }
+    }
+    entries
 }
 
 /// Draws the rows of one joint from `top` on, and says where their frame ends.
@@ -109,15 +87,15 @@ fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
     let Some(ErrorRow { joint, kind, .. }) = rows.first() else {
         return top;
     };
-    let bars: usize = rows.iter().map(|row| row.bars().count()).sum();
+    let bars: usize = rows.iter().map(|row| row.bars.len()).sum();
     let area = Area {
         x: MARGIN + LEFT_PX,
         y: top,
         width: WIDTH - 2.0 * MARGIN - LEFT_PX - NUMBER_PX,
         height: GROUP_GAP_PX * (rows.len() + 1) as f64 + BAR_PITCH_PX * bars as f64,
     };
-    let errors = rows.iter().flat_map(|row| row.bars());
-    let longest = Range::spanning(errors.map(|bar| bar.1)).map_or(0.0, |range| range.hi);
+    let errors = rows.iter().flat_map(|row| &row.bars);
+    let longest = Range::spanning(errors.map(|bar| bar.error)).map_or(0.0, |range| range.hi);
     let longest = if longest > 0.0 {
         longest.min(LONGEST_BAR)
     } else {
@@ -149,7 +127,7 @@ fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
 fn draw_group(canvas: &mut Canvas, frame: &Frame, row: &ErrorRow, factor: f64, top: f64) -> f64 {
     let left = frame.area.x;
     let mut next = top;
-    for (role, error) in row.bars() {
+    for &Bar { role, error, .. } in &row.bars {
         let length = frame.x_px(factor * drawable(error));
         let end = if error > LONGEST_BAR {
             length + 10.0
@@ -227,18 +205,23 @@ fn readable(error: f64, unit: &str) -> (f64, String) {
 
 #[cfg(test)]
 mod tests {
-    use super::{ErrorRow, error_bars};
-    use crate::report::plot::{JointKind, PlotError};
+    use super::{Bar, ErrorRow, error_bars};
+    use crate::report::plot::{JointKind, PlotError, Role};
 
     fn row(before: f64, after: Option<f64>) -> ErrorRow {
-        let kind = JointKind::Revolute;
+        let bar = |role, label: &str, error| Bar {
+            role,
+            label: label.into(),
+            error,
+        };
+        let before = bar(Role::Before, "before", before);
         ErrorRow {
             joint: 1,
-            kind,
+            kind: JointKind::Revolute,
             horizon_s: 0.5,
-            before: Some(before),
-            after,
-            hybrid: None,
+            bars: std::iter::once(before)
+                .chain(after.map(|error| bar(Role::After, "after", error)))
+                .collect(),
         }
     }
 
@@ -246,7 +229,14 @@ mod tests {
     fn numbers_stand_at_the_bars() {
         let figure = error_bars(&[row(2.104, Some(0.0213))], "errors").unwrap();
         assert!(figure.contains("2.10 rad") && figure.contains("21.3 mrad"));
-        assert!(figure.contains("0.5 s") && !figure.contains("hybrid"));
+        assert!(figure.contains("0.5 s"));
+    }
+
+    #[test]
+    fn the_key_names_each_model_once() {
+        let figure = error_bars(&[row(2.0, Some(1.0)), row(3.0, None)], "key").unwrap();
+        assert_eq!(figure.matches("before").count(), 1);
+        assert_eq!(figure.matches("after").count(), 1);
     }
 
     #[test]

@@ -20,7 +20,7 @@ mod style;
 
 pub use binned::{Bin, binned_mean};
 pub use decimate::decimate;
-pub use error_bars::{ErrorRow, error_bars};
+pub use error_bars::{Bar, ErrorRow, error_bars};
 pub use predictions::{Panel, Track, predictions};
 pub use residual_shape::{ShapePanel, ShapeSample, residual_shape};
 pub use style::Role;

@@ -11,7 +11,12 @@ pub enum Role {
     After,
     /// The model with a network for what is left.
     Hybrid,
+    /// Another model as it is, counted from 0.
+    Against(usize),
 }
+
+/// What is left of the same palette.
+const OTHERS: [&str; 4] = ["#cc79a7", "#56b4e9", "#e69f00", "#999999"];
 
 /// How a line is drawn.
 pub(super) struct Stroke {
@@ -30,6 +35,7 @@ impl Role {
             Self::Before => "#d55e00",
             Self::After => "#0072b2",
             Self::Hybrid => "#009e73",
+            Self::Against(k) => OTHERS[k % OTHERS.len()],
         }
     }
 
@@ -41,6 +47,7 @@ impl Role {
             Self::Before => (self.colour(), 1.9, "6 3.5"),
             Self::After => (self.colour(), 1.9, "none"),
             Self::Hybrid => (self.colour(), 2.4, "2.5 5"),
+            Self::Against(_) => (self.colour(), 1.9, "8 3 2 3"),
         };
         Stroke {
             colour,

@@ -8,8 +8,8 @@ use super::{Audit, Finding, JointAudit, Severity};
 use crate::data::log::{Interval, Log};
 use Severity::{Info, Serious, Warning};
 
-/// Motion for less than this \[s\] hardly fills one prediction window of 1 s with its ends.
-const LITTLE_MOTION_S: f64 = 2.0;
+/// Motion for less than this \[s\] is fewer than eight stretches of half a second, which tell no effects apart.
+const LITTLE_MOTION_S: f64 = 4.0;
 
 /// Below this \[s\] not even one window of 0.5 s fits.
 const TOO_LITTLE_MOTION_S: f64 = 0.5;
@@ -155,8 +155,10 @@ impl Found {
         self.add(
             severity,
             format!(
-                "only {} s of motion: add logs, or record for longer",
-                short(motion_s)
+                "only {} s of motion, {} stretches of half a second: too few to tell effects apart; add logs, or record \
+                 for longer",
+                short(motion_s),
+                (motion_s / 0.5).floor()
             ),
         );
     }
@@ -209,8 +211,9 @@ impl Found {
             self.add(
                 spike_severity(joint.q.spikes, rows),
                 format!(
-                    "{name} has {} single-row spike(s): check the encoder's wiring",
-                    joint.q.spikes
+                    "{name} has {} single-row spike(s) ({}): check the encoder's wiring",
+                    joint.q.spikes,
+                    percent(joint.q.spikes as f64 / rows as f64)
                 ),
             );
         }

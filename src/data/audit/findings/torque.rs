@@ -2,7 +2,7 @@
 
 use super::super::table::short;
 use super::super::{Audit, JointAudit};
-use super::Severity::{Info, Warning};
+use super::Severity::{Info, Serious, Warning};
 use super::{Found, is_passive, milliseconds, percent, spike_severity};
 
 /// Less clipping than this leaves the torque usable as it is logged.
@@ -10,6 +10,16 @@ const MUCH_SATURATION: f64 = 0.02;
 
 /// A torque lag below one step cannot be told from how the rows are stamped.
 const TORQUE_LAG_STEPS: f64 = 1.0;
+
+/// A longer lag pairs torques with the wrong accelerations by a good part of a fast motion.
+const LONG_LAG_STEPS: f64 = 3.0;
+
+/// Fast content beyond this share of the slow one is worth a word; beyond the other, the column is mostly noise.
+const SOME_CHATTER: f64 = 0.5;
+const MUCH_CHATTER: f64 = 1.0;
+
+/// A torque of which the motion explains less than this share of the variance tells more of something else.
+const WELL_EXPLAINED: f64 = 0.5;
 
 impl Found {
     pub(super) fn about_torque(&mut self, joint: &JointAudit, audit: &Audit) {
@@ -30,6 +40,8 @@ impl Found {
             );
         }
         self.about_torque_signal(joint, audit.rows);
+        self.about_chatter(joint);
+        self.about_torque_explained(joint);
         self.about_torque_lag(joint, audit.median_step_s);
     }
 
@@ -52,12 +64,72 @@ impl Found {
                 // Never serious: a command may chatter for good reason.
                 spike_severity(tau.spikes, rows).max(Warning),
                 format!(
-                    "{name} has {} single-row spike(s): an actuator hardly follows them; check whether \
+                    "{name} has {} single-row spike(s) ({}): an actuator hardly follows them; check whether \
                      the column holds a command or a measurement",
-                    tau.spikes
+                    tau.spikes,
+                    percent(tau.spikes as f64 / rows as f64)
                 ),
             );
         }
+    }
+
+    fn about_chatter(&mut self, joint: &JointAudit) {
+        let Some(demand) = joint.torque_demand else {
+            return;
+        };
+        let ratio = demand.fast_nm / demand.slow_nm;
+        if ratio < SOME_CHATTER {
+            return;
+        }
+        let (tau, name) = (&joint.tau, &joint.tau.name);
+        let far_off = if demand.far_off > 0.0 {
+            format!(
+                "; {} of the rows, up to {} N m, lie beyond twice the {} N m that the motion needs at most",
+                percent(demand.far_off),
+                short(tau.max.max(-tau.min)),
+                short(demand.needed_nm)
+            )
+        } else {
+            String::new()
+        };
+        self.add(
+            if ratio > MUCH_CHATTER { Serious } else { Warning },
+            format!(
+                "{name} chatters: {} N m (root mean square) faster than {} Hz beside {} N m slower, {} times as \
+                 much{far_off}. Hardly any of it moves the joint, all of it weighs in a least-squares fit of the \
+                 torque: record again with softer gains or a smooth command",
+                short(demand.fast_nm),
+                short(demand.slow_hz),
+                short(demand.slow_nm),
+                short(ratio)
+            ),
+        );
+    }
+
+    fn about_torque_explained(&mut self, joint: &JointAudit) {
+        let Some(demand) = joint.torque_demand else {
+            return;
+        };
+        if demand.explained >= WELL_EXPLAINED {
+            return;
+        }
+        let remedy = if demand.explained_slow >= WELL_EXPLAINED {
+            "do not trust parameters from a regression of the torque; fit trajectories, as closeloop does"
+        } else {
+            "something else moves the joint (a hand, a contact, stiction), or the column is not the torque that acts; \
+             leave such stretches out, or check the column"
+        };
+        self.add(
+            Warning,
+            format!(
+                "the motion explains {} of the variance of {} as logged and {} of what is slower than {} Hz \
+                 (regression on gravity, friction and accelerations): {remedy}",
+                percent(demand.explained),
+                joint.tau.name,
+                percent(demand.explained_slow),
+                short(demand.slow_hz)
+            ),
+        );
     }
 
     fn about_constant_torque(&mut self, joint: &JointAudit) {
@@ -85,15 +157,17 @@ impl Found {
         let Some(lag) = joint.torque_lag else { return };
         if lag.lag_s.abs() >= TORQUE_LAG_STEPS * step_s {
             let verb = if lag.lag_s > 0.0 { "trails" } else { "leads" };
+            let steps = lag.lag_s.abs() / step_s;
             self.add(
-                Info,
+                if steps > LONG_LAG_STEPS { Warning } else { Info },
                 format!(
                     "the acceleration of joint {} {verb} {} by {} ({} steps, correlation {}): a delay of \
-                     the actuator or of the time stamps",
+                     the actuator or of the time stamps; shift the column by as much before inertias are taken \
+                     from rows",
                     joint.joint,
                     joint.tau.name,
                     milliseconds(lag.lag_s.abs()),
-                    short(lag.lag_s.abs() / step_s),
+                    short(steps),
                     short(lag.correlation)
                 ),
             );
@@ -106,6 +180,66 @@ mod tests {
     use super::super::super::tests::swing;
     use super::super::tests::says;
     use super::*;
+
+    #[test]
+    fn torque_that_the_motion_does_not_need_is_told_with_its_size() {
+        let mut log = swing();
+        let signs = [30.0, -30.0].into_iter().cycle();
+        let chatter = log.tau[0].iter_mut().zip(signs);
+        chatter.for_each(|(tau, c)| *tau += c);
+        log.tau[0]
+            .iter_mut()
+            .step_by(50)
+            .for_each(|tau| *tau += 100.0);
+        assert!(says(
+            &log,
+            Serious,
+            &[
+                "tau1 chatters: 3",
+                "faster than 10.6 Hz",
+                "2 % of the rows",
+                "smooth command"
+            ]
+        ));
+        assert!(says(
+            &log,
+            Warning,
+            &[
+                "the motion explains",
+                "of tau1 as logged",
+                "fit trajectories"
+            ]
+        ));
+    }
+
+    #[test]
+    fn a_joint_that_something_else_moves_is_told() {
+        let mut log = swing();
+        let strange = |t: f64| 20.0 * (11.0 * t).sin();
+        let times = log.time.clone();
+        let rows = log.tau[0].iter_mut().zip(times);
+        rows.for_each(|(tau, t)| *tau += strange(t) * if t > 2.0 { 2.0 } else { 0.0 });
+        assert!(says(
+            &log,
+            Warning,
+            &["the motion explains", "something else moves the joint"]
+        ));
+    }
+
+    #[test]
+    fn a_torque_that_comes_early_is_told_with_its_remedy() {
+        let mut log = swing();
+        log.tau[0].rotate_left(5);
+        // A second motion, as gravity would explain a single one.
+        assert!(says(
+            &log,
+            Warning,
+            &[
+                "the acceleration of joint 1 trails tau1 by",
+                "shift the column"
+            ]
+        ));
+    }
 
     #[test]
     fn torques_that_show_little_are_named() {

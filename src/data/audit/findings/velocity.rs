@@ -3,7 +3,7 @@
 use super::super::table::short;
 use super::super::{Audit, JointAudit, MAX_LAG_S, VelocityCheck};
 use super::Severity::{Info, Serious, Warning};
-use super::{Found, milliseconds, spike_severity};
+use super::{Found, milliseconds, percent, spike_severity};
 
 /// A velocity that correlates less than this with the derivative of its angle is something else.
 const SAME_QUANTITY: f64 = 0.5;
@@ -63,9 +63,10 @@ impl Found {
         self.add(
             severity,
             format!(
-                "{name} has {} sample(s) that disagree with dq{number}/dt, by up to {} rad/s: \
+                "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: \
                      {remedy}",
                 joint.qd.spikes,
+                percent(joint.qd.spikes as f64 / rows as f64),
                 short(check.worst_rad_s)
             ),
         );

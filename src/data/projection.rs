@@ -1,0 +1,66 @@
+//! Linear regression by orthogonal columns: what of a series a basis explains, and what is left.
+
+/// Columns of unit length at right angles that span the same space; those that the others span
+/// already are dropped.
+pub(super) fn orthonormal(columns: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = vec![];
+    for column in columns {
+        basis.extend(free_of(&basis, &column));
+    }
+    basis
+}
+
+/// The part of a series at right angles to an orthonormal basis, scaled to unit length; `None` if
+/// nothing but rounding is left.
+pub(super) fn free_of(basis: &[Vec<f64>], series: &[f64]) -> Option<Vec<f64>> {
+    let whole = dot(series, series).sqrt();
+    let mut rest = series.to_vec();
+    for column in basis {
+        let share = dot(column, &rest);
+        rest.iter_mut()
+            .zip(column)
+            .for_each(|(value, c)| *value -= share * c);
+    }
+    let length = dot(&rest, &rest).sqrt();
+    if length <= 1e-6 * whole {
+        return None;
+    }
+    rest.iter_mut().for_each(|value| *value /= length);
+    Some(rest)
+}
+
+/// The part of a series that an orthonormal basis explains.
+pub(super) fn explained_by(basis: &[Vec<f64>], series: &[f64]) -> Vec<f64> {
+    let mut part = vec![0.0; series.len()];
+    for column in basis {
+        let share = dot(column, series);
+        part.iter_mut()
+            .zip(column)
+            .for_each(|(value, c)| *value += share * c);
+    }
+    part
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_explained_and_what_is_left_make_the_series() {
+        let ramp: Vec<f64> = (0..50).map(f64::from).collect();
+        let basis = orthonormal([vec![1.0; 50], ramp.clone(), vec![3.0; 50]].into_iter());
+        assert_eq!(basis.len(), 2, "a column that others span is dropped");
+        let series: Vec<f64> = ramp.iter().map(|x| 2.0 - 0.3 * x + (x * x).sin()).collect();
+        let part = explained_by(&basis, &series);
+        let rest: Vec<f64> = series.iter().zip(&part).map(|(a, b)| a - b).collect();
+        assert!(basis.iter().all(|column| dot(column, &rest).abs() < 1e-9));
+        // A straight line is explained whole.
+        let line: Vec<f64> = ramp.iter().map(|x| 2.0 - 0.3 * x).collect();
+        let found = explained_by(&basis, &line);
+        assert!(line.iter().zip(found).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+}
