@@ -191,9 +191,14 @@ impl Machine {
     }
 }
 
+/// The name of the `index`-th log, counted from 0.
+pub fn log_name(index: usize) -> String {
+    format!("log{}.csv", index + 1)
+}
+
 fn empty(index: usize, joints: usize) -> Log {
     Log {
-        path: PathBuf::from(format!("log{}.csv", index + 1)),
+        path: PathBuf::from(log_name(index)),
         time: Vec::new(),
         q: vec![Vec::new(); joints],
         qd: vec![Vec::new(); joints],

@@ -437,9 +437,13 @@ mod tests {
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
                 let values = [15.0, 3.0, delay, lag];
                 let cost = |values: &[f64]| -> f64 {
-                    shooting.costs(&model, &values.into(), &locals, 1.0).iter().sum()
+                    shooting
+                        .costs(&model, &values.into(), &locals, 1.0)
+                        .iter()
+                        .sum()
                 };
-                let terms = shooting.linearise(&model, &tangent, &values.as_slice().into(), &locals, 1.0);
+                let terms =
+                    shooting.linearise(&model, &tangent, &values.as_slice().into(), &locals, 1.0);
                 for (column, k) in [1, 2, 3].into_iter().enumerate() {
                     let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
                     let mut moved = values;
