@@ -5,6 +5,7 @@
 
 mod against;
 mod bad_input;
+mod bench;
 mod clients;
 mod common;
 mod demo;

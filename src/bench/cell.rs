@@ -6,14 +6,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::answer::answer;
 use super::grid::{Cell, hash};
-use super::hidden::Hidden;
-use super::judge::{Answer, Estimate, Judgement, Label, Named, Truth, judge, label};
+use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
-use crate::closeloop::{Finding, Outcome, Request, Split, Study, StudyError, close_loop};
+use super::told::told;
+use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
 use crate::data::Log;
-use crate::evaluate::{Assessment, assess};
-use crate::model::{FittedEffect, Library, Parameter, System};
+use crate::model::{Library, System};
 
 /// Errors are compared at the middle one \[s\].
 const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
@@ -91,7 +91,7 @@ impl Cell {
             errors: Errors {
                 before: outcome.errors.before.position_rms(),
                 after: outcome.errors.after.position_rms(),
-                told: told(&system, library, &split, &self.effects),
+                told: told(&system, library, &split, &self.effects, &HORIZONS_S),
             },
             truth,
             answer,
@@ -115,86 +115,4 @@ fn close(
         backend: None,
     };
     close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &mut |_| ())
-}
-
-fn answer(outcome: &Outcome) -> Answer {
-    let of_effects: Vec<&str> = outcome
-        .findings
-        .iter()
-        .flat_map(|finding| &finding.parameters)
-        .map(|parameter| parameter.name.as_str())
-        .collect();
-    let is_declared = |parameter: &&Parameter| !of_effects.contains(&parameter.name.as_str());
-    let set = |effects: &[FittedEffect]| effects.iter().map(label_of).collect();
-    Answer {
-        verdict: outcome.verdict,
-        reason: outcome.reason.clone(),
-        named: outcome.findings.iter().map(named).collect(),
-        alternatives: outcome
-            .alternatives
-            .iter()
-            .map(|alternative| set(&alternative.effects))
-            .collect(),
-        declared: outcome
-            .parameters
-            .iter()
-            .filter(is_declared)
-            .map(|parameter| estimate(&parameter.name, parameter))
-            .collect(),
-        left: outcome.unexplained.fraction,
-        left_p_value: outcome.unexplained.p_value,
-        left_where: outcome.unexplained.place.clone(),
-    }
-}
-
-fn named(finding: &Finding) -> Named {
-    let own = finding.effect.effect.parameters.iter();
-    let estimates = own.zip(&finding.parameters);
-    Named {
-        label: label_of(&finding.effect),
-        parameters: estimates
-            .map(|(own, found)| estimate(&own.name, found))
-            .collect(),
-        p_value: finding.p_value,
-        error_reduction: finding.error_reduction,
-    }
-}
-
-fn label_of(effect: &FittedEffect) -> Label {
-    label(&effect.effect.name, effect.joint + 1, "")
-}
-
-fn estimate(name: &str, parameter: &Parameter) -> Estimate {
-    Estimate {
-        name: name.to_owned(),
-        value: parameter.value,
-        ci95: parameter.ci95,
-    }
-}
-
-/// Error of the model with the true effects, fitted from their true values to the logs that the search had.
-fn told(system: &System, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
-    let mut study = Study::new(system, &split.train);
-    let declared = study.fit_declared().ok()?;
-    let truth: Vec<FittedEffect> = effects
-        .iter()
-        .map(|hidden| fitted(&study, library, hidden))
-        .collect::<Option<_>>()?;
-    let locals = declared.fit.locals.clone();
-    let model = study.refit(&truth, &declared.declared, locals, None).ok()?;
-    let values = |_| model.fit.values.as_slice();
-    let errors: Assessment = assess(&model.dynamics, values, &split.test, &HORIZONS_S);
-    Some(errors.position_rms())
-}
-
-/// The library's effect of that name with the true values; none where it has no such effect.
-fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
-    let joint = hidden.joint - 1;
-    let effect = library.effect(&hidden.name).ok()?;
-    let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
-    let mut fitted = FittedEffect::absent(&effect, joint);
-    for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
-        slot.0 = *hidden.values.get(&parameter.name)?;
-    }
-    Some(fitted)
 }

@@ -133,10 +133,10 @@ impl File {
                     "plants.{name}: every list of `driving` has {joints} numbers, one a joint"
                 ));
             }
-            let [low, high] = driving.band_hz;
-            if !(0.0 < low && low < high) {
+            let rises = |[low, high]: [f64; 2]| 0.0 < low && low < high;
+            if !(rises(driving.torque_hz) && rises(driving.reference_hz)) {
                 return Err(format!(
-                    "plants.{name}: `band_hz` is two rising frequencies above zero"
+                    "plants.{name}: `torque_hz` and `reference_hz` are two rising frequencies above zero"
                 ));
             }
         }
@@ -219,9 +219,10 @@ mod tests {
         model = "pendulum"
         mechanics = { form = "pendulum", inertia = 0.15, moment = 0.3, g = 9.81 }
         [plants.p.driving]
-        band_hz = [0.2, 2.0]
         torque = [1.0]
+        torque_hz = [0.2, 2.0]
         reference = [1.0]
+        reference_hz = [0.2, 1.0]
         stiffness = [10.0]
         damping = [1.0]
         limit = [3.0]

@@ -6,6 +6,8 @@ use std::f64::consts::{PI, TAU};
 use serde::{Deserialize, Serialize};
 
 use super::grid::{Cell, Group};
+use super::hidden::Hidden;
+use super::recording::log_name;
 use crate::closeloop::Verdict;
 
 /// `coulomb_friction@1`, the joint counted from 1; of a shift `parameter_shift(m1)`.
@@ -25,8 +27,6 @@ pub struct Truth {
     pub effects: Vec<(Label, BTreeMap<String, f64>)>,
     /// True values of declared parameters, where the rig fixes them.
     pub declared: BTreeMap<String, f64>,
-    /// How much each encoder reads too much \[rad\], `[log][joint]`.
-    pub offsets: Vec<[f64; 2]>,
 }
 
 /// A value with its 95 % interval.
@@ -98,7 +98,23 @@ pub struct Judgement {
 /// describes.
 const HALF: f64 = 0.5;
 
+/// The name of a parameter's value in a single log: `q_z[log1.csv]`.
+pub fn of_log(parameter: &str, log: &str) -> String {
+    format!("{parameter}[{log}]")
+}
+
+/// An effect's numbers; of an offset what it was in each log.
+fn values(effect: &Hidden, offsets: &[[f64; 2]]) -> BTreeMap<String, f64> {
+    if effect.name != "sensor_offset" {
+        return effect.values.clone();
+    }
+    let in_log =
+        |(k, offset): (usize, &[f64; 2])| (of_log("q_z", &log_name(k)), offset[effect.joint - 1]);
+    offsets.iter().enumerate().map(in_log).collect()
+}
+
 impl Truth {
+    /// Of a cell whose encoders read too much by `offsets` rad, `[log][joint]`.
     pub fn of(cell: &Cell, offsets: &[[f64; 2]]) -> Self {
         let mut machine = cell.bench.mechanics.clone();
         for shift in cell.effects.iter().filter(|e| e.name == "parameter_shift") {
@@ -111,12 +127,11 @@ impl Truth {
             effects: cell
                 .effects
                 .iter()
-                .map(|e| (e.label(), e.values.clone()))
+                .map(|effect| (effect.label(), values(effect, offsets)))
                 .collect(),
             declared: declared
                 .filter_map(|name| Some(((*name).to_owned(), machine.declared(name)?)))
                 .collect(),
-            offsets: offsets.to_vec(),
         }
     }
 
@@ -281,7 +296,6 @@ mod tests {
                 .map(|(label, own)| ((*label).to_owned(), values(own)))
                 .collect(),
             declared: BTreeMap::new(),
-            offsets: Vec::new(),
         }
     }
 
@@ -352,6 +366,19 @@ mod tests {
         assert!(pass(Verdict::PartlyExplained, drag(0.8)));
         assert!(!pass(Verdict::PartlyExplained, drag(0.4)));
         assert!(!pass(Verdict::Explained, drag(0.8)));
+    }
+
+    #[test]
+    fn an_offset_is_asked_for_in_each_log() {
+        let hidden = Hidden {
+            name: "sensor_offset".to_owned(),
+            joint: 2,
+            values: [("q_z".to_owned(), 0.1)].into(),
+        };
+        let values = values(&hidden, &[[0.0, 0.05], [0.0, -0.02]]);
+        let found = values.iter().map(|(name, value)| (name.as_str(), *value));
+        let found: Vec<(&str, f64)> = found.collect();
+        assert_eq!(found, [("q_z[log1.csv]", 0.05), ("q_z[log2.csv]", -0.02)]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! gears and encoders are written by hand here, and no model file, formula or integrator of the program is used
 //! until the logs are recorded.
 
+mod answer;
 mod cell;
 mod drive;
 mod excitation;
@@ -17,6 +18,7 @@ mod mechanics;
 mod motion;
 mod recording;
 mod table;
+mod told;
 mod transmission;
 
 pub use cell::{Errors, Findings};

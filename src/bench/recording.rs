@@ -17,12 +17,12 @@ use crate::data::Log;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Driving {
-    /// Band of torques and references \[Hz\].
-    pub band_hz: [f64; 2],
-    /// Open loop: root mean square of the torque \[N m\].
+    /// Open loop: root mean square of the torque \[N m\], and its band \[Hz\].
     pub torque: Vec<f64>,
-    /// Closed loop: root mean square of the reference \[rad\].
+    pub torque_hz: [f64; 2],
+    /// Closed loop: root mean square of the reference \[rad\], and its band \[Hz\].
     pub reference: Vec<f64>,
+    pub reference_hz: [f64; 2],
     /// Gains of the controller \[N m/rad\], \[N m s/rad\].
     pub stiffness: Vec<f64>,
     pub damping: Vec<f64>,
@@ -69,11 +69,11 @@ impl Source {
         match how {
             Loop::Open => {
                 let size = strength * driving.torque[j];
-                Self::Open(Multisine::draw(size, driving.band_hz, rng))
+                Self::Open(Multisine::draw(size, driving.torque_hz, rng))
             }
             Loop::Closed => {
                 let size = strength * driving.reference[j];
-                let reference = Multisine::draw(size, driving.band_hz, rng);
+                let reference = Multisine::draw(size, driving.reference_hz, rng);
                 let controller =
                     Controller::new(driving.stiffness[j], driving.damping[j], driving.limit[j]);
                 Self::Closed(reference, controller)
@@ -191,9 +191,14 @@ impl Machine {
     }
 }
 
+/// The name of the `index`-th log, counted from 0.
+pub fn log_name(index: usize) -> String {
+    format!("log{}.csv", index + 1)
+}
+
 fn empty(index: usize, joints: usize) -> Log {
     Log {
-        path: PathBuf::from(format!("log{}.csv", index + 1)),
+        path: PathBuf::from(log_name(index)),
         time: Vec::new(),
         q: vec![Vec::new(); joints],
         qd: vec![Vec::new(); joints],
@@ -217,9 +222,10 @@ mod tests {
 
     fn driving() -> Driving {
         Driving {
-            band_hz: [0.2, 2.0],
-            torque: vec![1.0],
-            reference: vec![0.8],
+            torque: vec![0.6],
+            torque_hz: [0.2, 2.0],
+            reference: vec![0.6],
+            reference_hz: [0.2, 1.0],
             stiffness: vec![10.0],
             damping: vec![1.2],
             limit: vec![4.0],

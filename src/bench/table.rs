@@ -184,7 +184,7 @@ fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
     let passed = |d: &Done<'_>| d.judgement().passed;
     let covered = |of_effects: bool| {
         let all = done.iter().flat_map(|d| &d.judgement().coverage);
-        let wanted = all.filter(|c| c.name.contains('@') == of_effects);
+        let wanted = all.filter(|c| c.name.contains('.') == of_effects);
         Rate::count(wanted.map(|c| c.covered))
     };
     vec![
@@ -233,12 +233,13 @@ fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
 fn by_parameter(done: &[Done<'_>]) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
     for coverage in done.iter().flat_map(|d| &d.judgement().coverage) {
-        let name = match coverage.name.split_once('@') {
-            // The joint says nothing about a parameter.
+        // Neither the joint nor the log says anything about a parameter.
+        let name = coverage.name.split('[').next().unwrap_or_default();
+        let name = match name.split_once('@') {
             Some((effect, rest)) => {
                 format!("{effect}{}", rest.trim_start_matches(char::is_numeric))
             }
-            None => coverage.name.clone(),
+            None => name.to_owned(),
         };
         groups.entry(name).or_default().push(coverage.covered);
     }

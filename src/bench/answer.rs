@@ -1,0 +1,69 @@
+//! What closing the loop said, in the words of the bench.
+
+use super::judge::{Answer, Estimate, Label, Named, label, of_log};
+use crate::closeloop::{Finding, Outcome};
+use crate::model::{FittedEffect, Parameter};
+
+/// The answer in an outcome.
+pub fn answer(outcome: &Outcome) -> Answer {
+    let of_effects: Vec<&str> = outcome
+        .findings
+        .iter()
+        .flat_map(|finding| &finding.parameters)
+        .map(|parameter| parameter.name.as_str())
+        .collect();
+    let is_declared = |parameter: &&Parameter| !of_effects.contains(&parameter.name.as_str());
+    let set = |effects: &[FittedEffect]| effects.iter().map(label_of).collect();
+    Answer {
+        verdict: outcome.verdict,
+        reason: outcome.reason.clone(),
+        named: outcome.findings.iter().map(named).collect(),
+        alternatives: outcome
+            .alternatives
+            .iter()
+            .map(|alternative| set(&alternative.effects))
+            .collect(),
+        declared: outcome
+            .parameters
+            .iter()
+            .filter(is_declared)
+            .map(|parameter| estimate(&parameter.name, parameter))
+            .collect(),
+        left: outcome.unexplained.fraction,
+        left_p_value: outcome.unexplained.p_value,
+        left_where: outcome.unexplained.place.clone(),
+    }
+}
+
+fn named(finding: &Finding) -> Named {
+    let own = &finding.effect.effect.parameters;
+    let common = own.iter().zip(&finding.parameters);
+    let common = common.filter(|(_, found)| !found.per_log);
+    let single = finding.effect.own.iter().map(|in_log| Estimate {
+        name: of_log(&own[in_log.parameter].name, &in_log.log_name()),
+        value: in_log.value,
+        ci95: in_log.ci95,
+    });
+    Named {
+        label: label_of(&finding.effect),
+        parameters: common
+            .map(|(own, found)| estimate(&own.name, found))
+            .chain(single)
+            .collect(),
+        p_value: finding.p_value,
+        error_reduction: finding.error_reduction,
+    }
+}
+
+fn label_of(effect: &FittedEffect) -> Label {
+    let (name, parameters) = (&effect.effect.name, &effect.effect.parameters);
+    label(name, effect.joint + 1, &parameters[0].name)
+}
+
+fn estimate(name: &str, parameter: &Parameter) -> Estimate {
+    Estimate {
+        name: name.to_owned(),
+        value: parameter.value,
+        ci95: parameter.ci95,
+    }
+}

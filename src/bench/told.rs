@@ -1,0 +1,56 @@
+//! The fit of a person who knows the truth: what any search could reach at best.
+
+use super::hidden::Hidden;
+use crate::closeloop::{Split, Study};
+use crate::evaluate::{Assessment, assess};
+use crate::model::{FittedEffect, Library, System};
+
+/// Error of the model with the true effects, fitted from their true values to the logs that the search had:
+/// position, all joints together, at the middle horizon \[rad\]. None where the library lacks one of them.
+pub fn told(
+    system: &System,
+    library: &Library,
+    split: &Split,
+    effects: &[Hidden],
+    horizons_s: &[f64],
+) -> Option<f64> {
+    let mut study = Study::new(system, &split.train);
+    let declared = study.fit_declared().ok()?;
+    let truth: Vec<FittedEffect> = effects
+        .iter()
+        .map(|hidden| fitted(&study, library, hidden))
+        .collect::<Option<_>>()?;
+    let locals = declared.fit.locals.clone();
+    let model = study.refit(&truth, &declared.declared, locals, None).ok()?;
+    let tests = split.test.iter();
+    let values: Vec<Vec<f64>> = tests.map(|log| model.values_in(log)).collect();
+    let errors: Assessment = assess(&model.dynamics, |log| &values[log], &split.test, horizons_s);
+    Some(errors.position_rms())
+}
+
+/// The effect with its true values; none where there is no such effect.
+fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
+    if hidden.name == "parameter_shift" {
+        return shift(study.system, hidden);
+    }
+    let joint = hidden.joint - 1;
+    let effect = library.effect(&hidden.name).ok()?;
+    let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
+    let mut fitted = FittedEffect::absent(&effect, joint);
+    for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
+        // What differs by log is found from zero.
+        if !parameter.per_log {
+            slot.0 = *hidden.values.get(&parameter.name)?;
+        }
+    }
+    Some(fitted)
+}
+
+fn shift(system: &System, hidden: &Hidden) -> Option<FittedEffect> {
+    let (name, value) = hidden.values.first_key_value()?;
+    let declared = system.parameters.iter().find(|p| p.name == *name)?;
+    let mut shifts = system.shifts().into_iter();
+    let mut shift = shifts.find(|shift| shift.effect.parameters[0].name == *name)?;
+    shift.values[0].0 = value - declared.value;
+    Some(shift)
+}

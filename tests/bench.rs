@@ -1,0 +1,160 @@
+//! The bench: its hand-written rigs against the equations of the model files, and a small grid end to end.
+
+use std::path::Path;
+
+use residyn::bench::{Cell, Group, Hidden, read};
+use residyn::evaluate::assess;
+use residyn::expr::SignForm;
+use residyn::model::{FittedEffect, Library};
+
+use crate::support::{refuses, succeeds, text};
+
+fn path(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("configs/bench")
+        .join(name)
+}
+
+#[test]
+fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
+    let cells = read(&path("effects.toml")).unwrap();
+    let of = |group| cells.iter().filter(|cell| cell.group == group).count();
+    assert!(of(Group::Single) >= 100, "{}", of(Group::Single));
+    assert!(of(Group::Pair) >= 25, "{}", of(Group::Pair));
+    assert!(of(Group::None) >= 20, "{}", of(Group::None));
+    assert!(of(Group::Outside) >= 20, "{}", of(Group::Outside));
+    let hidden: Vec<&Hidden> = cells.iter().flat_map(|cell| &cell.effects).collect();
+    let mut missing = Library::built_in().effects().to_vec();
+    missing.retain(|effect| !hidden.iter().any(|hidden| hidden.name == effect.name));
+    let names: Vec<&String> = missing.iter().map(|effect| &effect.name).collect();
+    assert!(names.is_empty(), "no cell hides {names:?}");
+}
+
+/// Values of the rig's parameters as the model file calls them.
+fn true_value(cell: &Cell, name: &str) -> Option<f64> {
+    let rig = serde_json::to_value(&cell.bench.mechanics).unwrap();
+    let declared = cell.bench.mechanics.declared(name);
+    declared.or_else(|| rig.get(name)?.as_f64())
+}
+
+/// The library's effect with the true numbers, where it is one of force, torque, angle or inertia.
+fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
+    let effect = library.effect(&hidden.name).ok()?;
+    let mut known = FittedEffect::absent(effect, hidden.joint - 1);
+    for (slot, parameter) in known.values.iter_mut().zip(&effect.parameters) {
+        slot.0 = *hidden.values.get(&parameter.name)?;
+    }
+    Some(known)
+}
+
+/// Memory and sensors are no part of the equations of motion.
+const NOT_IN_THE_EQUATIONS: [&str; 5] = [
+    "actuator_delay",
+    "actuator_lag",
+    "backlash",
+    "sensor_offset",
+    "parameter_shift",
+];
+/// Angles half a second ahead agree within this \[rad\]: friction that holds a joint there lets it creep here.
+const NEAR: f64 = 1e-4;
+
+#[test]
+fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code() {
+    let library = Library::built_in();
+    let mut compared = 0;
+    for mut cell in read(&path("effects.toml")).unwrap() {
+        let in_equations = |hidden: &Hidden| !NOT_IN_THE_EQUATIONS.contains(&hidden.name.as_str());
+        let plain = cell.condition_name == "base" && cell.group == Group::Single;
+        if !(plain && cell.effects.iter().all(in_equations)) {
+            continue;
+        }
+        let condition = &mut cell.condition;
+        (
+            condition.noise,
+            condition.rate_hz,
+            condition.logs,
+            condition.seconds,
+        ) = (0.0, 500.0, 2, 6.0);
+        let (logs, _) = cell.record();
+        let system = library.system(&cell.bench.model).unwrap();
+        let error = |effects: &[FittedEffect]| {
+            let sign = vec![SignForm::Smooth { width: 1e-4 }; system.joints];
+            let dynamics = system.dynamics_with(effects, &sign);
+            let mut values = dynamics.values();
+            for (value, parameter) in values.iter_mut().zip(&system.parameters) {
+                *value = true_value(&cell, &parameter.name).expect("the rig has it");
+            }
+            assess(&dynamics, |_| &values, &logs, &[0.5]).position_rms()
+        };
+        let effects: Option<Vec<FittedEffect>> = cell
+            .effects
+            .iter()
+            .map(|hidden| known(&library, hidden))
+            .collect();
+        let (with, without) = (error(&effects.expect("the library knows it")), error(&[]));
+        assert!(
+            with < NEAR && with < 0.02 * without,
+            "{}: {with} rad with it, {without} without",
+            cell.id
+        );
+        compared += 1;
+    }
+    assert!(compared > 50, "{compared}");
+}
+
+#[test]
+fn a_small_grid_gives_a_table_and_a_broken_run_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let (grid, out) = (path("smoke.toml"), folder.path());
+    let run = |only: &[&str]| {
+        let mut arguments = vec![
+            "bench",
+            "effects",
+            "--grid",
+            text(&grid),
+            "--out",
+            text(out),
+        ];
+        arguments.extend(["--json", "--only"]);
+        arguments.extend(only);
+        let summary: serde_json::Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
+        summary
+    };
+    let lines = || {
+        let text = std::fs::read_to_string(out.join("cells.jsonl")).unwrap();
+        text.lines()
+            .filter(|line| !line.is_empty())
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(run(&["none"])["cells"], 1);
+    // A line that was broken off is no result and does no harm.
+    let first = lines();
+    std::fs::write(out.join("cells.jsonl"), format!("{}\n{{\"conf", first[0])).unwrap();
+    let summary = run(&["none", "coulomb"]);
+    assert_eq!((summary["cells"].as_u64(), lines().len()), (Some(2), 3));
+    assert_eq!(lines()[0], first[0], "the first cell is not run again");
+    let coulomb: serde_json::Value = serde_json::from_str(&lines()[2]).unwrap();
+    let errors = &coulomb["findings"]["Ok"]["errors"];
+    let error = |which: &str| errors[which].as_f64().unwrap();
+    // Whoever is told of the friction predicts far better than who is not.
+    assert!(error("told") < 0.2 * error("before"), "{errors}");
+    let table = std::fs::read_to_string(out.join("table.md")).unwrap();
+    assert!(table.contains("| one effect: exact |"), "{table}");
+}
+
+#[test]
+fn a_wrong_grid_or_selection_is_refused() {
+    let grid = path("smoke.toml");
+    let message = refuses(&[
+        "bench",
+        "effects",
+        "--grid",
+        text(&grid),
+        "--only",
+        "nothing-of-the-kind",
+    ]);
+    assert!(message.contains("no cell's name contains"), "{message}");
+    let message = refuses(&["bench", "effects", "--grid", "no-such-grid.toml"]);
+    assert!(message.contains("give a grid with --grid"), "{message}");
+}
