@@ -187,6 +187,8 @@ fn an_effect_that_cannot_act_is_refused() {
         &effect(&format!("{twice}\n[[effect]]\n{twice}")),
         &["acts on joint 1 already"],
     );
+    let late = "name = \"actuator_delay\"\njoint = 1\nd = 0.2";
+    says(&effect(late), &["d = 0.2 lies outside of 0 to 0.1"]);
     says(
         &model_message("C_i = {", "tau1 = {"),
         &["the name `tau1` is taken"],

@@ -5,7 +5,10 @@ use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit, uncertainty};
 use residyn::model::{Commands, Dynamics, FittedEffect, Library, StepTorque};
 
+use serde_json::Value;
+
 use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
+use crate::support::{refuses, succeeds, text};
 use rand::RngExt;
 
 const DELAY_S: f64 = 0.0073;
@@ -98,7 +101,7 @@ fn without_delay_and_lag_the_command_acts() {
     let (time, tau) = history();
     for row in 0..time.len() - 1 {
         for mean in means(&model, time[row], time[row + 1], 4).0 {
-            assert_near(mean, tau[row], 1e-11, "held torque");
+            assert_near(mean, tau[row], 1e-12, "held torque");
         }
     }
 }
@@ -188,4 +191,132 @@ fn a_delay_and_a_lag_come_back_within_their_intervals() {
             uncertainty.half_width(2)
         );
     }
+}
+
+/// A folder with three logs of 15 s of the pendulum with this effect, and a fourth for the test.
+fn recorded(effect: &str) -> (tempfile::TempDir, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let record = |seed: &str| {
+        let log = folder.path().join(format!("{seed}.csv"));
+        let all = [
+            "simulate",
+            "--plant",
+            "pendulum",
+            "--duration",
+            "15",
+            "--effect",
+            effect,
+        ];
+        succeeds(&[&all[..], &["--seed", seed, "--out", text(&log)]].concat());
+        text(&log).to_owned()
+    };
+    let logs = ["1", "2", "3", "91"].map(record).to_vec();
+    (folder, logs)
+}
+
+#[test]
+fn closing_the_loop_tells_a_delay_from_a_lag() {
+    for (setting, name, truth) in [
+        ("actuator_delay=0.01", "actuator_delay", 0.01),
+        ("actuator_lag=0.02", "actuator_lag", 0.02),
+    ] {
+        let (folder, logs) = recorded(setting);
+        let [a, b, c, test] = [0, 1, 2, 3].map(|k| logs[k].as_str());
+        let out = folder.path().join("report");
+        let given = ["--model", "pendulum", "--train", a, b, c, "--test", test];
+        let json = succeeds(&[&["closeloop", "--json", "--out", text(&out)], &given[..]].concat());
+        let report: Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(report["verdict"], "explained", "{name}");
+        let effects = report["effects"].as_array().unwrap();
+        assert_eq!(effects.len(), 1, "{effects:?}");
+        assert_eq!(effects[0]["name"], name);
+        let parameter = &effects[0]["parameters"][0];
+        let end = |k: usize| parameter["ci95"][k].as_f64().unwrap();
+        assert!(end(0) < truth && truth < end(1), "{parameter}");
+
+        // What was written predicts the same when it is read again.
+        let error = |model: &[&str]| -> f64 {
+            let all = [&["evaluate", "--json", "--test", test], model].concat();
+            let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
+            value["position_rmse"][1][0].as_f64().unwrap()
+        };
+        let told = |which: &str| {
+            report["error"][which]["position_rmse"][1][0]
+                .as_f64()
+                .unwrap()
+        };
+        let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
+        assert_near(
+            error(&["--model", text(&model)]) / told("after"),
+            1.0,
+            1e-9,
+            name,
+        );
+        let read = error(&["--checkpoint", text(&checkpoint)]);
+        assert_near(read / told("hybrid"), 1.0, 1e-4, name);
+    }
+}
+
+#[test]
+fn what_has_no_past_cannot_carry_a_delay() {
+    let recipe = include_str!("../configs/smoke/train-pendulum.toml");
+    assert!(recipe.contains("plant = "));
+    let folder = tempfile::tempdir().unwrap();
+    let plant = folder.path().join("late.toml");
+    let pendulum = include_str!("../models/pendulum.toml");
+    let late = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.01\n";
+    std::fs::write(&plant, format!("{pendulum}{late}")).unwrap();
+    let line = recipe
+        .lines()
+        .find(|line| line.starts_with("plant = "))
+        .unwrap();
+    let config = folder.path().join("recipe.toml");
+    std::fs::write(&config, recipe.replace(line, "plant = \"late.toml\"")).unwrap();
+    let out = folder.path().join("out");
+    let message = refuses(&["train", "--config", text(&config), "--out", text(&out)]);
+    assert!(
+        message.contains("effect with memory") && message.contains("residyn simulate"),
+        "{message}"
+    );
+}
+
+/// An effect file with this in place of the delay's line.
+fn refused(from: &str, to: &str) -> String {
+    let delay = include_str!("../models/effects/actuator_delay.toml");
+    assert!(delay.contains(from));
+    let file = std::path::Path::new("own.toml");
+    residyn::model::Effect::from_text(file, &delay.replace(from, to))
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn a_filter_that_is_none_is_refused_with_its_line() {
+    let kind = refused("\"delay\"", "\"late\"");
+    assert!(
+        kind.contains("line 4") && kind.contains("\"delay\" or \"lag\""),
+        "{kind}"
+    );
+    for (from, to) in [("\"s\"", "\"ms\""), ("bounds = [0,", "bounds = [-1,")] {
+        let time = refused(from, to);
+        assert!(
+            time.contains("line 4") && time.contains("one parameter"),
+            "{time}"
+        );
+    }
+    let both = refused("confused_with", "force = \"-d\"\nconfused_with");
+    assert!(
+        both.contains("one of force, torque, angle, inertia and command"),
+        "{both}"
+    );
+}
+
+#[test]
+fn expressions_say_what_becomes_of_the_command() {
+    let told = |name: &str, own: &str| effect(name, 0.01).expression(&[own.to_owned()]);
+    assert_eq!(told("actuator_delay", "d1"), "tau1(t - d1)");
+    assert_eq!(
+        told("actuator_lag", "T1"),
+        "T1 * d(tau1)/dt + tau1 = commanded"
+    );
 }

@@ -177,6 +177,10 @@ fn an_effects_expression_names_its_joint_and_reads_back() {
     let library = Library::built_in();
     for system in all_systems() {
         for effect in library.effects() {
+            // What a filter does is told in words of its own, see memory.rs.
+            if effect.entry.formula().is_none() {
+                continue;
+            }
             for joint in (0..system.joints).filter(|j| can_act(&system, effect, *j)) {
                 let values = vec![1.0; effect.parameters.len()];
                 let fitted = fitted(effect, joint, &values);

@@ -100,11 +100,13 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
         step_s: STEP_S,
         length_s: STRETCH_S,
     };
-    let of_log = |log: &Log| {
-        let commands = Commands::of_log(&model.dynamics, &model.fit.values, log);
+    let of_log = |(k, log): (usize, &Log)| {
+        let values = model.fit.values_of_log(k);
+        let commands = Commands::of_log(&model.dynamics, &values, log);
         trajectories(&commands.acting_on(log), thinning)
     };
-    let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
+    let logs = study.logs.iter().enumerate();
+    let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
     let stride = (rows / SEGMENTS).max(1);
     let mut sets = [

@@ -39,7 +39,7 @@ impl Entry {
     pub fn needs_torque(&self) -> bool {
         self.formula().is_none_or(|formula| {
             let mut names = formula.names().into_iter();
-            names.any(|name| ["tau", "load"].contains(&name.as_ref()))
+            names.any(|name| ["tau", "load"].contains(&name))
         })
     }
 }

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use crate::data::Log;
 use crate::identify::Window;
-use crate::model::{Dynamics, Rollout};
+use crate::model::{Commands, Dynamics, Rollout, StepTorque};
 
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,10 +30,13 @@ impl Motion {
             time: self.time.clone(),
             q: vec![Vec::new(); n],
             qd: vec![Vec::new(); n],
-            tau: vec![Vec::new(); n],
+            tau: (0..n)
+                .map(|j| self.tau.iter().map(|tau| tau[j]).collect())
+                .collect(),
             leave_out: Vec::new(),
             notes: Vec::new(),
         };
+        let commands = Commands::of_log(dynamics, values, &log);
         for (row, tau) in self.tau.iter().enumerate() {
             if state.iter().any(|value| !value[0].is_finite()) {
                 return None;
@@ -41,17 +44,18 @@ impl Motion {
             for j in 0..n {
                 log.q[j].push(state[j][0]);
                 log.qd[j].push(state[n + j][0]);
-                log.tau[j].push(tau[j]);
             }
             let Some(next) = self.time.get(row + 1) else {
                 break;
             };
-            let dt = next - self.time[row];
+            let now = self.time[row];
+            let dt = next - now;
             let held: Vec<[f64; 1]> = tau.iter().map(|tau| [*tau]).collect();
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             // a small positive number
             let substeps = ((dt / LONGEST_STEP_S - 1e-6).ceil() as usize).max(1);
-            rollout.advance(&mut state, &held, [self.time[row]], [dt], substeps);
+            let torque = StepTorque::new([&commands], &held, [now], [*next], substeps);
+            rollout.advance(&mut state, &torque.mean, [now], [dt], substeps);
         }
         Some(log)
     }
