@@ -10,6 +10,7 @@ mod clients;
 mod common;
 mod demo;
 mod effects;
+mod experiments;
 mod functions;
 mod gradients;
 mod identify;

@@ -1,5 +1,5 @@
 use crate::expr::{Binary, Graph};
-use crate::model::Dynamics;
+use crate::model::{Dynamics, Parameter};
 
 /// A parameter of the declared equations that a payload raises by a known amount.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +15,7 @@ pub(super) struct Payload {
 /// Units of what a payload adds to.
 const OF_MASS: [&str; 2] = ["kg", "kg m^2"];
 /// Share of the parameter that the payload adds.
-pub(super) const SHARE: f64 = 0.5;
+const SHARE: f64 = 0.5;
 
 impl Payload {
     /// A payload for each of the first `declared` parameters that one can add to.
@@ -27,6 +27,15 @@ impl Payload {
             delay_s,
         };
         (0..declared).filter(carries).map(of).collect()
+    }
+
+    pub fn text(&self, dynamics: &Dynamics) -> String {
+        let Parameter { name, unit, .. } = &dynamics.parameters[self.parameter];
+        let percent = 100.0 * SHARE;
+        format!(
+            "a payload that raises `{name}` by a known {:.3} {unit} ({percent:.0} %)",
+            self.extra
+        )
     }
 
     /// The model of a rig that carries the payload in the later logs and not in the others: one program for both, so
