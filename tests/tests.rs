@@ -25,3 +25,4 @@ mod rigs;
 mod shift;
 mod support;
 mod train;
+mod unexplained;
