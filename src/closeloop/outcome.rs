@@ -56,7 +56,8 @@ pub struct Outcome {
     /// A formula for what is left, where something that matters is.
     pub proposal: Option<Proposal>,
     pub errors: Errors,
-    /// Residual generalised force along the training logs, by the model before and after.
+    /// Residual generalised force along the training logs, by the model before and after; angles within
+    /// the turn where a joint makes more than one.
     pub residual_before: Vec<ForceSample>,
     pub residual_after: Vec<ForceSample>,
     /// The same as smooth curves over each variable.

@@ -10,7 +10,7 @@ use super::learn::learn_residual;
 use super::outcome::{Contender, Errors, Finding, Outcome, Verdict};
 use super::per_log::take_over_intervals;
 use super::proposal::proposal;
-use super::residual::{ForceSample, residual_force};
+use super::residual::{ForceSample, residual_force, within_turn};
 use super::split::Split;
 use super::study::{Fitted, Study, StudyError};
 use super::unexplained::{UNKNOWN, Unexplained};
@@ -90,8 +90,12 @@ pub fn close_loop(
         number: 3,
         text: "residual force",
     });
-    let residual_before = residual_force(&study, &before);
-    let residual_after = residual_force(&study, &after);
+    let residual = |model: &Fitted| {
+        let mut samples = residual_force(&study, model);
+        within_turn(&mut samples, &system.prismatic);
+        samples
+    };
+    let (residual_before, residual_after) = (residual(&before), residual(&after));
     let curves = |samples: &[ForceSample]| curves(samples, &system.prismatic);
     let (curves_before, curves_after) = (curves(&residual_before), curves(&residual_after));
     let proposal = proposal(&study, &after, &left);
