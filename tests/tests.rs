@@ -27,3 +27,4 @@ mod rigs;
 mod shift;
 mod support;
 mod train;
+mod unexplained;

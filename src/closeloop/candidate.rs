@@ -11,7 +11,15 @@ pub fn candidates(
     present: &[FittedEffect],
 ) -> Vec<FittedEffect> {
     let mut all: Vec<FittedEffect> = study.system.shifts();
-    for effect in library {
+    all.extend(acting(study, library));
+    all.retain(|new| !present.iter().any(|old| old.excludes(new)));
+    all
+}
+
+/// Every one of these effects on every joint where it can act and be seen.
+pub(super) fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
+    let mut all = Vec::new();
+    for effect in effects {
         for joint in 0..study.system.joints {
             if is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
@@ -24,7 +32,6 @@ pub fn candidates(
             }
         }
     }
-    all.retain(|new| !present.iter().any(|old| old.excludes(new)));
     all
 }
 

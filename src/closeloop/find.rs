@@ -1,3 +1,5 @@
+use rand::Rng;
+
 use super::confirm::{Confirmed, TakenBack, confirm};
 use super::folds::{folds, left_out_losses};
 use super::outcome::Alternative;
@@ -34,6 +36,7 @@ const HALF: f64 = 0.5;
 pub fn find(
     study: &mut Study<'_>,
     library: &Library,
+    rng: &mut impl Rng,
     progress: &mut dyn FnMut(Stage<'_>),
 ) -> Result<Found, StudyError> {
     let mut stage = |number: usize, text: &str| progress(Stage { number, text });
@@ -55,11 +58,11 @@ pub fn find(
     let rounds = search.rounds;
     let mut after = on_all(study, &before, &model);
     stage(2, "asking what is left");
-    let mut left = unexplained(study, library.probes(), &before, &after);
+    let mut left = unexplained(study, library.probes(), &before, &after, rng);
     if left.is_significant() && share_left(study, &before, &after) > HALF {
         taken_back.extend(stand_ins(study, &after));
         after = before.clone();
-        left = unexplained(study, library.probes(), &before, &after);
+        left = unexplained(study, library.probes(), &before, &after, rng);
     }
     let alternatives = Alternative::of_rivals(study, rivals, &after, &mut |text| stage(3, text));
     Ok(Found {

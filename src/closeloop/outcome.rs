@@ -1,7 +1,9 @@
 use super::confirm::TakenBack;
 use super::contradicted::Contradicted;
+use super::curve::Curve;
 use super::experiment::{Separation, separation};
 use super::learn::Learned;
+use super::proposal::Proposal;
 use super::residual::ForceSample;
 use super::search::{Rival, Round};
 use super::split::How;
@@ -51,10 +53,16 @@ pub struct Outcome {
     /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
     pub confirmed_on: usize,
     pub unexplained: Unexplained,
+    /// A formula for what is left, where something that matters is.
+    pub proposal: Option<Proposal>,
     pub errors: Errors,
-    /// Residual generalised force along the training logs, by the model before and after.
+    /// Residual generalised force along the training logs, by the model before and after; angles within
+    /// the turn where a joint makes more than one.
     pub residual_before: Vec<ForceSample>,
     pub residual_after: Vec<ForceSample>,
+    /// The same as smooth curves over each variable.
+    pub curves_before: Vec<Curve>,
+    pub curves_after: Vec<Curve>,
     /// The residual network trained on what is left, where the logs give enough to train it.
     pub learned: Option<Learned>,
     /// For each joint whether it slides rather than turns.

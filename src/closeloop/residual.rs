@@ -1,3 +1,5 @@
+use std::f64::consts::{PI, TAU};
+
 use super::study::{Fitted, Study};
 use crate::identify::{Shooting, cut, fit};
 
@@ -66,6 +68,19 @@ pub fn residual_force(study: &Study<'_>, model: &Fitted) -> Vec<ForceSample> {
             }
         })
         .collect()
+}
+
+/// Where a turning joint makes more than a full turn, the angle within the turn, from -pi to pi: that is what a
+/// force can depend on.
+pub fn within_turn(samples: &mut [ForceSample], prismatic: &[bool]) {
+    for (joint, _) in prismatic.iter().enumerate().filter(|(_, slides)| !**slides) {
+        let reach = samples.iter().map(|s| s.q[joint].abs()).fold(0.0, f64::max);
+        if reach > TAU {
+            for sample in samples.iter_mut() {
+                sample.q[joint] = (sample.q[joint] + PI).rem_euclid(TAU) - PI;
+            }
+        }
+    }
 }
 
 /// Root mean square of the residual force over stretches and joints, outliers weighing no more than three

@@ -2,16 +2,18 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bootstrap::reduction_interval;
 use super::contradicted::contradicted;
+use super::curve::curves;
 use super::evidence::{p_of_gains, p_value};
 use super::find::{Found, find};
 use super::folds::{folds, left_out_losses};
 use super::learn::learn_residual;
 use super::outcome::{Contender, Errors, Finding, Outcome, Verdict};
 use super::per_log::take_over_intervals;
-use super::residual::residual_force;
+use super::proposal::proposal;
+use super::residual::{ForceSample, residual_force, within_turn};
 use super::split::Split;
 use super::study::{Fitted, Study, StudyError};
-use super::unexplained::Unexplained;
+use super::unexplained::{UNKNOWN, Unexplained};
 use crate::data::audit;
 use crate::evaluate::{Assessment, assess, window_count};
 use crate::identify::uncertainty;
@@ -83,13 +85,20 @@ pub fn close_loop(
         taken_back,
         confirmed_on,
         unexplained: left,
-    } = find(&mut study, library, progress)?;
+    } = find(&mut study, library, rng, progress)?;
     progress(Stage {
         number: 3,
         text: "residual force",
     });
-    let residual_before = residual_force(&study, &before);
-    let residual_after = residual_force(&study, &after);
+    let residual = |model: &Fitted| {
+        let mut samples = residual_force(&study, model);
+        within_turn(&mut samples, &system.prismatic);
+        samples
+    };
+    let (residual_before, residual_after) = (residual(&before), residual(&after));
+    let curves = |samples: &[ForceSample]| curves(samples, &system.prismatic);
+    let (curves_before, curves_after) = (curves(&residual_before), curves(&residual_after));
+    let proposal = proposal(&study, &after, &left);
     let learned = match backend {
         Some(backend) => learn_residual(&study, &after, backend, rng, &mut |text| {
             progress(Stage { number: 4, text });
@@ -147,9 +156,12 @@ pub fn close_loop(
         findings,
         rounds,
         unexplained: left,
+        proposal,
         errors,
         residual_before,
         residual_after,
+        curves_before,
+        curves_after,
         learned,
         train: split.train.clone(),
         test: split.test,
@@ -282,7 +294,10 @@ fn verdict(
                       do not use them before logs of more varied motion confirm them";
         return (Verdict::Inconclusive, reason.into());
     }
-    let what_is_left = format!("something that depends on {} is left", left.place);
+    let what_is_left = match left.place.as_str() {
+        UNKNOWN => "something is left that follows no variable that was probed".to_owned(),
+        place => format!("something that depends on {place} is left"),
+    };
     match (found, left.is_significant()) {
         (0, false) => (
             Verdict::NoMissingEffect,

@@ -1,8 +1,8 @@
 use serde::Serialize;
 
 use crate::closeloop::{
-    Alternative, Contradicted, Finding, How, Outcome, Separation, TakenBack, Unexplained, Verdict,
-    norm,
+    Alternative, Contradicted, Curve, Finding, How, Outcome, Probed, Separation, TakenBack,
+    Verdict, norm,
 };
 use crate::data::Finding as AuditFinding;
 use crate::evaluate::{Assessment, Summary, summarise};
@@ -98,6 +98,26 @@ struct UnexplainedEntry {
     p_value: f64,
     #[serde(rename = "where")]
     place: String,
+    omnibus: OmnibusEntry,
+    probes: Vec<Probed>,
+    curves: Vec<Curve>,
+    proposal: Option<ProposalEntry>,
+}
+
+/// Whether the residuals are more than noise, whatever they follow.
+#[derive(Debug, Serialize)]
+struct OmnibusEntry {
+    p_value: f64,
+    /// Share of the residual variance of each joint that is no white noise.
+    share: Vec<f64>,
+}
+
+/// A formula for what is left: no finding.
+#[derive(Debug, Serialize)]
+struct ProposalEntry {
+    joint: usize,
+    formula: String,
+    explains: f64,
 }
 
 #[derive(Debug, Serialize)]
@@ -211,7 +231,7 @@ impl Report {
             alternatives: outcome.alternatives.iter().map(alternative).collect(),
             taken_back: outcome.taken_back.iter().map(taken_back).collect(),
             confirmed_on: outcome.confirmed_on,
-            unexplained: left(&outcome.unexplained),
+            unexplained: left(outcome),
             parameters: outcome.parameters[..declared]
                 .iter()
                 .map(parameter)
@@ -312,11 +332,23 @@ fn shifted(effect: &FittedEffect) -> Option<String> {
         .map(|_| effect.effect.parameters[0].name.clone())
 }
 
-fn left(unexplained: &Unexplained) -> UnexplainedEntry {
+fn left(outcome: &Outcome) -> UnexplainedEntry {
+    let left = &outcome.unexplained;
     UnexplainedEntry {
-        fraction: unexplained.fraction,
-        p_value: unexplained.p_value,
-        place: unexplained.place.clone(),
+        fraction: left.fraction,
+        p_value: left.p_value,
+        place: left.place.clone(),
+        omnibus: OmnibusEntry {
+            p_value: left.omnibus.p_value,
+            share: left.omnibus.shares.clone(),
+        },
+        probes: left.probes.clone(),
+        curves: outcome.curves_after.clone(),
+        proposal: outcome.proposal.as_ref().map(|proposal| ProposalEntry {
+            joint: proposal.joint + 1,
+            formula: proposal.formula.clone(),
+            explains: proposal.explains,
+        }),
     }
 }
 

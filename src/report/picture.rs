@@ -1,11 +1,9 @@
 //! The report's plots: what of an outcome goes into which chart.
 
-use std::f64::consts::{PI, TAU};
-
 use super::plot::{
-    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapePanel, ShapeSample, Track,
+    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapePanel, ShapeSample, Track,
 };
-use crate::closeloop::{ForceSample, Outcome};
+use crate::closeloop::{Curve, ForceSample, Outcome};
 use crate::data::Log;
 use crate::evaluate::{Assessment, summarise, traces};
 use crate::model::Dynamics;
@@ -105,35 +103,44 @@ fn predicted(
         .collect()
 }
 
-/// The residual generalised force over angle, speed and torque, before and after.
+/// The residual generalised force over angle, speed, torque and time, before and after.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    // Over full turns the angle within the turn is what a force can depend on.
-    let turns = |joint: usize| {
-        let reach = outcome.residual_before.iter().map(|s| s.q[joint].abs());
-        !outcome.prismatic[joint] && reach.fold(0.0, f64::max) > TAU
-    };
-    let shown = |q: f64, joint: usize| {
-        if turns(joint) {
-            (q + PI).rem_euclid(TAU) - PI
-        } else {
-            q
-        }
-    };
     let samples = |all: &[ForceSample], joint: usize| {
         all.iter()
             .map(|s| ShapeSample {
-                q: shown(s.q[joint], joint),
-                qd: s.qd[joint],
-                tau: s.tau[joint],
+                values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
                 residual: s.force[joint],
             })
             .collect()
+    };
+    let names = |joint: usize| {
+        [
+            format!("q{joint}"),
+            format!("qd{joint}"),
+            format!("tau{joint}"),
+            "t".to_owned(),
+        ]
+    };
+    let curves = |all: &[Curve], joint: usize| {
+        names(joint + 1).map(|name| {
+            let found = all
+                .iter()
+                .find(|c| c.joint == joint + 1 && c.variable == name);
+            found.map(|c| ShapeCurve {
+                x: c.x.clone(),
+                force: c.force.clone(),
+                low: c.low.clone(),
+                high: c.high.clone(),
+            })
+        })
     };
     let panel = |joint: usize| ShapePanel {
         joint: joint + 1,
         kind: kind(outcome, joint),
         before: samples(&outcome.residual_before, joint),
         after: samples(&outcome.residual_after, joint),
+        curves_before: curves(&outcome.curves_before, joint),
+        curves_after: curves(&outcome.curves_after, joint),
     };
     let panels: Vec<ShapePanel> = (0..outcome.after.dynamics.joints).map(panel).collect();
     super::plot::residual_shape(&panels, "What the model lacks, before and after")

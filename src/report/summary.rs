@@ -1,6 +1,6 @@
 use std::fmt::Write;
 
-use super::text::{headline, small, values};
+use super::text::{headline, proposal_line, small, values};
 use crate::closeloop::Outcome;
 use crate::evaluate::{Assessment, Summary, summarise};
 
@@ -19,6 +19,9 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             finding.expression,
             values(finding).join("\n    ")
         );
+    }
+    if let Some(proposal) = &outcome.proposal {
+        let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
     for &k in &outcome.identifiability.hold {
         let name = &outcome.before.dynamics.parameters[k].name;

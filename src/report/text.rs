@@ -1,6 +1,8 @@
 use std::fmt::Write;
 
-use crate::closeloop::{Finding, How, MOST_EFFECTS, Outcome, SIGNIFICANT, Verdict, norm};
+use crate::closeloop::{
+    Finding, How, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, SIGNIFICANT, UNKNOWN, Verdict, norm,
+};
 use crate::data::Severity;
 use crate::evaluate::{Summary, summarise};
 use crate::model::{OwnValue, Parameter};
@@ -328,23 +330,21 @@ fn confirmed(outcome: &Outcome) -> String {
 
 fn left(outcome: &Outcome) -> String {
     let left = &outcome.unexplained;
-    let structure = if left.is_significant() {
-        format!(
-            "It follows {} (p = {}).",
-            left.place,
-            probability(left.p_value)
-        )
-    } else if left.p_value < SIGNIFICANT {
-        format!(
-            "There is structure in it (p = {}), too little to matter: no smooth shape over angle, speed, torque or \
-             time saves a twentieth of the loss.",
-            probability(left.p_value)
-        )
-    } else {
-        format!(
-            "It follows neither angle, speed, torque nor time (p = {}).",
-            probability(left.p_value)
-        )
+    let p = probability(left.p_value);
+    let share = 100.0 * left.omnibus.most().1;
+    let structure = match left.place.as_str() {
+        UNKNOWN => format!(
+            "The residuals are no noise (p = {p}; {share:.0} % of their variance is more than white noise), and follow \
+             no smooth shape over angle, speed, torque or time: think of something with a memory or a rhythm of its \
+             own, such as a spring in the joint, presliding or a disturbance."
+        ),
+        place if left.is_significant() => format!("It follows {place} (p = {p})."),
+        _ if left.p_value < SIGNIFICANT => format!(
+            "There is structure in it (p = {p}), too little to matter: {share:.1} % of the residuals' variance is more \
+             than white noise, and no shape that was probed saves {:.0} % of the loss.",
+            100.0 * NOTEWORTHY
+        ),
+        _ => format!("The residuals are like the sensor's noise (p = {p})."),
     };
     let network = match &outcome.errors.hybrid {
         Some(hybrid) if hybrid.position_rms() > 1.01 * outcome.errors.after.position_rms() => {
@@ -355,10 +355,30 @@ fn left(outcome: &Outcome) -> String {
     format!(
         "## What is left\n\n{:.1} % of the residual variance above the sensor's noise is left. {structure}\n{network}\
          Residual generalised force: {:.4} before, {:.4} after (root mean square over stretches of 0.15 s, N m or N).\n\n\
-         ![residual](residual.svg)\n\n",
+         ![residual](residual.svg)\n\n{}",
         100.0 * left.fraction,
         norm(&outcome.residual_before),
-        norm(&outcome.residual_after)
+        norm(&outcome.residual_after),
+        outcome.proposal.as_ref().map(proposed).unwrap_or_default()
+    )
+}
+
+fn proposed(proposal: &Proposal) -> String {
+    format!(
+        "{}.\nNothing but its fit speaks for it. As an effect file, for a folder that `--effects` names:\n\n\
+         ```toml\n{}```\n\n",
+        capitalised(&proposal_line(proposal)),
+        proposal.file
+    )
+}
+
+/// `proposal, not a finding: force on joint 1 ~ -0.0012 * qd1^3 (explains 81 % of what is left on stretches left out)`
+pub(super) fn proposal_line(proposal: &Proposal) -> String {
+    format!(
+        "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of what is left on stretches left out)",
+        proposal.joint + 1,
+        proposal.formula,
+        100.0 * proposal.explains
     )
 }
 

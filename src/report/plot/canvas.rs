@@ -144,6 +144,16 @@ pub(super) fn curves<'a>(
         .set("stroke-linejoin", "round")
 }
 
+/// The area within an outline.
+pub(super) fn filled(outline: &[(f64, f64)], colour: &str) -> Path {
+    let mut data = String::new();
+    for (index, point) in outline.iter().enumerate() {
+        push(&mut data, if index == 0 { 'M' } else { 'L' }, *point);
+    }
+    data.push('Z');
+    Path::new().set("d", data).set("fill", colour)
+}
+
 /// Round dots as one path of zero-length strokes with round caps: a fifth of the text of as many circles.
 pub(super) fn dots(
     points: impl IntoIterator<Item = (f64, f64)>,

@@ -2,8 +2,8 @@
 
 use svg::node::element::{Group, Rectangle};
 
-use super::canvas::{Anchor, TO_BASELINE, curves, dots, marker, rule, text, text_width};
-use super::style::{INK, MARGIN, MEAN_MARK_PX, Role, START_MARK_PX, TEXT_SIZE, WIDTH};
+use super::canvas::{Anchor, TO_BASELINE, curves, dots, filled, marker, text, text_width};
+use super::style::{INK, MARGIN, Role, START_MARK_PX, TEXT_SIZE, WIDTH};
 
 const SAMPLE_PX: f64 = 30.0;
 const ROW_PX: f64 = 21.0;
@@ -20,8 +20,8 @@ pub(super) enum Sample {
     Bar(Role),
     /// The mark at the start of a piece of a curve.
     Start,
-    /// A marker with an upright interval.
-    Interval,
+    /// The line of a role in its band.
+    Band(Role),
 }
 
 /// An entry of a legend.
@@ -77,8 +77,12 @@ fn sample(sample: Sample, x: f64, y: f64) -> Group {
                 .set("fill", role.colour()),
         ),
         Sample::Start => group.add(marker(centre, START_MARK_PX, INK)),
-        Sample::Interval => group
-            .add(rule((centre.0, y - 8.0), (centre.0, y + 8.0), INK).set("stroke-width", 1.4))
-            .add(marker(centre, MEAN_MARK_PX, INK)),
+        Sample::Band(role) => {
+            let (right, low, high) = (x + SAMPLE_PX, y + 6.0, y - 6.0);
+            let outline = [(x, low), (right, low), (right, high), (x, high)];
+            group
+                .add(filled(&outline, role.colour()).set("opacity", 0.25))
+                .add(curves([&[(x, y), (right, y)][..]], &role.stroke()))
+        }
     }
 }

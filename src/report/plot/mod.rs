@@ -8,7 +8,6 @@
 //! only the generic font `sans-serif`.
 
 mod axes;
-mod binned;
 mod canvas;
 mod decimate;
 mod error_bars;
@@ -18,11 +17,10 @@ mod residual_shape;
 mod scale;
 mod style;
 
-pub use binned::{Bin, binned_mean};
 pub use decimate::decimate;
 pub use error_bars::{Bar, ErrorRow, error_bars};
 pub use predictions::{Panel, Track, predictions};
-pub use residual_shape::{ShapePanel, ShapeSample, residual_shape};
+pub use residual_shape::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
 pub use style::Role;
 
 /// A figure that cannot be drawn.

@@ -3,32 +3,35 @@
 use svg::node::element::SVG;
 
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
-use super::binned::{Bin, binned_mean};
-use super::canvas::{Area, Canvas, clipped, curves, dots, marker, rule};
+use super::canvas::{Area, Canvas, clipped, curves, dots, filled, rule};
 use super::legend::{Entry, Sample, legend};
 use super::scale::Range;
-use super::style::{INK, MARGIN, MEAN_MARK_PX, Role, Stroke, WIDTH};
+use super::style::{INK, MARGIN, Role, WIDTH};
 use super::{JointKind, PlotError};
 
-/// Enough to show the cloud; a mean over all points stands in front of it.
+/// Enough to show the cloud; a curve stands in front of it.
 const MAX_CLOUD_POINTS: usize = 1500;
-const BINS: usize = 16;
 const PANEL_HEIGHT: f64 = 230.0;
-const PANEL_GAP: f64 = 32.0;
+const PANEL_GAP: f64 = 16.0;
 /// Points beyond these quantiles do not stretch an axis.
 const QUANTILES: (f64, f64) = (0.01, 0.99);
 
 /// The residual force of one window, with the mean state in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeSample {
-    /// Position of the joint.
-    pub q: f64,
-    /// Velocity of the joint.
-    pub qd: f64,
-    /// Commanded generalised force on the joint.
-    pub tau: f64,
+    /// Position and velocity of the joint, commanded generalised force on it, time.
+    pub values: [f64; 4],
     /// Generalised force that the model lacks.
     pub residual: f64,
+}
+
+/// The share of one variable in the residual force, with a band.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeCurve {
+    pub x: Vec<f64>,
+    pub force: Vec<f64>,
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
 }
 
 /// The residual forces of one joint.
@@ -42,21 +45,28 @@ pub struct ShapePanel {
     pub before: Vec<ShapeSample>,
     /// Left by the model with the effects; empty where there is none.
     pub after: Vec<ShapeSample>,
+    /// In the order of the samples' values; none where a variable stays the same.
+    pub curves_before: [Option<ShapeCurve>; 4],
+    pub curves_after: [Option<ShapeCurve>; 4],
 }
 
-type Cloud = Vec<(f64, f64)>;
+/// What one panel shows of one model.
+struct Shown<'a> {
+    role: Role,
+    cloud: Vec<(f64, f64)>,
+    curve: Option<&'a ShapeCurve>,
+}
 
 /// What a panel of a row has along its lower side.
 struct Column {
     quantity: String,
     unit: &'static str,
-    value: fn(&ShapeSample) -> f64,
 }
 
-/// Draws one row a joint: residual force against position, velocity and torque.
+/// Draws one row a joint: residual force against position, velocity, torque and time.
 ///
 /// The axes cover the middle 98 % of the values; a remark counts the points outside. Large clouds are thinned
-/// evenly, the means are over all points.
+/// evenly.
 pub fn residual_shape(panels: &[ShapePanel], title: &str) -> Result<String, PlotError> {
     if panels.is_empty() {
         return Err(PlotError::Empty {
@@ -78,28 +88,24 @@ fn entries(panels: &[ShapePanel]) -> Vec<Entry> {
     if panels.iter().any(|panel| !panel.after.is_empty()) {
         entries.push(Entry::new(Sample::Point(Role::After), "after"));
     }
-    entries.push(Entry::new(Sample::Interval, "mean of a bin, 95 % interval"));
+    entries.push(Entry::new(
+        Sample::Band(Role::After),
+        "what this variable carries by itself, 95 % band",
+    ));
     entries
 }
 
-fn columns(panel: &ShapePanel) -> [Column; 3] {
+fn columns(panel: &ShapePanel) -> [Column; 4] {
     let ShapePanel { joint, kind, .. } = panel;
+    let column = |quantity: String, unit| Column { quantity, unit };
     [
-        Column {
-            quantity: format!("position q{joint}"),
-            unit: kind.position_unit(),
-            value: |sample| sample.q,
-        },
-        Column {
-            quantity: format!("velocity qd{joint}"),
-            unit: kind.velocity_unit(),
-            value: |sample| sample.qd,
-        },
-        Column {
-            quantity: format!("{} tau{joint}", kind.force_name()),
-            unit: kind.force_unit(),
-            value: |sample| sample.tau,
-        },
+        column(format!("position q{joint}"), kind.position_unit()),
+        column(format!("velocity qd{joint}"), kind.velocity_unit()),
+        column(
+            format!("{} tau{joint}", kind.force_name()),
+            kind.force_unit(),
+        ),
+        column("time t".to_owned(), "s"),
     ]
 }
 
@@ -108,7 +114,7 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
     let range = force_range(panel);
     let y = Axis::vertical(range, PANEL_HEIGHT, &residual, panel.kind.force_unit());
     let left = MARGIN + y.gutter();
-    let width = (WIDTH - MARGIN - left - 2.0 * PANEL_GAP) / 3.0;
+    let width = (WIDTH - MARGIN - left - 3.0 * PANEL_GAP) / 4.0;
     let mut area = Area {
         x: left,
         y: top,
@@ -116,26 +122,26 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
         height: PANEL_HEIGHT,
     };
     canvas.add(heading(area, &format!("Joint {}", panel.joint)));
-    for column in columns(panel) {
-        let clouds = [(Role::Before, &panel.before), (Role::After, &panel.after)]
-            .map(|(role, samples)| (role, cloud(samples, column.value)));
-        let range = state_range(&clouds);
+    for (k, column) in columns(panel).into_iter().enumerate() {
+        let shown = [
+            (Role::Before, &panel.before, &panel.curves_before[k]),
+            (Role::After, &panel.after, &panel.curves_after[k]),
+        ]
+        .map(|(role, samples, curve)| Shown {
+            role,
+            cloud: samples.iter().map(|s| (s.values[k], s.residual)).collect(),
+            curve: curve.as_ref(),
+        });
+        let range = state_range(&shown);
         let x = Axis::horizontal(range, width, &column.quantity, column.unit);
         let frame = Frame { area, x: &x, y: &y };
-        draw_panel(canvas, &frame, &clouds);
+        draw_panel(canvas, &frame, &shown);
         if area.x == left {
             canvas.add(frame.y_numbers());
             canvas.add(frame.y_label());
         }
         area.x += width + PANEL_GAP;
     }
-}
-
-fn cloud(samples: &[ShapeSample], value: fn(&ShapeSample) -> f64) -> Cloud {
-    samples
-        .iter()
-        .map(|sample| (value(sample), sample.residual))
-        .collect()
 }
 
 /// Of each set on its own, so that a large one does not push a small one off the axis; zero is always on it.
@@ -150,10 +156,10 @@ fn force_range(panel: &ShapePanel) -> Range {
     ranges.fold(zero, Range::union).drawable().widened(0.08)
 }
 
-fn state_range(clouds: &[(Role, Cloud)]) -> Range {
-    let values = clouds
+fn state_range(shown: &[Shown<'_>]) -> Range {
+    let values = shown
         .iter()
-        .flat_map(|(_, cloud)| cloud)
+        .flat_map(|shown| &shown.cloud)
         .map(|point| point.0);
     let range = Range::between_quantiles(values, QUANTILES.0, QUANTILES.1);
     range
@@ -162,27 +168,29 @@ fn state_range(clouds: &[(Role, Cloud)]) -> Range {
         .drawable()
 }
 
-fn draw_panel(canvas: &mut Canvas, frame: &Frame, clouds: &[(Role, Cloud)]) {
+fn draw_panel(canvas: &mut Canvas, frame: &Frame, shown: &[Shown<'_>]) {
     canvas.add(frame.grid());
     canvas.add(frame.x_labels());
     let zero = frame.y_px(0.0);
     let mut inner = clipped(frame.area).add(rule((0.0, zero), (frame.area.width, zero), INK));
-    for (role, cloud) in clouds {
+    for Shown { role, cloud, .. } in shown {
         let step = cloud.len().div_ceil(MAX_CLOUD_POINTS).max(1);
-        let shown = cloud
+        let held = cloud
             .iter()
             .step_by(step)
             .filter(|point| frame.holds(**point));
-        let points = shown.map(|point| frame.point_px(*point));
+        let points = held.map(|point| frame.point_px(*point));
         inner = inner.add(dots(points, 3.0, role.colour()).set("opacity", 0.28));
     }
-    for (role, cloud) in clouds {
-        inner = with_means(inner, frame, *role, &binned_mean(cloud, BINS));
+    for Shown { role, curve, .. } in shown {
+        if let Some(curve) = curve {
+            inner = with_curve(inner, frame, *role, curve);
+        }
     }
     canvas.add(inner);
-    let total: usize = clouds.iter().map(|(_, cloud)| cloud.len()).sum();
-    let inside = |cloud: &Cloud| cloud.iter().filter(|point| frame.holds(**point)).count();
-    let outside = total - clouds.iter().map(|(_, cloud)| inside(cloud)).sum::<usize>();
+    let points = || shown.iter().flat_map(|shown| &shown.cloud);
+    let total = points().count();
+    let outside = points().filter(|point| !frame.holds(**point)).count();
     if total == 0 {
         canvas.add(no_data(frame.area));
     } else if outside > 0 {
@@ -193,29 +201,26 @@ fn draw_panel(canvas: &mut Canvas, frame: &Frame, clouds: &[(Role, Cloud)]) {
     }
 }
 
-fn with_means(mut inner: SVG, frame: &Frame, role: Role, bins: &[Bin]) -> SVG {
-    let colour = role.colour();
-    let means: Cloud = bins
-        .iter()
-        .map(|bin| frame.point_px((bin.x, bin.mean)))
-        .collect();
-    let thin = Stroke {
-        width: 1.2,
-        ..role.stroke()
+/// A line in its band.
+fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG {
+    let line = |forces: &[f64]| -> Vec<(f64, f64)> {
+        let points = curve.x.iter().zip(forces);
+        points
+            .map(|(x, force)| frame.point_px((*x, *force)))
+            .collect()
     };
-    inner = inner.add(curves([means.as_slice()], &thin));
-    for (bin, centre) in bins.iter().zip(&means) {
-        let [low, high] = [-1.0, 1.0].map(|sign| frame.y_px(bin.mean + sign * bin.half_width));
-        inner = inner
-            .add(rule((centre.0, low), (centre.0, high), colour).set("stroke-width", 1.6))
-            .add(marker(*centre, MEAN_MARK_PX, colour));
-    }
+    let (low, mut high) = (line(&curve.low), line(&curve.high));
+    high.reverse();
+    let outline = [low, high].concat();
+    let middle = line(&curve.force);
     inner
+        .add(filled(&outline, role.colour()).set("opacity", 0.25))
+        .add(curves([middle.as_slice()], &role.stroke()))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ShapePanel, ShapeSample, residual_shape};
+    use super::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
     use crate::report::plot::{JointKind, PlotError};
 
     fn panel(before: Vec<ShapeSample>) -> ShapePanel {
@@ -225,14 +230,14 @@ mod tests {
             kind,
             before,
             after: vec![],
+            curves_before: [const { None }; 4],
+            curves_after: [const { None }; 4],
         }
     }
 
     fn sample(residual: f64) -> ShapeSample {
         ShapeSample {
-            q: 1.0,
-            qd: residual,
-            tau: 0.0,
+            values: [1.0, residual, 0.0, 0.0],
             residual,
         }
     }
@@ -259,6 +264,23 @@ mod tests {
         let figure = residual_shape(&[panel(samples)], "outlier").unwrap();
         assert!(figure.contains("of 501 points outside"));
         assert!(!figure.contains(">10000<"));
+    }
+
+    #[test]
+    fn a_curve_is_drawn_in_its_band() {
+        let mut panel = panel((0..20).map(|i| sample(f64::from(i) - 10.0)).collect());
+        let without = residual_shape(std::slice::from_ref(&panel), "curve").unwrap();
+        panel.curves_before[1] = Some(ShapeCurve {
+            x: vec![-9.0, 9.0],
+            force: vec![-5.0, 5.0],
+            low: vec![-6.0, 4.0],
+            high: vec![-4.0, 6.0],
+        });
+        let figure = residual_shape(&[panel], "curve").unwrap();
+        assert!(
+            figure.len() > without.len() && figure.contains("Z\""),
+            "{figure}"
+        );
     }
 
     #[test]

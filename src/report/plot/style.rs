@@ -65,8 +65,6 @@ pub(super) const SMALL_SIZE: f64 = 11.5;
 
 /// Radius of the mark at the start of a piece of a curve.
 pub(super) const START_MARK_PX: f64 = 3.4;
-/// Radius of the mark at the mean of a bin.
-pub(super) const MEAN_MARK_PX: f64 = 3.0;
 
 pub(super) const INK: &str = "#2b2b2b";
 pub(super) const FAINT_INK: &str = "#666666";

@@ -1,0 +1,146 @@
+//! What no effect of the library explains is told from noise, and where it lives.
+
+use std::path::Path;
+
+use residyn::closeloop::{Proposal, Study, Unexplained, proposal, unexplained};
+use residyn::data::Log;
+use residyn::model::{FittedEffect, Library, System};
+use residyn::plant::Plant;
+
+use crate::common::rng;
+
+/// A pendulum that hangs at q1 = 0, driven by a geared motor; its encoder and its hidden effects are added.
+const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 5, duration_s = 10, start = [0, 0] }
+"#;
+
+/// White noise of a milliradian, and an encoder of 4096 steps a turn.
+const WHITE: &str = "position_noise = 1e-3, position_step = 0.0";
+const QUANTISED: &str = "position_noise = 2e-4, position_step = 1.5339807878856412e-3";
+
+/// An effect file that no library has.
+fn effect(name: &str, force: &str) -> String {
+    format!(
+        "[effect]\nname = \"{name}\"\nabout = \"hidden\"\nforce = \"{force}\"\n[parameters]\n\
+         size = {{ unit = \"1\", typical = 1.0 }}\n"
+    )
+}
+
+/// The library with a folder of these files.
+fn library(files: &[String]) -> Library {
+    let folder = tempfile::tempdir().unwrap();
+    for (number, file) in files.iter().enumerate() {
+        std::fs::write(folder.path().join(format!("{number}.toml")), file).unwrap();
+    }
+    Library::built_in().with_folder(folder.path()).unwrap()
+}
+
+/// Logs of the rig with the hidden force.
+fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
+    let library = library(&[effect("hidden", force)]);
+    let text = format!("{RIG}sensor = {{ rate_hz = 100, {sensor} }}\n");
+    let mut plant = Plant::from_text(Path::new("rig.toml"), &text, &library).unwrap();
+    plant.add_effect(&library, "hidden", 1, &[]).unwrap();
+    let mut rng = rng(seed);
+    (0..plant.recording.logs)
+        .map(|_| plant.record(&mut rng).unwrap())
+        .collect()
+}
+
+/// The pendulum with these effects declared, their sizes unknown.
+fn declared(effects: &[&str]) -> System {
+    let library = Library::built_in();
+    let mut system = library.system(Path::new("pendulum")).unwrap();
+    system.parameters[0].value = -17.0;
+    system.parameters[1].value = 4.0;
+    let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), 0);
+    system.effects = effects.iter().map(absent).collect();
+    system
+}
+
+/// What the pendulum with these effects leaves unexplained of the logs, beside the pendulum without.
+fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
+    let (bare, system) = (declared(&[]), declared(effects));
+    let before = Study::new(&bare, logs).fit_declared().unwrap();
+    let mut study = Study::new(&system, logs);
+    let after = study.fit_declared().unwrap();
+    let probes = Library::built_in();
+    unexplained(&study, probes.probes(), &before, &after, &mut rng(seed))
+}
+
+/// A formula for what the bare pendulum leaves of the logs.
+fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
+    let system = declared(&[]);
+    let mut study = Study::new(&system, logs);
+    let fitted = study.fit_declared().unwrap();
+    let library = Library::built_in();
+    let left = unexplained(&study, library.probes(), &fitted, &fitted, &mut rng(seed));
+    proposal(&study, &fitted, &left)
+}
+
+#[test]
+fn noise_is_not_significant() {
+    for sensor in [WHITE, QUANTISED] {
+        for seed in 0..8 {
+            let left = left(&logs(sensor, "0*size", seed), &[], seed);
+            assert!(
+                !left.is_significant() && left.p_value > 0.01,
+                "{sensor}, {seed}: {left:?}"
+            );
+        }
+    }
+}
+
+/// An effect of the library that the model has leaves nothing that matters, sharper though the rig's friction is.
+#[test]
+fn an_effect_that_was_found_leaves_nothing() {
+    for seed in 0..3 {
+        let logs = logs(QUANTISED, "-0.16*size*sign(qd)", seed);
+        let left = left(&logs, &["coulomb_friction"], seed);
+        assert!(!left.is_significant(), "{seed}: {left:?}");
+    }
+}
+
+/// Forces that no effect of the library describes, and where they live.
+#[test]
+fn what_the_library_lacks_is_located() {
+    let cases = [
+        ("-0.0015*size*qd^3", "qd1"),
+        ("-0.15*size*sign(qd)*(1 + sin(q))", "q1*qd1"),
+        ("-0.02*size*t*sign(qd)", "t"),
+        ("clamp(tau, -1.2*size - 0.1*qd, 1.2 - 0.1*qd) - tau", "tau1"),
+        ("0.1*size*sin(25*t)", "unknown"),
+    ];
+    for (force, place) in cases {
+        for sensor in [WHITE, QUANTISED] {
+            let left = left(&logs(sensor, force, 1), &[], 1);
+            assert_eq!(left.place, place, "{force}, {sensor}: {left:?}");
+            assert!(left.p_value < 0.01);
+        }
+    }
+}
+
+#[test]
+fn cubic_damping_is_proposed_with_its_size() {
+    for seed in 0..3 {
+        let found = proposed(&logs(WHITE, "-0.0015*size*qd^3", seed), seed).unwrap();
+        assert!(found.formula.ends_with(" * qd1^3"), "{found:?}");
+        let size: f64 = found.formula.split(' ').next().unwrap().parse().unwrap();
+        assert!((size + 0.0015).abs() < 1e-4, "{found:?}");
+        assert!(found.explains > 0.8, "{found:?}");
+        // What the report prints is a file that `--effects` takes.
+        let library = library(&[found.file]);
+        assert_eq!(
+            library.effect("proposed").unwrap().parameters[0].unit,
+            "N m s^3/rad^3"
+        );
+    }
+}
+
+#[test]
+fn nothing_is_proposed_for_noise() {
+    assert_eq!(proposed(&logs(WHITE, "0*size", 3), 3), None);
+}
