@@ -151,6 +151,7 @@ pub fn close_loop(
         residual_before,
         residual_after,
         learned,
+        calibration: None,
         train: split.train.clone(),
         test: split.test,
     })
