@@ -14,7 +14,14 @@ fn demo() -> &'static Path {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let report = folder.path().join("report");
         let run = Command::new(env!("CARGO_BIN_EXE_residyn"))
-            .args(["closeloop", "--against", "pendulum", "--out"])
+            .args([
+                "closeloop",
+                "--against",
+                "pendulum",
+                "--calibrate",
+                "1",
+                "--out",
+            ])
             .arg(&report)
             .output()
             .expect("the program starts");

@@ -53,6 +53,53 @@ fn the_same_seed_gives_the_same_report() {
 }
 
 #[test]
+fn simulations_of_the_accepted_model_show_what_the_logs_could() {
+    let folder = tempfile::tempdir().unwrap();
+    let calibrated = |seed: &str, name: &str| {
+        let out = folder.path().join(name);
+        let out = text(&out);
+        let arguments = [
+            "closeloop",
+            "--json",
+            "--seed",
+            seed,
+            "--calibrate",
+            "2",
+            "--out",
+            out,
+        ];
+        let report: Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
+        let written = std::fs::read_to_string(folder.path().join(name).join("report.md")).unwrap();
+        assert!(written.contains("## What these logs could show"));
+        report
+    };
+    let (first, second) = (calibrated("3", "first"), calibrated("3", "second"));
+    assert_eq!(first, second);
+    let calibration = &first["calibration"];
+    assert_eq!(
+        (&calibration["runs"], &calibration["alarms"]),
+        (&2.into(), &0.into())
+    );
+    let smallest = calibration["smallest"].as_array().unwrap();
+    let of = |name: &str| smallest.iter().find(|entry| entry["effect"] == name);
+    // What was found belongs to the model; what is hidden beside it is found.
+    assert!(of("coulomb_friction").is_none());
+    let drag = of("viscous_friction").unwrap();
+    assert!(drag["value"].as_f64().unwrap() > 0.0);
+    assert_eq!(drag["verified"], true);
+    // The rest of the report is what it is without.
+    let (plain, _folder) = demo("3");
+    assert!(plain["calibration"].is_null());
+    assert_eq!(plain["error"], first["error"]);
+}
+
+#[test]
+fn a_calibration_of_no_runs_is_refused() {
+    let message = refuses(&["closeloop", "--calibrate", "0"]);
+    assert!(message.contains("--calibrate"), "{message}");
+}
+
+#[test]
 fn what_was_written_is_taken_by_other_commands() {
     let (report, folder) = demo("4");
     let out = folder.path().join("report");

@@ -1,3 +1,4 @@
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
@@ -6,7 +7,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Answer, Common, inputs, progress};
-use crate::closeloop::{Contender, Outcome, Request, STAGES, Split, Verdict, close_loop};
+use crate::closeloop::{
+    Contender, Outcome, Request, STAGES, Split, Verdict, calibrate, close_loop,
+};
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, System};
 use crate::plant::Plant;
@@ -18,7 +21,7 @@ use crate::train::Origin;
 /// Without arguments: a simulated demo rig whose logs carry an effect that its model does not declare.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report\n  residyn closeloop --model pendulum --train run1.csv --test run3.csv --against published.toml old/model.toml"
+    after_help = "Example:\n  residyn closeloop --model models/pendulum.toml --train run1.csv run2.csv \\\n      --test run3.csv --leave-out run1.csv@4.2-5.0 --out report\n  residyn closeloop --model pendulum --train run1.csv --test run3.csv --against published.toml old/model.toml\n  residyn closeloop --calibrate 20"
 )]
 pub(super) struct Arguments {
     /// Model file, or the name of a built-in system
@@ -39,6 +42,10 @@ pub(super) struct Arguments {
     /// Intervals to leave out, in the time of the log
     #[arg(long, num_args = 1.., value_name = "LOG@T0-T1")]
     leave_out: Vec<LeaveOut>,
+    /// Afterwards repeat the search on this many simulations of the accepted model: how often does it name an effect
+    /// where there is none, and how small an effect would it name? Takes about as long as so many runs
+    #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS")]
+    calibrate: Option<NonZeroUsize>,
     /// Folders of your own effect files
     #[arg(long, num_args = 1.., value_name = "DIR")]
     effects: Vec<PathBuf>,
@@ -71,13 +78,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         horizons_s: HORIZONS_S,
         backend: Some(arguments.common.device),
     };
-    let outcome = close_loop(request, &mut rng, &mut |stage| {
+    let mut outcome = close_loop(request, &mut rng, &mut |stage| {
         bar.set_position(stage.number as u64);
         bar.set_message(stage.text.to_owned());
     })?;
     bar.finish_and_clear();
     let origin = origin(arguments, &system);
-    let report = report::write(&arguments.out, &system, &outcome, &origin)?;
+    let mut report = report::write(&arguments.out, &system, &outcome, &origin)?;
+    if let Some(runs) = arguments.calibrate {
+        // The report is safe before the long work begins.
+        let bar = progress::bar(runs.get());
+        let study = outcome.study(&system);
+        let calibration = calibrate(
+            &study,
+            &outcome.after,
+            &library,
+            runs.get(),
+            &mut rng,
+            &mut |step| {
+                bar.set_length(step.of as u64);
+                bar.set_position(step.number as u64);
+                bar.set_message(step.text.to_owned());
+            },
+        )?;
+        outcome.calibration = Some(calibration);
+        bar.finish_and_clear();
+        report = report::write(&arguments.out, &system, &outcome, &origin)?;
+    }
     if arguments.common.json {
         inputs::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
@@ -162,6 +189,7 @@ fn origin(arguments: &Arguments, system: &System) -> Origin {
             "against": paths(&arguments.against),
             "leave_out": spans.collect::<Vec<_>>(),
             "effects": paths(&arguments.effects),
+            "calibrate": arguments.calibrate,
             "device": arguments.common.device.name(),
         }),
         seed: arguments.common.seed,

@@ -1,6 +1,7 @@
 //! Closing the loop: from logs and a declared model to the effects that the model lacks.
 
 mod bootstrap;
+mod calibrate;
 mod candidate;
 mod confirm;
 mod contradicted;
@@ -22,6 +23,7 @@ mod split;
 mod study;
 mod unexplained;
 
+pub use calibrate::{Calibration, HIDDEN, Limit, Size, Step, calibrate};
 pub use confirm::TakenBack;
 pub use contradicted::Contradicted;
 pub use curve::{Curve, curves};

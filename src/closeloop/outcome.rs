@@ -1,3 +1,4 @@
+use super::calibrate::Calibration;
 use super::confirm::TakenBack;
 use super::contradicted::Contradicted;
 use super::curve::Curve;
@@ -12,7 +13,7 @@ use super::unexplained::Unexplained;
 use crate::data::{Audit, Log};
 use crate::evaluate::Assessment;
 use crate::identify::Identifiability;
-use crate::model::{Dynamics, FittedEffect, OwnValue, Parameter};
+use crate::model::{Dynamics, FittedEffect, OwnValue, Parameter, System};
 
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -65,10 +66,22 @@ pub struct Outcome {
     pub curves_after: Vec<Curve>,
     /// The residual network trained on what is left, where the logs give enough to train it.
     pub learned: Option<Learned>,
+    /// What the training logs could show, where that was asked for: see [`super::calibrate`].
+    pub calibration: Option<Calibration>,
     /// For each joint whether it slides rather than turns.
     pub prismatic: Vec<bool>,
     /// Widths of the smoothed sign of each joint, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
+}
+
+impl Outcome {
+    /// The training logs as they were studied; `system` is the one that was declared.
+    pub fn study<'a>(&'a self, system: &'a System) -> Study<'a> {
+        Study {
+            identifiability: self.identifiability.clone(),
+            ..Study::new(system, &self.train)
+        }
+    }
 }
 
 /// One effect that was added.

@@ -163,6 +163,7 @@ pub fn close_loop(
         curves_before,
         curves_after,
         learned,
+        calibration: None,
         train: split.train.clone(),
         test: split.test,
     })

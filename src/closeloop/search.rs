@@ -38,11 +38,11 @@ impl Rival {
 }
 
 /// Probability of a false alarm that a look admits, over all candidates and all their starting points.
-const FALSE_ALARM: f64 = 0.05;
+pub(super) const FALSE_ALARM: f64 = 0.05;
 /// Few stretches cannot prove so much. There an effect is admitted that takes away half of the loss on stretches
 /// left out, which chance does not do, if it alone is this significant.
-const PLAIN: f64 = 0.5;
-const SIGNIFICANT_ALONE: f64 = 0.01;
+pub(super) const PLAIN: f64 = 0.5;
+pub(super) const SIGNIFICANT_ALONE: f64 = 0.01;
 /// Candidates that are fitted after all have been screened.
 const FITTED: usize = 8;
 /// Effects that one search adds at most.

@@ -26,9 +26,10 @@ const SHORT_S: f64 = 0.15;
 /// Length in s of the windows over which models are fitted and compared: most effects show in them.
 pub(super) const WINDOW_S: f64 = 0.5;
 
-/// Dry friction is smoothed over this share of a joint's top speed in the logs, so that the width means the
+/// Dry friction is smoothed over this share of a joint's top speed in the logs: a joint that sticks creeps at most at
+/// such a speed, a milliradian in half a second on a lab rig. A share, so that the width means the
 /// same on a slow axis and on a fast arm.
-const SIGN_WIDTH: f64 = 0.002;
+const SIGN_WIDTH: f64 = 5e-4;
 
 /// A declared system, logs to learn from, and what both imply.
 pub struct Study<'a> {

@@ -142,6 +142,24 @@ pub fn fit(
     Ok(search.finish())
 }
 
+/// A model as it stands, no value changed, and what each window says about the parameters `active` there.
+///
+/// # Errors
+/// As [`fit`].
+pub fn as_it_stands(
+    shooting: &Shooting<'_>,
+    dynamics: &Dynamics,
+    active: &[usize],
+    values: impl Into<Values>,
+    locals: Vec<Vec<f64>>,
+    scale: f64,
+) -> Result<Fit, FitError> {
+    let tangent = Tangent::new(dynamics, active, Local::State);
+    let values = values.into();
+    let search = Search::new(shooting, dynamics, &tangent, values, locals, Some(scale))?;
+    Ok(search.finish())
+}
+
 /// The cost that one Gauss-Newton step promises for the model at `values`, within the parameters' bounds:
 /// the worth of a candidate before it is fitted. `None` where the model diverges there.
 pub fn promise(

@@ -12,7 +12,7 @@ mod shooting;
 mod values;
 mod window;
 
-pub use fit::{Fit, FitError, Reduced, fit, promise};
+pub use fit::{Fit, FitError, Reduced, as_it_stands, fit, promise};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
 pub use sensitivity::Local;

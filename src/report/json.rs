@@ -1,5 +1,6 @@
 use serde::Serialize;
 
+use super::calibration::CalibrationEntry;
 use crate::closeloop::{
     Alternative, Contradicted, Curve, Finding, How, Outcome, Probed, Separation, TakenBack,
     Verdict, norm,
@@ -34,6 +35,8 @@ pub struct Report {
     logs: LogsEntry,
     audit: Vec<AuditEntry>,
     tried: Vec<Vec<TriedEntry>>,
+    /// `null` where it was not asked for.
+    calibration: Option<CalibrationEntry>,
     files: FilesEntry,
 }
 
@@ -253,6 +256,7 @@ impl Report {
                 })
                 .collect(),
             tried: tried(outcome),
+            calibration: outcome.calibration.as_ref().map(CalibrationEntry::new),
             files: FilesEntry {
                 model: MODEL,
                 report: TEXT,

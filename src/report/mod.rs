@@ -1,5 +1,6 @@
 //! What closing the loop found, for people and for programs.
 
+mod calibration;
 mod folder;
 mod json;
 mod model_file;

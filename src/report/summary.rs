@@ -1,5 +1,6 @@
 use std::fmt::Write;
 
+use super::calibration::line;
 use super::text::{headline, proposal_line, small, values};
 use crate::closeloop::Outcome;
 use crate::evaluate::{Assessment, Summary, summarise};
@@ -54,6 +55,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
     for (name, model) in as_they_are {
         let _ = writeln!(out, "  {name}, no fit: {}", errors(outcome, model));
     }
+    out += &outcome.calibration.as_ref().map_or_else(String::new, line);
     let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
     out
 }

@@ -1,5 +1,6 @@
 use std::fmt::Write;
 
+use super::calibration::section;
 use crate::closeloop::{
     Finding, How, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, SIGNIFICANT, UNKNOWN, Verdict, norm,
 };
@@ -19,6 +20,10 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
         alternatives(outcome),
         left(outcome),
         tried(outcome),
+        outcome
+            .calibration
+            .as_ref()
+            .map_or_else(String::new, section),
         logs(outcome),
         footer(outcome, seed),
     ];
@@ -51,7 +56,7 @@ pub(super) fn headline(outcome: &Outcome) -> String {
 }
 
 /// `a`, `a and b`, `a, b and c`
-fn listed(names: &[String]) -> String {
+pub(super) fn listed(names: &[String]) -> String {
     match names {
         [] => String::new(),
         [one] => one.clone(),
@@ -229,7 +234,7 @@ fn errors(outcome: &Outcome) -> String {
 
 /// A position error in rad (or m), three significant digits.
 pub(super) fn small(x: f64) -> String {
-    rounded(x, 0.01 * x)
+    rounded(x, 0.01 * x.abs())
 }
 
 fn parameters(outcome: &Outcome) -> String {

@@ -1,0 +1,143 @@
+//! On a simulated pendulum without a missing effect, encoders as on a real rig.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+
+use super::*;
+use crate::plant::Plant;
+
+const RIG: &str = r#"
+model = "pendulum"
+
+[parameters]
+C_g = -17.4
+C_i = 4.6
+
+[sensor]
+rate_hz = 100
+position_noise = 5e-4
+position_step = 1.5339807878856412e-3
+
+[excitation]
+amplitude = [1.6]
+band_hz = [0.15, 2.0]
+tones = 8
+
+[recording]
+logs = 3
+duration_s = 8
+start = [0, 0]
+"#;
+
+fn coulomb(level: f64) -> String {
+    format!("[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nF_c = {level}\n")
+}
+
+/// Logs of the rig, with what is added to its file.
+fn logs(more: &str, seed: u64) -> Vec<Log> {
+    let text = format!("{RIG}\n{more}");
+    let plant = Plant::from_text(Path::new("rig.toml"), &text, &Library::built_in()).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..plant.recording.logs)
+        .map(|_| plant.record(&mut rng).unwrap())
+        .collect()
+}
+
+fn pendulum() -> System {
+    Library::built_in().system(Path::new("pendulum")).unwrap()
+}
+
+#[test]
+fn the_windows_of_the_logs_are_found_again() {
+    let (system, logs) = (pendulum(), logs("", 0));
+    let mut study = Study::new(&system, &logs);
+    let accepted = study.fit_declared().unwrap();
+    let null = Null::new(&study, &accepted).unwrap();
+    let drawn = null.draw(&[], &mut ChaCha8Rng::seed_from_u64(0)).unwrap();
+    let again = study.on(&drawn);
+    let (before, after) = (&study.shooting, &again.shooting);
+    assert_eq!(before.windows.len(), after.windows.len());
+    // The motion is the accepted model's, and each residual has its old size: only signs were drawn.
+    let residuals = |study: &Study<'_>| {
+        let states = study.shooting.initial_locals(0);
+        let values = &accepted.fit.values;
+        let scale = Some(accepted.fit.scale);
+        let dynamics = &accepted.dynamics;
+        let found = crate::identify::fit(&study.shooting, dynamics, &[], values, states, scale);
+        study
+            .shooting
+            .residuals(dynamics, &values.into(), &found.unwrap().locals)
+    };
+    let mut turned = 0;
+    for (window, (old, new)) in residuals(&study).iter().zip(residuals(&again)).enumerate() {
+        let sign = if old.iter().zip(&new).map(|(a, b)| a * b).sum::<f64>() > 0.0 {
+            1.0
+        } else {
+            turned += 1;
+            -1.0
+        };
+        let off = old.iter().zip(&new).map(|(a, b)| (a - sign * b).abs());
+        let off = off.fold(0.0, f64::max);
+        // Both fits end when a step gains less than 1e-4 of the loss: within a hundredth of the noise.
+        assert!(off < 0.03, "window {window}: {off}");
+    }
+    assert!(turned > 5 && turned < after.windows.len() - 5, "{turned}");
+}
+
+#[test]
+fn nothing_is_named_where_nothing_is_missing_and_the_hidden_is() {
+    let (system, library, logs) = (pendulum(), Library::built_in(), logs("", 0));
+    let mut study = Study::new(&system, &logs);
+    let accepted = study.fit_declared().unwrap();
+    let repeat = |runs: usize| {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        calibrate(&study, &accepted, &library, runs, &mut rng, &mut |_| {}).unwrap()
+    };
+    let found = repeat(8);
+    // At the nominal 5 % two of eight have a chance of 6 %, three one of 0.6 %.
+    assert!(found.alarms() <= 2, "{:?}", found.named);
+    let tried: Vec<_> = found.limits.iter().filter_map(Limit::verified).collect();
+    // The gain of the drive is one with the pendulum's own constants.
+    assert_eq!(tried, [true; 3]);
+    let gain = |limit: &&Limit| limit.effect.effect.name == "actuator_gain";
+    let gain = found.limits.iter().find(gain).unwrap();
+    assert_eq!(gain.smallest, Size::NeverTold);
+}
+
+#[test]
+fn friction_is_named_from_about_its_smallest_size_on() {
+    const SEEDS: u64 = 4;
+    let (system, library) = (pendulum(), Library::built_in());
+    let bare = logs("", 0);
+    let mut study = Study::new(&system, &bare);
+    let accepted = study.fit_declared().unwrap();
+    let limits = limits(&study, &accepted, library.effects()).unwrap();
+    let friction = |limit: &&Limit| limit.effect.effect.name == "coulomb_friction";
+    let Size::Named { values, .. } = &limits.iter().find(friction).unwrap().smallest else {
+        panic!("friction shows in any motion");
+    };
+    let smallest = values[0];
+    let named = |level: f64| {
+        let named = |seed: &u64| {
+            let logs = logs(&coulomb(level), 100 + seed);
+            let mut study = Study::new(&system, &logs);
+            let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
+            let found = find(&mut study, &library, rng, &mut |_| {}).unwrap();
+            let effects = found.after.effects.iter();
+            effects.map(FittedEffect::label).collect::<Vec<_>>() == ["coulomb_friction on joint 1"]
+        };
+        (0..SEEDS).filter(named).count()
+    };
+    assert!(named(0.5 * smallest) <= 1, "half of {smallest}");
+    assert!(named(2.0 * smallest) >= 3, "twice {smallest}");
+}
+
+#[test]
+fn the_interval_of_a_share_is_wilsons() {
+    // 0 of 20: z^2 / (20 + z^2). 5 of 10: 0.2366 to 0.7634, as printed in textbooks.
+    let [low, high] = wilson(0, 20);
+    assert!(low == 0.0 && (high - 0.16113).abs() < 1e-5, "{high}");
+    let [low, high] = wilson(5, 10);
+    assert!((low - 0.2366).abs() < 1e-4 && (high - 0.7634).abs() < 1e-4);
+}

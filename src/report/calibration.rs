@@ -1,0 +1,258 @@
+//! What the logs could show, as a part of `report.json`, a section of `report.md` and a line for a terminal.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::text::{listed, small};
+use crate::closeloop::{Calibration, HIDDEN, Limit, Size};
+use crate::model::{EffectParameter, FittedEffect};
+
+#[derive(Debug, Serialize)]
+pub(super) struct CalibrationEntry {
+    /// Simulations of the accepted model that were searched.
+    runs: usize,
+    /// Those in which something was named that is not there.
+    alarms: usize,
+    rate: f64,
+    rate_ci95: [f64; 2],
+    named: Vec<AlarmEntry>,
+    /// Simulations in which something was left that nothing explains.
+    unexplained: usize,
+    smallest: Vec<SmallestEntry>,
+}
+
+#[derive(Debug, Serialize)]
+struct AlarmEntry {
+    name: String,
+    joint: usize,
+    runs: usize,
+}
+
+/// The smallest size of an effect that the search would name.
+#[derive(Debug, Serialize)]
+struct SmallestEntry {
+    effect: String,
+    joint: usize,
+    parameter: String,
+    /// `null` where there is none: `reason` says why.
+    value: Option<f64>,
+    unit: String,
+    reason: Option<&'static str>,
+    /// Where the parameter is a torque.
+    share_of_top_torque: Option<f64>,
+    /// The effect's inner parameters at that size; other switches are at zero.
+    with: Vec<ValueEntry>,
+    /// Whether it was named when hidden at 1.5 times that size; `null` where that was not tried.
+    verified: Option<bool>,
+    /// What else was named then.
+    named_besides: Vec<EffectEntry>,
+}
+
+#[derive(Debug, Serialize)]
+struct ValueEntry {
+    name: String,
+    value: f64,
+    unit: String,
+}
+
+#[derive(Debug, Serialize)]
+struct EffectEntry {
+    name: String,
+    joint: usize,
+}
+
+impl CalibrationEntry {
+    pub(super) fn new(calibration: &Calibration) -> Self {
+        Self {
+            runs: calibration.named.len(),
+            alarms: calibration.alarms(),
+            rate: calibration.rate(),
+            rate_ci95: calibration.rate_ci95(),
+            named: alarms(calibration),
+            unexplained: calibration.unexplained,
+            smallest: calibration
+                .limits
+                .iter()
+                .map(|limit| smallest(limit, &calibration.top_torque))
+                .collect(),
+        }
+    }
+}
+
+fn alarms(calibration: &Calibration) -> Vec<AlarmEntry> {
+    let mut runs: BTreeMap<(&str, usize), usize> = BTreeMap::new();
+    for effect in calibration.named.iter().flatten() {
+        *runs
+            .entry((&effect.effect.name, effect.joint + 1))
+            .or_default() += 1;
+    }
+    runs.into_iter()
+        .map(|((name, joint), runs)| AlarmEntry {
+            name: name.to_owned(),
+            joint,
+            runs,
+        })
+        .collect()
+}
+
+fn smallest(limit: &Limit, top_torque: &[f64]) -> SmallestEntry {
+    let effect = &limit.effect;
+    let parameters = &effect.effect.parameters;
+    let (leading, values) = match &limit.smallest {
+        Size::Named { switch, values } => (*switch, values.as_slice()),
+        // The parameter that its size would be told by.
+        _ => (
+            parameters.iter().position(|p| p.is_switch()).unwrap_or(0),
+            [].as_slice(),
+        ),
+    };
+    let EffectParameter { name, unit, .. } = &parameters[leading];
+    let value = values.get(leading).copied();
+    let top = top_torque[effect.joint];
+    let inner = parameters
+        .iter()
+        .zip(values)
+        .filter(|(p, _)| !p.is_switch());
+    SmallestEntry {
+        effect: effect.effect.name.clone(),
+        joint: effect.joint + 1,
+        parameter: name.clone(),
+        value,
+        unit: unit.clone(),
+        reason: reason(&limit.smallest),
+        share_of_top_torque: value
+            .filter(|_| unit == "N m" && top > 0.0)
+            .map(|value| value / top),
+        with: inner
+            .map(|(parameter, value)| ValueEntry {
+                name: parameter.name.clone(),
+                value: *value,
+                unit: parameter.unit.clone(),
+            })
+            .collect(),
+        verified: limit.verified(),
+        named_besides: besides(limit)
+            .map(|other| EffectEntry {
+                name: other.effect.name.clone(),
+                joint: other.joint + 1,
+            })
+            .collect(),
+    }
+}
+
+fn reason(size: &Size) -> Option<&'static str> {
+    match size {
+        Size::Named { .. } => None,
+        Size::NeverTold => Some("not told from the rest of the model at any size"),
+        Size::NotComputed => Some("not computed: no value of a parameter switches it off"),
+    }
+}
+
+/// What was named beside the hidden effect, or in its place.
+fn besides(limit: &Limit) -> impl Iterator<Item = &FittedEffect> {
+    let named = limit.named.iter().flatten();
+    named.filter(|named| named.label() != limit.effect.label())
+}
+
+/// The section of `report.md`.
+pub(super) fn section(calibration: &Calibration) -> String {
+    let mut out = format!(
+        "## What these logs could show\n\n{}, with the torques of the training logs and the residuals of its fit as noise, \
+         were searched like the logs themselves. {}.\n\n\
+         The smallest size of each effect that the search would name in four of five such logs; common effects were hidden in a \
+         simulation at {HIDDEN} times that size:\n\n\
+         | effect | joint | smallest size | of the top torque | hidden |\n|---|---|---|---|---|\n",
+        simulations(calibration),
+        alarms_in_words(calibration),
+    );
+    for limit in &calibration.limits {
+        let entry = smallest(limit, &calibration.top_torque);
+        let size = entry.value.map_or_else(
+            || entry.reason.unwrap_or_default().to_owned(),
+            |value| {
+                let others = entry.with.iter();
+                std::iter::once(quantity(&entry.parameter, value, &entry.unit))
+                    .chain(others.map(|other| quantity(&other.name, other.value, &other.unit)))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+            },
+        );
+        let share = entry
+            .share_of_top_torque
+            .map_or_else(|| "-".to_owned(), |share| format!("{:.2} %", 100.0 * share));
+        let _ = writeln!(
+            out,
+            "| {} | {} | {size} | {share} | {} |",
+            limit.effect.title(),
+            entry.joint,
+            hidden(limit)
+        );
+    }
+    out + "\n"
+}
+
+/// The line for a terminal.
+pub(super) fn line(calibration: &Calibration) -> String {
+    format!(
+        "  {}: {}\n",
+        simulations(calibration),
+        alarms_in_words(calibration)
+    )
+}
+
+fn simulations(calibration: &Calibration) -> String {
+    format!(
+        "{} simulations of the accepted model",
+        calibration.named.len()
+    )
+}
+
+fn alarms_in_words(calibration: &Calibration) -> String {
+    let [low, high] = calibration.rate_ci95().map(|share| 100.0 * share);
+    let mut out = format!(
+        "{} named an effect that is not there: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
+        calibration.alarms(),
+        100.0 * calibration.rate(),
+    );
+    let named = alarms(calibration);
+    if !named.is_empty() {
+        let named: Vec<String> = named
+            .iter()
+            .map(|alarm| format!("{} on joint {} ({})", alarm.name, alarm.joint, alarm.runs))
+            .collect();
+        let _ = write!(out, ": {}", listed(&named));
+    }
+    let _ = write!(
+        out,
+        "; {} left something unexplained",
+        calibration.unexplained
+    );
+    out
+}
+
+fn hidden(limit: &Limit) -> String {
+    let others: Vec<String> = besides(limit).map(FittedEffect::label).collect();
+    match (limit.verified(), others.is_empty()) {
+        (None, _) => "not tried".to_owned(),
+        (Some(true), true) => "named".to_owned(),
+        (Some(true), false) => format!("named beside {}", listed(&others)),
+        (Some(false), true) => "not named".to_owned(),
+        (Some(false), false) => format!("{} named in its place", listed(&others)),
+    }
+}
+
+fn quantity(name: &str, value: f64, unit: &str) -> String {
+    let unit = if unit == "1" {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
+    let number = if value == 0.0 {
+        "0".to_owned()
+    } else {
+        small(value)
+    };
+    format!("{name} = {number}{unit}")
+}
