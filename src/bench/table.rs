@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cell::Findings;
 use super::grid::{Cell, Group};
-use super::judge::Judgement;
+use super::judge::{Coverage, Judgement};
 use crate::closeloop::Verdict;
 
 /// One cell and what came of it; one line of `cells.jsonl`.
@@ -122,14 +122,23 @@ pub struct Seconds {
 /// The error after is as small as that of the true structure when it exceeds it by no more than this.
 const AS_GOOD: f64 = 1.1;
 
+/// A cell whose loop could not be closed counts as a failure wherever it counts at all.
 struct Done<'l> {
     cell: &'l Cell,
-    findings: &'l Findings,
+    findings: Option<&'l Findings>,
 }
 
 impl Done<'_> {
-    fn judgement(&self) -> &Judgement {
-        &self.findings.judgement
+    fn shows(&self, what: impl Fn(&Judgement) -> bool) -> bool {
+        self.findings.is_some_and(|f| what(&f.judgement))
+    }
+
+    fn ratio(&self) -> Option<f64> {
+        self.findings?.errors.ratio()
+    }
+
+    fn coverage(&self) -> &[Coverage] {
+        self.findings.map_or(&[], |f| &f.judgement.coverage)
     }
 }
 
@@ -137,10 +146,9 @@ impl Done<'_> {
 pub fn summarise(lines: &[Line]) -> Summary {
     let done: Vec<Done<'_>> = lines
         .iter()
-        .filter_map(|line| {
-            let findings = line.findings.as_ref().ok()?;
-            let cell = &line.cell;
-            Some(Done { cell, findings })
+        .map(|line| Done {
+            cell: &line.cell,
+            findings: line.findings.as_ref().ok(),
         })
         .collect();
     let failed = lines.iter().filter_map(|line| {
@@ -151,10 +159,7 @@ pub fn summarise(lines: &[Line]) -> Summary {
         .iter()
         .filter(|d| matches!(d.cell.group, Group::Single | Group::Pair))
         .collect();
-    let ratios: Vec<f64> = known
-        .iter()
-        .filter_map(|d| d.findings.errors.ratio())
-        .collect();
+    let ratios: Vec<f64> = known.iter().filter_map(|d| d.ratio()).collect();
     Summary {
         cells: lines.len(),
         errors: failed.collect(),
@@ -177,13 +182,14 @@ fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
     let of = |group: Group, hit: &dyn Fn(&Done<'_>) -> bool| {
         Rate::count(done.iter().filter(|d| d.cell.group == group).map(hit))
     };
-    let exact = |d: &Done<'_>| d.judgement().exact;
-    let within = |d: &Done<'_>| d.judgement().within;
-    let named = |d: &Done<'_>| !d.findings.answer.named.is_empty();
-    let flagged = |d: &Done<'_>| d.judgement().flagged;
-    let passed = |d: &Done<'_>| d.judgement().passed;
+    let exact = |d: &Done<'_>| d.shows(|j| j.exact);
+    let within = |d: &Done<'_>| d.shows(|j| j.within);
+    let named = |d: &Done<'_>| !d.findings.is_some_and(|f| f.answer.named.is_empty());
+    let flagged_in_vain = |d: &Done<'_>| !d.shows(|j| !j.flagged);
+    let flagged = |d: &Done<'_>| d.shows(|j| j.flagged);
+    let passed = |d: &Done<'_>| d.shows(|j| j.passed);
     let covered = |of_effects: bool| {
-        let all = done.iter().flat_map(|d| &d.judgement().coverage);
+        let all = done.iter().flat_map(Done::coverage);
         let wanted = all.filter(|c| c.name.contains('.') == of_effects);
         Rate::count(wanted.map(|c| c.covered))
     };
@@ -199,7 +205,10 @@ fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
             of(Group::Pair, &within),
         ),
         Row::new("no effect: something is named", of(Group::None, &named)),
-        Row::new("no effect: something is flagged", of(Group::None, &flagged)),
+        Row::new(
+            "no effect: something is flagged",
+            of(Group::None, &flagged_in_vain),
+        ),
         Row::new("outside the library: flagged", of(Group::Outside, &flagged)),
         Row::new(
             "outside the library: flagged, and no name that cuts less than half of the error",
@@ -224,7 +233,7 @@ fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
     for d in done {
         for key in keys(d) {
-            groups.entry(key).or_default().push(d.judgement().passed);
+            groups.entry(key).or_default().push(d.shows(|j| j.passed));
         }
     }
     counted(groups)
@@ -232,7 +241,7 @@ fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
 
 fn by_parameter(done: &[Done<'_>]) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
-    for coverage in done.iter().flat_map(|d| &d.judgement().coverage) {
+    for coverage in done.iter().flat_map(Done::coverage) {
         // Neither the joint nor the log says anything about a parameter.
         let name = coverage.name.split('[').next().unwrap_or_default();
         let name = match name.split_once('@') {
@@ -251,19 +260,22 @@ fn counted(groups: BTreeMap<String, Vec<bool>>) -> Vec<Row> {
     groups.into_iter().map(row).collect()
 }
 
+/// Cells that could not be run are listed by their errors.
 fn failure(d: &Done<'_>) -> Option<Failure> {
-    let (judgement, answer) = (d.judgement(), &d.findings.answer);
+    let Findings {
+        answer,
+        judgement,
+        errors,
+        ..
+    } = d.findings?;
+    let labels = answer.named.iter().map(|named| named.label.clone());
     (!judgement.passed).then(|| Failure {
         cell: d.cell.id.clone(),
         group: d.cell.group,
-        named: answer
-            .named
-            .iter()
-            .map(|named| named.label.clone())
-            .collect(),
+        named: labels.collect(),
         within: judgement.within,
         verdict: answer.verdict,
-        ratio: d.findings.errors.ratio(),
+        ratio: errors.ratio(),
     })
 }
 

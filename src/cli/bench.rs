@@ -134,7 +134,12 @@ impl Store {
 
     fn add(&self, cell: &Cell, library: &Library) -> Result<Line> {
         let begun = Instant::now();
-        let findings = cell.run(library).map_err(|error| format!("{error:#}"));
+        // A panic is a failure of what is measured: one more line, and the run of hours goes on.
+        let run = std::panic::AssertUnwindSafe(|| cell.run(library));
+        let findings = match std::panic::catch_unwind(run) {
+            Ok(findings) => findings.map_err(|error| format!("{error:#}")),
+            Err(_) => Err("the program panicked".to_owned()),
+        };
         let line = Line {
             configuration: configuration(cell)?,
             program: self.program.clone(),
