@@ -10,7 +10,7 @@ use rand_distr::{Distribution, Normal};
 use residyn::data::Log;
 use residyn::expr::{Graph, Program, SignForm};
 use residyn::model::{
-    Commands, Dynamics, Effect, Entry, FittedEffect, Library, Rollout, StepTorque, System,
+    Commands, Dynamics, Effect, Entry, FittedEffect, Library, Rollout, Sensors, StepTorque, System,
 };
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
@@ -211,13 +211,17 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
         };
         *tau = log.time.iter().map(|t| 0.25 * torque * wave(*t)).collect();
     }
-    let commands = Commands::of_log(model, &model.values(), &log);
+    let (time, tau) = (log.time.clone(), log.tau.clone());
+    let commands = Commands::new(model, &model.values(), &time, &tau);
     let mut rollout = Rollout::<f64, 1>::new(model, &model.values());
+    let mut sensors = Sensors::<1>::new(model, &model.values());
     let mut state: Vec<[f64; 1]> = start.iter().map(|x| [*x]).collect();
     for row in 0..=rows {
         let time = log.time[row];
+        let before = || Commands::just_before([&commands], [row]);
+        let shown = sensors.show(&state, before, [time]);
         for j in 0..n {
-            log.q[j].push(state[j][0]);
+            log.q[j].push(shown[j][0]);
             log.qd[j].push(state[n + j][0]);
         }
         let held: Vec<[f64; 1]> = log.tau.iter().map(|tau| [tau[row]]).collect();

@@ -288,6 +288,7 @@ fn every_effect_file_is_tested_here() {
         "sensor_offset",
         "actuator_delay",
         "actuator_lag",
+        "backlash",
     ]);
     tested.sort_unstable();
     let library = Library::built_in();

@@ -3,7 +3,7 @@
 use residyn::data::Log;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit, uncertainty};
-use residyn::model::{Commands, Dynamics, FittedEffect, Library, StepTorque};
+use residyn::model::{Commands, Dynamics, FittedEffect, Library, Sensors, StepTorque};
 
 use serde_json::Value;
 
@@ -37,7 +37,8 @@ fn history() -> (Vec<f64>, Vec<f64>) {
 /// Mean torque of the first joint over each part, and its slopes by the filters' parameters.
 fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f64>) {
     let (time, tau) = history();
-    let commands = Commands::new(model, &model.values(), &time, &[tau]);
+    let tau = [tau];
+    let commands = Commands::new(model, &model.values(), &time, &tau);
     let torque = StepTorque::new([&commands], &[[f64::NAN]], [from], [to], parts);
     let first = |lanes: Vec<[f64; 1]>| lanes.into_iter().map(|lane| lane[0]).collect();
     (first(torque.mean), first(torque.slopes))
@@ -215,10 +216,11 @@ fn recorded(effect: &str) -> (tempfile::TempDir, Vec<String>) {
 }
 
 #[test]
-fn closing_the_loop_tells_a_delay_from_a_lag() {
+fn closing_the_loop_names_the_effect_with_memory() {
     for (setting, name, truth) in [
         ("actuator_delay=0.01", "actuator_delay", 0.01),
         ("actuator_lag=0.02", "actuator_lag", 0.02),
+        ("backlash=0.01", "backlash", 0.01),
     ] {
         let (folder, logs) = recorded(setting);
         let [a, b, c, test] = [0, 1, 2, 3].map(|k| logs[k].as_str());
@@ -306,7 +308,7 @@ fn a_filter_that_is_none_is_refused_with_its_line() {
     }
     let both = refused("confused_with", "force = \"-d\"\nconfused_with");
     assert!(
-        both.contains("one of force, torque, angle, inertia and command"),
+        both.contains("one of force, torque, angle, inertia, command and reading"),
         "{both}"
     );
 }
@@ -319,4 +321,58 @@ fn expressions_say_what_becomes_of_the_command() {
         told("actuator_lag", "T1"),
         "T1 * d(tau1)/dt + tau1 = commanded"
     );
+}
+
+fn backlash(delta: f64, driven: f64) -> FittedEffect {
+    fitted(
+        Library::built_in().effect("backlash").unwrap(),
+        0,
+        &[delta, driven],
+    )
+}
+
+#[test]
+fn play_parts_the_sensor_from_the_link() {
+    for (driven, [v, tau], ahead) in [
+        (1.0, [2.0, 0.5], 0.01),
+        (1.0, [2.0, -0.5], -0.01),
+        (0.0, [2.0, -0.5], -0.01),
+        (0.0, [-2.0, -0.5], 0.01),
+    ] {
+        let model = pendulum(&[backlash(0.02, driven)]);
+        let mut sensors = Sensors::<1>::new(&model, &model.values());
+        let mut state = [[0.7], [v]];
+        let shown = sensors.show(&state, || vec![[tau]], [0.0])[0][0];
+        assert_near(shown, 0.7 + ahead, 1e-12, "angle shown");
+        state[0][0] = shown;
+        sensors.correct(&mut state, || vec![[tau]], [0.0]);
+        assert_near(state[0][0], 0.7, 1e-12, "angle of the link");
+        // The link itself moves as without play.
+        let inputs = [&[0.7, v, tau, 0.0], model.values().as_slice()].concat();
+        assert_near(
+            model.program.eval(&inputs)[1],
+            15.0 * 0.7_f64.sin() + 3.0 * tau,
+            1e-12,
+            "link",
+        );
+    }
+}
+
+#[test]
+fn play_comes_back_within_its_interval() {
+    for driven in [0.0, 1.0] {
+        let rig = pendulum(&[backlash(0.01, driven)]);
+        let logs = logs(&rig);
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
+        let model = pendulum(&[backlash(0.0, driven)]);
+        let start = [14.0, 3.3, 0.0, driven];
+        let locals = shooting.initial_locals(0);
+        let found = fit(&shooting, &model, &[0, 1, 2], start.as_slice(), locals, None).unwrap();
+        let half = uncertainty(&shooting, &found).half_width(2);
+        let value = found.values[2];
+        assert!(
+            (value - 0.01).abs() < half && half < 1e-3,
+            "{driven}: {value} +- {half}"
+        );
+    }
 }

@@ -6,8 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use super::study::{Fitted, Study, joined};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Commands, Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-    absorbed,
+    Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
+    as_modelled,
 };
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
@@ -93,8 +93,8 @@ fn fit_settings() -> FitSettings {
     }
 }
 
-/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees the
-/// torque that acts, as the model does.
+/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees what
+/// the model does.
 fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     let thinning = Thinning {
         step_s: STEP_S,
@@ -102,8 +102,7 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     };
     let of_log = |(k, log): (usize, &Log)| {
         let values = model.fit.values_of_log(k);
-        let commands = Commands::of_log(&model.dynamics, &values, log);
-        trajectories(&commands.acting_on(log), thinning)
+        trajectories(&as_modelled(&model.dynamics, &values, log), thinning)
     };
     let logs = study.logs.iter().enumerate();
     let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();

@@ -98,6 +98,7 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         .map(|name| graph.input(name))
         .collect();
     let mut parameters = dynamics.parameters.clone();
+    let logged = inputs[..n].to_vec();
     for (joint, input) in inputs[..n].iter_mut().enumerate() {
         // No formula can hold such a name, so none is taken.
         let name = format!("offset of q{}", joint + 1);
@@ -115,11 +116,23 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         });
     }
     let outputs = graph.append(&dynamics.program, &inputs);
+    let reading = dynamics.reading.as_ref().map(|reading| {
+        let mut graph = graph.clone();
+        let shown = graph.append(reading, &inputs);
+        let with_offset: Vec<_> = (shown.into_iter().zip(&logged).zip(&inputs))
+            .map(|((shown, logged), own)| {
+                let offset = graph.sub(*logged, *own);
+                graph.add(shown, offset)
+            })
+            .collect();
+        graph.finish(&with_offset)
+    });
     Dynamics {
         name: dynamics.name.clone(),
         joints: n,
         parameters,
         program: graph.finish(&outputs),
         filters: dynamics.filters.clone(),
+        reading,
     }
 }

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
-use crate::model::{Commands, Dynamics, Rollout, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// Squared errors of one window.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,7 +102,7 @@ fn run<'v>(
     horizons_s: &[f64],
     step_s: f64,
 ) -> Vec<OpenLoop> {
-    let commands: Vec<Commands> = (logs.iter().enumerate())
+    let commands: Vec<Commands<'_>> = (logs.iter().enumerate())
         .map(|(index, log)| Commands::of_log(dynamics, values(index), log))
         .collect();
     let one = |&horizon_s: &f64| {
@@ -180,7 +180,7 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
 fn roll(
     dynamics: &Dynamics,
     values: &[f64],
-    commands: &Commands,
+    commands: &Commands<'_>,
     log: &Log,
     pack: &[Window],
     step_s: f64,
@@ -197,6 +197,10 @@ fn roll(
         .collect();
     let mut errors: Vec<WindowError> = pack.iter().map(|w| WindowError::none(w, log, n)).collect();
     let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
+    let mut sensors = Sensors::<LANES>::new(dynamics, values);
+    let before = |at: [usize; LANES]| move || Commands::just_before([commands; LANES], at);
+    let first = std::array::from_fn(|l| lane(l).first);
+    sensors.correct(&mut state, before(first), first.map(|row| log.time[row]));
     let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
     for row in 0..rows - 1 {
         let at: [usize; LANES] =
@@ -211,10 +215,13 @@ fn roll(
         let substeps = ((longest / step_s - 1e-6).ceil() as usize).max(1);
         let torque = StepTorque::new([commands; LANES], &tau, time, end, substeps);
         rollout.advance(&mut state, &torque.mean, time, dt, substeps);
-        for (l, error) in errors.iter_mut().enumerate() {
-            if pack[l].first + row < pack[l].last {
-                error.add(&mut state, l, log, pack[l].first + row + 1);
-            }
+        let counts = |l: usize| pack[l].first + row < pack[l].last;
+        for l in (0..pack.len()).filter(|l| counts(*l)) {
+            errors[l].hold(&mut state, l);
+        }
+        let shown = sensors.show(&state, before(at.map(|row| row + 1)), end);
+        for l in (0..pack.len()).filter(|l| counts(*l)) {
+            errors[l].add(shown, &state[n..], l, log, pack[l].first + row + 1);
         }
     }
     errors
@@ -232,13 +239,12 @@ impl WindowError {
         }
     }
 
-    fn add(&mut self, state: &mut [[f64; LANES]], lane: usize, log: &Log, row: usize) {
-        let n = self.position.len();
+    /// Keep a state that left every sensible range at its edge: it counts as what it is, and stays a number.
+    fn hold(&mut self, state: &mut [[f64; LANES]], lane: usize) {
         for value in state.iter_mut() {
             let value = &mut value[lane];
             if !(value.abs() <= SENSIBLE) {
                 self.diverged = true;
-                // Held at the edge of the sensible: it counts as what it is, and stays a number.
                 *value = if value.is_nan() {
                     SENSIBLE
                 } else {
@@ -246,10 +252,21 @@ impl WindowError {
                 };
             }
         }
+    }
+
+    /// Compare angles shown and velocities with a row of the log.
+    fn add(
+        &mut self,
+        angles: &[[f64; LANES]],
+        velocities: &[[f64; LANES]],
+        lane: usize,
+        log: &Log,
+        row: usize,
+    ) {
         self.rows += 1;
-        for j in 0..n {
-            self.position[j] += (state[j][lane] - log.q[j][row]).powi(2);
-            self.velocity[j] += (state[n + j][lane] - log.qd[j][row]).powi(2);
+        for j in 0..self.position.len() {
+            self.position[j] += (angles[j][lane] - log.q[j][row]).powi(2);
+            self.velocity[j] += (velocities[j][lane] - log.qd[j][row]).powi(2);
         }
     }
 }

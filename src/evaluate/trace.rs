@@ -1,6 +1,6 @@
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
-use crate::model::{Commands, Dynamics, Rollout, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) ->
 fn trace(
     dynamics: &Dynamics,
     values: &[f64],
-    commands: &Commands,
+    commands: &Commands<'_>,
     log: &Log,
     window: &Window,
 ) -> Trace {
@@ -33,13 +33,17 @@ fn trace(
         .expect("windows() checks this");
     let mut state: Vec<[f64; 1]> = start.iter().map(|value| [*value]).collect();
     let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
+    let mut sensors = Sensors::<1>::new(dynamics, values);
+    let before = |row: usize| move || Commands::just_before([commands], [row]);
+    sensors.correct(&mut state, before(window.first), [log.time[window.first]]);
     let mut trace = Trace {
         time: Vec::new(),
         q: vec![Vec::new(); dynamics.joints],
     };
     for row in window.first..=window.last {
         trace.time.push(log.time[row]);
-        for (q, value) in trace.q.iter_mut().zip(&state) {
+        let shown = sensors.show(&state, before(row), [log.time[row]]);
+        for (q, value) in trace.q.iter_mut().zip(shown) {
             q.push(value[0]);
         }
         if row < window.last {

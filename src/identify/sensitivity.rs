@@ -21,6 +21,9 @@ pub enum Local {
 /// behind the model's own are the derivatives of the torques by the parameters of the model's filters.
 pub(super) struct Tangent {
     pub program: Program,
+    /// Where sensors show other angles than the rig's own: those (n), then for each joint their derivatives by `q`
+    /// and `qd`, then for each joint those by active parameters. The inputs are the model's.
+    pub reading: Option<Program>,
     pub joints: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
@@ -62,6 +65,7 @@ impl Tangent {
             .collect();
         Self {
             program: graph.finish(&all),
+            reading: reading(dynamics, active),
             joints: n,
             active: active.to_vec(),
             local,
@@ -82,6 +86,19 @@ impl Tangent {
     }
 }
 
+/// See [`Tangent::reading`].
+fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
+    let n = dynamics.joints;
+    let mut graph = Graph::new();
+    let names = dynamics.program.inputs();
+    let inputs: Vec<_> = names.iter().map(|name| graph.input(name)).collect();
+    let shown = graph.append(dynamics.reading.as_ref()?, &inputs);
+    let parameters: Vec<_> = active.iter().map(|&k| inputs[3 * n + 1 + k]).collect();
+    let by_state = graph.jacobian(&shown, &inputs[..2 * n]).concat();
+    let by_parameter = graph.jacobian(&shown, &parameters).concat();
+    Some(graph.finish(&[shown, by_state, by_parameter].concat()))
+}
+
 /// Integrates states and their sensitivities together, by the classical Runge-Kutta method of order 4.
 ///
 /// The sensitivity of column c obeys dS/dt = (df/dx) S + df/dc; rows are angles, then velocities.
@@ -93,6 +110,9 @@ pub(super) struct Flow<'t> {
     inner: Vec<Lane>,
     slope: Vec<Lane>,
     sum: Vec<Lane>,
+    reading: Option<Tape<'t, f64, LANES>>,
+    /// Angles shown, then their sensitivities, laid out as in `now`.
+    shown: Vec<Lane>,
 }
 
 /// The classical Runge-Kutta method: time of the stage, reach of the next stage, weight in the sum.
@@ -110,6 +130,12 @@ impl<'t> Flow<'t> {
         for (slot, value) in tape.inputs()[3 * n + 1..].iter_mut().zip(values) {
             *slot = [*value; LANES];
         }
+        let mut reading = tangent.reading.as_ref().map(Program::tape);
+        if let Some(reading) = &mut reading {
+            for (slot, value) in reading.inputs()[3 * n + 1..].iter_mut().zip(values) {
+                *slot = [*value; LANES];
+            }
+        }
         let size = 2 * n * (1 + tangent.columns());
         Self {
             tangent,
@@ -118,6 +144,8 @@ impl<'t> Flow<'t> {
             inner: vec![[0.0; LANES]; size],
             slope: vec![[0.0; LANES]; size],
             sum: vec![[0.0; LANES]; size],
+            reading,
+            shown: vec![[0.0; LANES]; size / 2],
         }
     }
 
@@ -125,6 +153,44 @@ impl<'t> Flow<'t> {
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
         let first = 3 * self.tangent.joints + 1;
         self.tape.inputs()[first + parameter][lane] = value;
+        if let Some(reading) = &mut self.reading {
+            reading.inputs()[first + parameter][lane] = value;
+        }
+    }
+
+    /// The angles that the sensors show and their sensitivities (`[joint * columns + column]`), when the torque
+    /// until now was `tau`.
+    pub fn shown(&mut self, tau: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
+        let (n, columns) = (self.tangent.joints, self.tangent.columns());
+        let Some(reading) = &mut self.reading else {
+            return (&self.now[..n], &self.now[2 * n..][..n * columns]);
+        };
+        let inputs = reading.inputs();
+        inputs[..2 * n].copy_from_slice(&self.now[..2 * n]);
+        inputs[2 * n..3 * n].copy_from_slice(&tau());
+        inputs[3 * n] = time;
+        reading.run();
+        let shared = self.tangent.active.len();
+        for joint in 0..n {
+            self.shown[joint] = *reading.output(joint);
+            for column in 0..columns {
+                let direct = n + 2 * n * n + joint * shared + column;
+                let mut sum = if column < shared {
+                    *reading.output(direct)
+                } else {
+                    [0.0; LANES]
+                };
+                for state in 0..2 * n {
+                    let slope = reading.output(n + joint * 2 * n + state);
+                    let own = &self.now[2 * n + state * columns + column];
+                    for lane in 0..LANES {
+                        sum[lane] += slope[lane] * own[lane];
+                    }
+                }
+                self.shown[n + joint * columns + column] = sum;
+            }
+        }
+        self.shown.split_at(n)
     }
 
     /// Start at these states; only the columns of the initial state are sensitive to them.

@@ -5,7 +5,7 @@ use super::sensitivity::{Flow, LANES, Lane, Tangent};
 use super::values::Values;
 use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
-use crate::model::{Commands, Dynamics, Rollout, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
 /// stable and accurate with dry friction smoothed to a fraction of a percent of the top speed.
@@ -50,6 +50,8 @@ struct Pack {
     windows: Vec<usize>,
     /// The log of each lane.
     logs: [usize; LANES],
+    /// The row of each lane's log.
+    at: Vec<[usize; LANES]>,
     time: Vec<Lane>,
     dt: Vec<Lane>,
     substeps: Vec<usize>,
@@ -152,7 +154,7 @@ impl<'l> Shooting<'l> {
     }
 
     /// What the model's filters make of the torques of each log.
-    fn commands(&self, dynamics: &Dynamics, values: &Values) -> Vec<Commands> {
+    fn commands(&self, dynamics: &Dynamics, values: &Values) -> Vec<Commands<'l>> {
         let of_log = |(index, log)| Commands::of_log(dynamics, &values.of_log(index), log);
         self.logs.iter().enumerate().map(of_log).collect()
     }
@@ -200,6 +202,7 @@ impl Pack {
         let mut pack = Self {
             windows: members.to_vec(),
             logs: std::array::from_fn(|lane| windows[members[lane.min(members.len() - 1)]].log),
+            at: vec![[0; LANES]; rows],
             time: vec![[0.0; LANES]; rows],
             dt: vec![[0.0; LANES]; rows],
             substeps: Vec::new(),
@@ -213,6 +216,7 @@ impl Pack {
             let log = &logs[window.log];
             for row in 0..rows {
                 let at = (window.first + row).min(window.last);
+                pack.at[row][lane] = at;
                 pack.time[row][lane] = log.time[at];
                 pack.dt[row][lane] = if at < window.last {
                     log.time[at + 1] - log.time[at]
@@ -253,7 +257,7 @@ impl Pack {
     }
 
     /// The torque from `row` to the next with the windows' own forces, if any, added.
-    fn torque(&self, commands: &[Commands], row: usize, forces: &[Lane]) -> StepTorque<LANES> {
+    fn torque(&self, commands: &[Commands<'_>], row: usize, forces: &[Lane]) -> StepTorque<LANES> {
         let end = self.time.get(row + 1).unwrap_or(&self.time[row]);
         let mut torque = StepTorque::new(
             self.logs.map(|log| &commands[log]),
@@ -270,23 +274,31 @@ impl Pack {
         torque
     }
 
+    /// The torque that acted until `row`.
+    fn torque_before(&self, commands: &[Commands<'_>], row: usize) -> Vec<Lane> {
+        Commands::just_before(self.logs.map(|log| &commands[log]), self.at[row])
+    }
+
     /// Integrate and show the angles at each row.
     fn roll(
         &self,
         dynamics: &Dynamics,
         values: &Values,
-        commands: &[Commands],
+        commands: &[Commands<'_>],
         locals: &[Vec<f64>],
         mut see: impl FnMut(usize, &[Lane]),
     ) {
         let mut state = self.gather(locals);
         let forces = state.split_off(dynamics.states());
         let mut rollout = Rollout::<f64, LANES>::new(dynamics, &values.common);
+        let mut sensors = Sensors::<LANES>::new(dynamics, &values.common);
         self.own_values(values, |parameter, lane, value| {
             rollout.set_in_lane(parameter, lane, value);
+            sensors.set_in_lane(parameter, lane, value);
         });
         for row in 0..self.rows() {
-            see(row, &state[..dynamics.joints]);
+            let before = || self.torque_before(commands, row);
+            see(row, sensors.show(&state, before, self.time[row]));
             let torque = self.torque(commands, row, &forces);
             rollout.advance(
                 &mut state,
@@ -302,7 +314,7 @@ impl Pack {
         &self,
         tangent: &Tangent,
         values: &Values,
-        commands: &[Commands],
+        commands: &[Commands<'_>],
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<(usize, WindowTerms)> {
@@ -315,12 +327,13 @@ impl Pack {
         });
         flow.start(&states);
         for row in 0..self.rows() {
+            let before = || self.torque_before(commands, row);
+            let (angles, slopes) = flow.shown(before, self.time[row]);
             for j in 0..n {
                 let weight = self.weight[row][j].map(|w| w / scale);
                 let residual =
-                    std::array::from_fn(|l| (flow.now[j][l] - self.q[row][j][l]) * weight[l]);
-                let first = 2 * n + j * columns;
-                sums.add(&residual, &flow.now[first..first + columns], &weight);
+                    std::array::from_fn(|l| (angles[j][l] - self.q[row][j][l]) * weight[l]);
+                sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
             let torque = self.torque(commands, row, &states[2 * n..]);
             flow.advance(&torque, self.time[row], self.dt[row], self.substeps[row]);
@@ -423,19 +436,19 @@ mod tests {
     }
 
     #[test]
-    fn gradients_by_a_delay_and_a_lag_are_slopes_of_the_cost() {
+    fn gradients_by_effects_with_memory_are_slopes_of_the_cost() {
         let library = Library::built_in();
-        let effects = ["actuator_delay", "actuator_lag"]
+        let effects = ["actuator_delay", "actuator_lag", "backlash"]
             .map(|name| FittedEffect::absent(library.effect(name).unwrap(), 0));
         let pendulum = library.system(Path::new("pendulum")).unwrap();
-        let model = pendulum.dynamics_with(&effects, &[SignForm::Exact]);
+        let model = pendulum.dynamics_with(&effects, &[SignForm::DEFAULT]);
         let logs = [log()];
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
         for local in [Local::State, Local::StateAndForce] {
             let locals = shooting.initial_locals(usize::from(local == Local::StateAndForce));
-            let tangent = Tangent::new(&model, &[1, 2, 3], local);
+            let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
-                let values = [15.0, 3.0, delay, lag];
+                let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
                 let cost = |values: &[f64]| -> f64 {
                     shooting
                         .costs(&model, &values.into(), &locals, 1.0)
@@ -444,7 +457,7 @@ mod tests {
                 };
                 let terms =
                     shooting.linearise(&model, &tangent, &values.as_slice().into(), &locals, 1.0);
-                for (column, k) in [1, 2, 3].into_iter().enumerate() {
+                for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
                     let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
                     let mut moved = values;
                     moved[k] += 1e-7;

@@ -3,7 +3,7 @@ use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
 use super::{Dynamics, Parameter};
-use crate::expr::{Formula, Graph, Node, Scope, SignForm};
+use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
 impl System {
     /// The declared equations with the file's own effects, ready to run.
@@ -25,6 +25,7 @@ impl System {
             "one form of the sign for each joint"
         );
         let mut assembly = Assembly::new(self, effects, sign);
+        let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
         assembly.apply_forces();
@@ -37,6 +38,7 @@ impl System {
             parameters: assembly.parameters,
             program: assembly.graph.finish(&outputs),
             filters: filters(self.parameters.len(), effects),
+            reading,
         }
     }
 }
@@ -92,7 +94,8 @@ impl FittedEffect {
             | Entry::Torque(f)
             | Entry::Angle(f)
             | Entry::Inertia(f)
-            | Entry::Shift(_, f) => f,
+            | Entry::Shift(_, f)
+            | Entry::Reading(f) => f,
         };
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
@@ -285,15 +288,25 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The angles of the declared equations: those of the rig as effects turn them, one after the other.
+    /// The angles of the declared equations: those of the rig as effects turn them.
     fn declared_angles(&mut self) -> Vec<Node> {
-        let of_rig = self.q.clone();
-        let turns =
-            |effect: &Effect| matches!(effect.entry, Entry::Angle(_)) && !effect.is_of_sensor();
-        for (index, joint, formula) in self.entries(turns) {
+        self.turned(|effect| matches!(effect.entry, Entry::Angle(_)) && !effect.is_of_sensor())
+    }
+
+    /// What sensors show where effects stand between them and the rig.
+    fn reading(&mut self) -> Option<Program> {
+        let stands_between = |effect: &Effect| matches!(effect.entry, Entry::Reading(_));
+        let shown = self.turned(stands_between);
+        (shown != self.q).then(|| self.graph.clone().finish(&shown))
+    }
+
+    /// The angles as some effects turn them, one after the other.
+    fn turned(&mut self, by: impl Fn(&Effect) -> bool) -> Vec<Node> {
+        let before = self.q.clone();
+        for (index, joint, formula) in self.entries(by) {
             self.q[joint] = self.effect_node(index, formula);
         }
-        std::mem::replace(&mut self.q, of_rig)
+        std::mem::replace(&mut self.q, before)
     }
 
     /// The names of the declared equations: angles as effects turn them, torques as effects leave them.

@@ -38,12 +38,14 @@ pub struct Filter {
 /// Between the rows of the history the command is held; before the first row it was that row's for ever,
 /// after the last it stays. Filters are linear, so that a delay and a lag on one joint have no order.
 #[derive(Debug, Clone)]
-pub struct Commands {
+pub struct Commands<'l> {
+    time: &'l [f64],
+    tau: &'l [Vec<f64>],
     joints: usize,
     /// Filters of the model: what each stands for in the outputs of [`Commands::slopes`].
     filters: Vec<Filter>,
     /// For each joint the filtered history, where there is a filter.
-    histories: Vec<Option<History>>,
+    histories: Vec<Option<History<'l>>>,
 }
 
 /// The torque over one part of a step.
@@ -56,10 +58,10 @@ struct Mean {
     by_lag: f64,
 }
 
-impl Commands {
+impl<'l> Commands<'l> {
     /// The filters of `dynamics` with parameters `values`, in its order, acting on torques `tau` (`[joint][row]`)
     /// that are held from `time[row]` (s) on.
-    pub fn new(dynamics: &Dynamics, values: &[f64], time: &[f64], tau: &[Vec<f64>]) -> Self {
+    pub fn new(dynamics: &Dynamics, values: &[f64], time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
         let history = |joint: usize| {
             let own = |kind: CommandFilter| {
                 let mut filters = dynamics.filters.iter();
@@ -71,6 +73,8 @@ impl Commands {
                 .then(|| History::new(time, &tau[joint], value(delay), value(lag)))
         };
         Self {
+            time,
+            tau,
             joints: dynamics.joints,
             filters: dynamics.filters.clone(),
             histories: (0..dynamics.joints).map(history).collect(),
@@ -78,8 +82,22 @@ impl Commands {
     }
 
     /// The same for a log.
-    pub fn of_log(dynamics: &Dynamics, values: &[f64], log: &Log) -> Self {
+    pub fn of_log(dynamics: &Dynamics, values: &[f64], log: &'l Log) -> Self {
         Self::new(dynamics, values, &log.time, &log.tau)
+    }
+
+    /// The torque (`[joint][lane]`) that acted until a row of each history.
+    pub fn just_before<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<[f64; W]> {
+        let of_lane = |joint: usize, lane: usize| {
+            let (own, row) = (commands[lane], rows[lane]);
+            match &own.histories[joint] {
+                Some(history) => history.at(own.time[row]).output,
+                None => own.tau[joint][row.saturating_sub(1)],
+            }
+        };
+        (0..commands[0].joints)
+            .map(|joint| std::array::from_fn(|lane| of_lane(joint, lane)))
+            .collect()
     }
 
     /// The log with the torque that acts in place of the commanded one: its mean from each row to the next.
@@ -112,7 +130,7 @@ impl<const W: usize> StepTorque<W> {
     /// Means over parts make an integration with parts accurate to second order in their length, wherever between
     /// them the torque jumps, and its result smooth in the filters' parameters.
     pub fn new(
-        commands: [&Commands; W],
+        commands: [&Commands<'_>; W],
         held: &[[f64; W]],
         from: [f64; W],
         to: [f64; W],
@@ -150,7 +168,7 @@ impl<const W: usize> StepTorque<W> {
         )
     }
 
-    fn set(&mut self, lane: usize, joint: usize, model: &Commands, means: &[Mean]) {
+    fn set(&mut self, lane: usize, joint: usize, model: &Commands<'_>, means: &[Mean]) {
         for (part, mean) in means.iter().enumerate() {
             self.mean[part * model.joints + joint][lane] = mean.value;
             for (k, filter) in model.filters.iter().enumerate() {
@@ -167,12 +185,12 @@ impl<const W: usize> StepTorque<W> {
 
 /// One joint's command, delayed by `delay` and smoothed with the time constant `lag` (s), in closed form.
 #[derive(Debug, Clone)]
-struct History {
+struct History<'l> {
     delay: f64,
     lag: f64,
-    time: Vec<f64>,
+    time: &'l [f64],
     /// The command from each row on.
-    command: Vec<f64>,
+    command: &'l [f64],
     /// At each row: integral of the command from the first row on, output of the lag, its derivative by `lag`.
     integral: Vec<f64>,
     output: Vec<f64>,
@@ -190,13 +208,13 @@ struct Instant {
     integral_by_lag: f64,
 }
 
-impl History {
-    fn new(time: &[f64], command: &[f64], delay: f64, lag: f64) -> Self {
+impl<'l> History<'l> {
+    fn new(time: &'l [f64], command: &'l [f64], delay: f64, lag: f64) -> Self {
         let mut history = Self {
             delay,
             lag,
-            time: time.to_vec(),
-            command: command.to_vec(),
+            time,
+            command,
             integral: vec![0.0],
             output: vec![command[0]],
             output_by_lag: vec![0.0],

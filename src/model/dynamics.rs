@@ -38,6 +38,9 @@ pub struct Dynamics {
     pub program: Program,
     /// What the commanded torques go through first, see [`Commands`](super::Commands).
     pub filters: Vec<Filter>,
+    /// What the sensors show for the angles, from the same inputs, where that is not the rig's own: n outputs. The
+    /// torques are those that acted until then.
+    pub reading: Option<Program>,
 }
 
 impl Dynamics {

@@ -20,6 +20,8 @@ pub enum Entry {
     Shift(usize, Formula),
     /// A filter of the commanded torque, ahead of everything else that becomes of it.
     Command(CommandFilter),
+    /// What the sensor shows for the joint's angle.
+    Reading(Formula),
 }
 
 impl Entry {
@@ -30,7 +32,8 @@ impl Entry {
             | Self::Torque(f)
             | Self::Angle(f)
             | Self::Inertia(f)
-            | Self::Shift(_, f) => Some(f),
+            | Self::Shift(_, f)
+            | Self::Reading(f) => Some(f),
             Self::Command(_) => None,
         }
     }
@@ -103,7 +106,8 @@ impl Effect {
             | Entry::Torque(f)
             | Entry::Angle(f)
             | Entry::Inertia(f)
-            | Entry::Shift(_, f) => f.text().to_owned(),
+            | Entry::Shift(_, f)
+            | Entry::Reading(f) => f.text().to_owned(),
         }
     }
 
@@ -184,6 +188,7 @@ const EFFECT_KEYS: &[&str] = &[
     "angle",
     "inertia",
     "command",
+    "reading",
     "contains",
     "confused_with",
     "shown_by",
@@ -276,11 +281,12 @@ fn entry(
     parameters: &[EffectParameter],
 ) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    let kinds: [(&str, Make); 4] = [
+    let kinds: [(&str, Make); 5] = [
         ("force", Entry::Force),
         ("torque", Entry::Torque),
         ("angle", Entry::Angle),
         ("inertia", Entry::Inertia),
+        ("reading", Entry::Reading),
     ];
     let mut found = command(section, parameters)?;
     for (key, make) in kinds {
@@ -288,7 +294,7 @@ fn entry(
             if found.is_some() {
                 return Err(section.error_at(
                     key,
-                    "an effect has one of force, torque, angle, inertia and command",
+                    "an effect has one of force, torque, angle, inertia, command and reading",
                 ));
             }
             check_names(document, &formula, &EFFECT_NAMES, parameters)?;
@@ -296,7 +302,9 @@ fn entry(
         }
     }
     found.ok_or_else(|| {
-        section.error("one of force, torque, angle, inertia and command is missing in [effect]")
+        section.error(
+            "one of force, torque, angle, inertia, command and reading is missing in [effect]",
+        )
     })
 }
 

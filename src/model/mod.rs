@@ -15,6 +15,7 @@ mod network;
 mod reader;
 mod rollout;
 mod sections;
+mod sensors;
 mod shift;
 mod system;
 
@@ -31,5 +32,6 @@ pub use network::{
 };
 pub use reader::FileError;
 pub use rollout::Rollout;
+pub use sensors::{Sensors, as_modelled};
 pub use shift::absorbed;
 pub use system::{FittedEffect, OwnValue, System, put_own};

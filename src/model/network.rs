@@ -355,5 +355,6 @@ pub fn network_dynamics(
         parameters: Vec::new(),
         program: graph.finish(&outputs),
         filters: Vec::new(),
+        reading: None,
     })
 }

@@ -7,7 +7,7 @@ use super::file::{Plant, PlantError};
 use crate::closeloop::joined;
 use crate::data::Log;
 use crate::expr::SignForm;
-use crate::model::{Commands, Dynamics, Rollout, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// The rig moves in steps of this length (s), far below what any fit uses.
 const STEP_S: f64 = 1e-4;
@@ -43,9 +43,18 @@ impl Plant {
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
         let torques: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
-        let commands = Commands::new(&dynamics, &values, &times, &by_joint(&torques, n));
-        for (&time, tau) in times.iter().zip(torques) {
-            self.measure(&mut log, time, &state, &tau, rng);
+        let tau_of_joints = by_joint(&torques, n);
+        let commands = Commands::new(&dynamics, &values, &times, &tau_of_joints);
+        let mut sensors = Sensors::<1>::new(&dynamics, &values);
+        for (row, (&time, tau)) in times.iter().zip(torques).enumerate() {
+            let before = || Commands::just_before([&commands], [row]);
+            self.measure(
+                &mut log,
+                time,
+                sensors.show(&state, before, [time]),
+                &tau,
+                rng,
+            );
             let held: Vec<[f64; 1]> = tau.iter().map(|tau| [*tau]).collect();
             let torque = StepTorque::new([&commands], &held, [time], [time + dt], substeps);
             rollout.advance(&mut state, &torque.mean, [time], [dt], substeps);
@@ -72,7 +81,7 @@ impl Plant {
         &self,
         log: &mut Log,
         time: f64,
-        state: &[[f64; 1]],
+        angles: &[[f64; 1]],
         tau: &[f64],
         rng: &mut impl Rng,
     ) {
@@ -82,7 +91,7 @@ impl Plant {
         log.time.push(time);
         for j in 0..tau.len() {
             let step = self.sensor.position_step;
-            let read = state[j][0] + noise.sample(rng);
+            let read = angles[j][0] + noise.sample(rng);
             let q = if step > 0.0 {
                 (read / step).round() * step
             } else {

@@ -7,7 +7,7 @@ use super::data::{Data, Logged, Simulated};
 use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{Commands, Library, System};
+use crate::model::{Library, System, as_modelled};
 use crate::plant::Plant;
 use crate::train::{Segments, SegmentsError};
 
@@ -66,15 +66,15 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
     };
     let dynamics = equations(system);
     let values = dynamics.values();
-    let acting = |log: &Log| match recipe.kind {
-        // A network alone has no filters: it learns from what was commanded.
+    let modelled = |log: &Log| match recipe.kind {
+        // A network alone has no effects: it learns from what was commanded and shown.
         Kind::DataDriven => log.clone(),
-        Kind::Hybrid | Kind::Physics => Commands::of_log(&dynamics, &values, log).acting_on(log),
+        Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, &values, log),
     };
     let mut training = Segments::new(system.joints, logged.steps);
     for log in &logs {
         let before = training.len();
-        for trajectory in trajectories(&acting(log), thinning) {
+        for trajectory in trajectories(&modelled(log), thinning) {
             // A gap may leave a piece that holds no segment; a log without any is refused below.
             if trajectory.time.len() > logged.steps {
                 push(&mut training, &trajectory).map_err(in_file(&log.path))?;

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use crate::data::Log;
 use crate::identify::Window;
-use crate::model::{Commands, Dynamics, Rollout, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,13 +36,17 @@ impl Motion {
             leave_out: Vec::new(),
             notes: Vec::new(),
         };
-        let commands = Commands::of_log(dynamics, values, &log);
+        let tau = log.tau.clone();
+        let commands = Commands::new(dynamics, values, &self.time, &tau);
+        let mut sensors = Sensors::<1>::new(dynamics, values);
         for (row, tau) in self.tau.iter().enumerate() {
             if state.iter().any(|value| !value[0].is_finite()) {
                 return None;
             }
+            let before = || Commands::just_before([&commands], [row]);
+            let shown = sensors.show(&state, before, [self.time[row]]);
             for j in 0..n {
-                log.q[j].push(state[j][0]);
+                log.q[j].push(shown[j][0]);
                 log.qd[j].push(state[n + j][0]);
             }
             let Some(next) = self.time.get(row + 1) else {

@@ -49,6 +49,7 @@ pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
         parameters,
         program: graph.finish(&[velocity, acceleration]),
         filters: Vec::new(),
+        reading: None,
     }
 }
 

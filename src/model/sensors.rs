@@ -1,0 +1,96 @@
+use super::{Commands, Dynamics};
+use crate::data::Log;
+use crate::expr::Tape;
+
+/// What the sensors of a model show of `W` trajectories: the angles of the rig itself unless an effect stands between
+/// joint and sensor.
+pub struct Sensors<'d, const W: usize> {
+    tape: Option<Tape<'d, f64, W>>,
+    joints: usize,
+    shown: Vec<[f64; W]>,
+}
+
+impl<'d, const W: usize> Sensors<'d, W> {
+    /// The sensors of `dynamics` with parameters `values`, in its order.
+    pub fn new(dynamics: &'d Dynamics, values: &[f64]) -> Self {
+        let joints = dynamics.joints;
+        let mut tape = dynamics.reading.as_ref().map(|reading| reading.tape());
+        if let Some(tape) = &mut tape {
+            let own = &mut tape.inputs()[3 * joints + 1..];
+            for (slot, value) in own.iter_mut().zip(values) {
+                *slot = [*value; W];
+            }
+        }
+        Self {
+            tape,
+            joints,
+            shown: vec![[0.0; W]; joints],
+        }
+    }
+
+    /// Let a parameter have another value in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        let first = 3 * self.joints + 1;
+        if let Some(tape) = &mut self.tape {
+            tape.inputs()[first + parameter][lane] = value;
+        }
+    }
+
+    /// The angles (`[n][lane]`) shown of `state` (`[2n][lane]`) at `time` (s), when the torque until then was `tau`
+    /// (`[n][lane]`).
+    pub fn show<'s>(
+        &'s mut self,
+        state: &'s [[f64; W]],
+        tau: impl FnOnce() -> Vec<[f64; W]>,
+        time: [f64; W],
+    ) -> &'s [[f64; W]] {
+        let n = self.joints;
+        let Some(tape) = &mut self.tape else {
+            return &state[..n];
+        };
+        let inputs = tape.inputs();
+        inputs[..2 * n].copy_from_slice(state);
+        inputs[2 * n..3 * n].copy_from_slice(&tau());
+        inputs[3 * n] = time;
+        tape.run();
+        for (k, shown) in self.shown.iter_mut().enumerate() {
+            *shown = *tape.output(k);
+        }
+        &self.shown
+    }
+
+    /// Put the rig's own angles in place of those that sensors show in `state`. What stands between is small, and is
+    /// taken at the angles shown.
+    pub fn correct(
+        &mut self,
+        state: &mut [[f64; W]],
+        tau: impl FnOnce() -> Vec<[f64; W]>,
+        time: [f64; W],
+    ) {
+        let seen = state.to_vec();
+        let shown = self.show(&seen, tau, time);
+        for ((angle, shown), seen) in state.iter_mut().zip(shown).zip(&seen) {
+            for lane in 0..W {
+                angle[lane] -= shown[lane] - seen[lane];
+            }
+        }
+    }
+}
+
+/// A log as a model with parameters `values` sees it: with the torques that act and the angles of the rig itself.
+#[must_use]
+pub fn as_modelled(dynamics: &Dynamics, values: &[f64], log: &Log) -> Log {
+    let commands = Commands::of_log(dynamics, values, log);
+    let mut own = commands.acting_on(log);
+    let mut sensors = Sensors::<1>::new(dynamics, values);
+    for row in 0..log.rows() {
+        let logged = log.q.iter().chain(&log.qd);
+        let mut state: Vec<[f64; 1]> = logged.map(|column| [column[row]]).collect();
+        let before = || Commands::just_before([&commands], [row]);
+        sensors.correct(&mut state, before, [log.time[row]]);
+        for (column, angle) in own.q.iter_mut().zip(&state) {
+            column[row] = angle[0];
+        }
+    }
+    own
+}
