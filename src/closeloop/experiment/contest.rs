@@ -1,10 +1,11 @@
 use super::menu::{Proposal, as_logged, proposals, spread};
-use super::motion::{Motion, is_turn, start_of, windows};
+use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
+use crate::closeloop::per_log::values_on;
 use crate::closeloop::search::Rival;
-use crate::closeloop::study::{Fitted, Study, WINDOW_S, joined};
+use crate::closeloop::study::{Fitted, Study, WINDOW_S};
 use crate::data::Log;
-use crate::identify::{Fit, Shooting, Window, fit, uncertainty};
+use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect};
 
 /// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
@@ -22,14 +23,15 @@ const SCALE: f64 = 100.0;
 /// One of two explanations.
 pub(super) struct Contender {
     dynamics: Dynamics,
-    values: Vec<f64>,
+    /// What differs by log, by the logs of the study.
+    values: Values,
 }
 
 impl Contender {
     pub fn new(study: &Study<'_>, effects: &[FittedEffect], declared: &[f64]) -> Self {
         Self {
             dynamics: study.system.dynamics_with(effects, &study.sign),
-            values: joined(declared, effects),
+            values: values_on(study.logs, declared, effects),
         }
     }
 
@@ -52,27 +54,32 @@ impl Contender {
     }
 
     /// What it says the rig does; `None` where it diverges.
-    fn simulate(&self, motions: &[Motion]) -> Option<Vec<Log>> {
-        let simulate = |motion: &Motion| motion.simulate(&self.dynamics, &self.values);
-        motions.iter().map(simulate).collect()
+    fn simulate(&self, motions: &[Motion]) -> Option<Record> {
+        Record::of(motions, &self.dynamics, &self.values, WINDOW_S)
     }
 
-    /// Fit to logs, every parameter free that the file does not fix: an experiment may determine what the present
-    /// logs do not.
-    fn refit(&self, shooting: &Shooting<'_>, locals: Vec<Vec<f64>>) -> Option<Fit> {
+    /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
+    /// present logs do not.
+    fn refit(
+        &self,
+        shooting: &Shooting<'_>,
+        origins: &[usize],
+        locals: Vec<Vec<f64>>,
+    ) -> Option<Fit> {
         let parameters = &self.dynamics.parameters;
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&k| !parameters[k].fixed)
             .collect();
-        fit(
-            shooting,
-            &self.dynamics,
-            &active,
-            &self.values,
-            locals,
-            Some(SCALE),
-        )
-        .ok()
+        let own = |(log, &origin): (usize, &usize)| {
+            let of_origin = self.values.own.iter().filter(move |own| own.log == origin);
+            of_origin.map(move |own| Own { log, ..*own })
+        };
+        let values = Values {
+            common: self.values.common.clone(),
+            own: origins.iter().enumerate().flat_map(own).collect(),
+        };
+        let scale = Some(SCALE);
+        fit(shooting, &self.dynamics, &active, values, locals, scale).ok()
     }
 }
 
@@ -83,8 +90,8 @@ pub(super) struct Contest<'a> {
     /// Fitted to the present logs as the truth has them.
     other: Contender,
     noise: Vec<f64>,
-    /// The motion of the present logs as the truth has it, one log a window.
-    present: Vec<Log>,
+    /// The motion of the present logs as the truth has it.
+    present: Record,
     /// Start states that the other takes there.
     locals: Vec<Vec<f64>>,
     /// Twice the loss that is left there, and the difference on each joint.
@@ -126,23 +133,18 @@ impl<'a> Contest<'a> {
             .map(|w| window_of(study, model, w))
             .collect();
         let present = truth.simulate(&motions)?;
-        let parts = windows(&present, WINDOW_S);
-        let shooting = Shooting::new(&present, parts, &noise);
-        let starts = shooting
-            .windows
-            .iter()
-            .map(|w| start_of(&present, w))
-            .collect();
-        let found = other.refit(&shooting, starts)?;
+        let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
+        let found = other.refit(&shooting, &present.origins, present.starts(0..))?;
         let loss = loss_of(&found);
-        let all_s = duration_s(&study.shooting.windows, study.logs);
+        let windows = study.shooting.windows.iter();
+        let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
         // The logs did not tell, whatever the noise says: they hold no more than was needed.
-        let too_sure = loss / duration_s(&shooting.windows, &present) * all_s / NEEDED;
+        let too_sure = loss / present.duration_s(0..) * all_s / NEEDED;
         let differences = differences(&shooting, &other, &found, 0);
         Some(Self {
             inflation: inflation(study, model).max(too_sure),
             other: Contender {
-                values: found.values,
+                values: at_origins(found.found(), &present.origins),
                 ..other
             },
             locals: found.locals,
@@ -166,13 +168,13 @@ impl<'a> Contest<'a> {
     }
 
     fn payloads(&self) -> Vec<Payload> {
-        let times = self.present.iter().flat_map(|log| &log.time);
+        let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
         let declared = self.study.system.parameters.len();
         let truth = &self.truth;
         Payload::all(
             &truth.dynamics,
-            &truth.values,
+            &truth.values.common,
             declared,
             2.0 * latest_s + 10.0,
         )
@@ -195,18 +197,13 @@ impl<'a> Contest<'a> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
             .simulate(&proposal.motions)
-            .filter(|logs| self.is_possible(logs, proposal.turns))?;
-        let logs = [self.present.as_slice(), &proposed].concat();
-        let shooting = Shooting::new(&logs, windows(&logs, WINDOW_S), &self.noise);
+            .filter(|record| self.is_possible(record, proposal.turns))?;
+        let both = self.present.and(&proposed);
+        let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
         let present = self.locals.len();
-        let starts = shooting.windows[present..]
-            .iter()
-            .map(|w| start_of(&logs, w));
-        let found = other.refit(
-            &shooting,
-            self.locals.iter().cloned().chain(starts).collect(),
-        )?;
-        let duration_s = duration_s(&shooting.windows[present..], &logs);
+        let locals = [self.locals.clone(), both.starts(present..)].concat();
+        let found = other.refit(&shooting, &both.origins, locals)?;
+        let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
         let differences = differences(&shooting, &other, &found, present);
         let share = |j: &usize| differences[*j] / self.noise[*j];
@@ -221,13 +218,25 @@ impl<'a> Contest<'a> {
         })
     }
 
-    fn is_possible(&self, logs: &[Log], turns: Option<usize>) -> bool {
+    fn is_possible(&self, record: &Record, turns: Option<usize>) -> bool {
         let slow = |log: &Log| {
             let mut joints = log.qd.iter().zip(&self.study.top_speed);
             joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= FASTEST * top))
         };
-        logs.iter().all(slow) && turns.is_none_or(|j| logs.iter().any(|log| is_turn(&log.q[j])))
+        let turned = |j: usize| {
+            let mut motions = record.motions.iter();
+            motions.any(|m| is_turn(&record.logs[m.log].q[j][m.first..=m.last]))
+        };
+        record.logs.iter().all(slow) && turns.is_none_or(turned)
     }
+}
+
+/// Values of a fit to a record by the logs of the study.
+fn at_origins(mut values: Values, origins: &[usize]) -> Values {
+    for own in &mut values.own {
+        own.log = origins[own.log];
+    }
+    values
 }
 
 /// The motion of one window of the logs.
@@ -236,6 +245,7 @@ fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
     let log = &study.logs[window.log];
     let rows = window.first..=window.last;
     Motion {
+        log: window.log,
         start: model.fit.locals[w].clone(),
         time: log.time[rows.clone()].to_vec(),
         tau: rows
@@ -247,10 +257,6 @@ fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
 /// Twice the loss of a fit, in units of the noise.
 fn loss_of(fit: &Fit) -> f64 {
     2.0 * SCALE * SCALE * fit.cost
-}
-
-fn duration_s(windows: &[Window], logs: &[Log]) -> f64 {
-    windows.iter().map(|w| w.duration_s(logs)).sum()
 }
 
 /// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.

@@ -223,6 +223,7 @@ impl Entry {
         let rows = (length_s / step_s).round() as usize;
         let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);
         let mut motion = Motion {
+            log: window.log,
             start: self.state(study, state, joint),
             time: Vec::new(),
             tau: Vec::new(),

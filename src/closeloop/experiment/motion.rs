@@ -2,12 +2,14 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use crate::data::Log;
-use crate::identify::Window;
+use crate::identify::{Values, Window};
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
+    /// Number of the study's log that it begins in.
+    pub log: usize,
     /// Angles, then velocities.
     pub start: Vec<f64>,
     /// Time of each row in s.
@@ -19,50 +21,176 @@ pub(super) struct Motion {
 /// Steps of the simulation are no longer than this (s), as in fits.
 const LONGEST_STEP_S: f64 = 2e-3;
 
-impl Motion {
-    /// The log of a model's motion, with true velocities; `None` where it diverges.
-    pub fn simulate(&self, dynamics: &Dynamics, values: &[f64]) -> Option<Log> {
-        let n = dynamics.joints;
-        let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
-        let mut state: Vec<[f64; 1]> = self.start.iter().map(|value| [*value]).collect();
-        let mut log = Log {
-            path: PathBuf::new(),
-            time: self.time.clone(),
-            q: vec![Vec::new(); n],
-            qd: vec![Vec::new(); n],
-            tau: (0..n)
-                .map(|j| self.tau.iter().map(|tau| tau[j]).collect())
-                .collect(),
-            leave_out: Vec::new(),
-            notes: Vec::new(),
+/// Between motions of one log the rig stands for so long (s) under the torque that the next begins with: longer than
+/// any memory of its drive.
+const PAUSE_S: f64 = 2.0;
+
+/// Simulated logs, each of motions one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Record {
+    pub logs: Vec<Log>,
+    /// For each of them the log of the study that its motions begin in: what differs by log is as it was there.
+    pub origins: Vec<usize>,
+    /// The rows of each motion.
+    pub motions: Vec<Window>,
+    /// The motions in consecutive parts.
+    pub windows: Vec<Window>,
+}
+
+impl Record {
+    /// Motions as a model has them, cut into windows of `length_s`. `values` gives its parameters in each log of the
+    /// study. `None` where it diverges.
+    pub fn of(
+        motions: &[Motion],
+        dynamics: &Dynamics,
+        values: &Values,
+        length_s: f64,
+    ) -> Option<Self> {
+        let mut record = Self {
+            logs: Vec::new(),
+            origins: Vec::new(),
+            motions: Vec::new(),
+            windows: Vec::new(),
         };
-        let tau = log.tau.clone();
-        let commands = Commands::new(dynamics, values, &self.time, &tau);
-        let mut sensors = Sensors::<1>::new(dynamics, values);
-        for (row, tau) in self.tau.iter().enumerate() {
-            if state.iter().any(|value| !value[0].is_finite()) {
-                return None;
-            }
-            let before = || Commands::just_before([&commands], [row]);
-            let shown = sensors.show(&state, before, [self.time[row]]);
-            for j in 0..n {
-                log.q[j].push(shown[j][0]);
-                log.qd[j].push(state[n + j][0]);
-            }
-            let Some(next) = self.time.get(row + 1) else {
-                break;
-            };
-            let now = self.time[row];
-            let dt = next - now;
-            let held: Vec<[f64; 1]> = tau.iter().map(|tau| [*tau]).collect();
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            // a small positive number
-            let substeps = ((dt / LONGEST_STEP_S - 1e-6).ceil() as usize).max(1);
-            let torque = StepTorque::new([&commands], &held, [now], [*next], substeps);
-            rollout.advance(&mut state, &torque.mean, [now], [dt], substeps);
+        for motion in motions {
+            let index = record.log_of(motion.log, dynamics.joints);
+            let first = append(&mut record.logs[index], motion);
+            let values = values.of_log(motion.log);
+            simulate(
+                &mut record.logs[index],
+                first,
+                &motion.start,
+                dynamics,
+                &values,
+            )?;
+            let log = &record.logs[index];
+            record.motions.push(Window {
+                log: index,
+                first,
+                last: log.rows() - 1,
+            });
+            record.windows.extend(windows(log, index, first, length_s));
         }
-        Some(log)
+        Some(record)
     }
+
+    /// Number of the record's log for motions that begin in a log of the study.
+    fn log_of(&mut self, origin: usize, joints: usize) -> usize {
+        if let Some(known) = self.origins.iter().position(|known| *known == origin) {
+            return known;
+        }
+        self.origins.push(origin);
+        self.logs.push(empty_log(joints));
+        self.logs.len() - 1
+    }
+
+    /// This record and then another one, its logs apart.
+    pub fn and(&self, other: &Self) -> Self {
+        let joined = |own: &[Window], others: &[Window]| {
+            let moved = others.iter().map(|window| Window {
+                log: window.log + self.logs.len(),
+                ..*window
+            });
+            own.iter().copied().chain(moved).collect()
+        };
+        Self {
+            motions: joined(&self.motions, &other.motions),
+            windows: joined(&self.windows, &other.windows),
+            logs: [self.logs.as_slice(), &other.logs].concat(),
+            origins: [self.origins.as_slice(), &other.origins].concat(),
+        }
+    }
+
+    /// The true states at the starts of windows.
+    pub fn starts(&self, windows: std::ops::RangeFrom<usize>) -> Vec<Vec<f64>> {
+        let start = |window: &Window| {
+            let log = &self.logs[window.log];
+            let columns = log.q.iter().chain(&log.qd);
+            columns.map(|column| column[window.first]).collect()
+        };
+        self.windows[windows].iter().map(start).collect()
+    }
+
+    /// Length in s of the windows from a number on.
+    pub fn duration_s(&self, windows: std::ops::RangeFrom<usize>) -> f64 {
+        let windows = self.windows[windows].iter();
+        windows.map(|w| w.duration_s(&self.logs)).sum()
+    }
+}
+
+fn empty_log(joints: usize) -> Log {
+    Log {
+        path: PathBuf::new(),
+        time: Vec::new(),
+        q: vec![Vec::new(); joints],
+        qd: vec![Vec::new(); joints],
+        tau: vec![Vec::new(); joints],
+        leave_out: Vec::new(),
+        notes: Vec::new(),
+    }
+}
+
+/// Add the torques of a motion to a log, after a pause; the row at which it begins.
+fn append(log: &mut Log, motion: &Motion) -> usize {
+    let earliest = log
+        .time
+        .last()
+        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * PAUSE_S);
+    let delay = (earliest - motion.time[0]).max(0.0);
+    let pause = (motion.time[0] - PAUSE_S, &motion.tau[0]);
+    let rows = motion.time.iter().copied().zip(&motion.tau);
+    for (time, tau) in std::iter::once(pause).chain(rows) {
+        log.time.push(time + delay);
+        for (column, tau) in log.tau.iter_mut().zip(tau) {
+            column.push(*tau);
+        }
+    }
+    log.time.len() - motion.time.len()
+}
+
+/// Fill in the states of a model from row `first` to the end of a log; `None` where it diverges.
+fn simulate(
+    log: &mut Log,
+    first: usize,
+    start: &[f64],
+    dynamics: &Dynamics,
+    values: &[f64],
+) -> Option<()> {
+    let commanded = log.clone();
+    let commands = Commands::of_log(dynamics, values, &commanded);
+    let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
+    let mut sensors = Sensors::<1>::new(dynamics, values);
+    let mut state: Vec<[f64; 1]> = start.iter().map(|value| [*value]).collect();
+    // The row of the pause, which nothing reads, is as the motion begins.
+    let columns = log.q.iter_mut().chain(&mut log.qd);
+    columns
+        .zip(start)
+        .for_each(|(column, value)| column.resize(first, *value));
+    for row in first..log.rows() {
+        if state.iter().any(|value| !value[0].is_finite()) {
+            return None;
+        }
+        let before = || Commands::just_before([&commands], [row]);
+        let shown = sensors.show(&state, before, [log.time[row]]).to_vec();
+        let columns = log.q.iter_mut().chain(&mut log.qd);
+        let read = shown.iter().chain(&state[dynamics.joints..]);
+        columns
+            .zip(read)
+            .for_each(|(column, value)| column.push(value[0]));
+        let Some(&to) = log.time.get(row + 1) else {
+            break;
+        };
+        let (from, held): (f64, Vec<[f64; 1]>) = (
+            log.time[row],
+            log.tau.iter().map(|tau| [tau[row]]).collect(),
+        );
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        // a small positive number
+        let substeps = (((to - from) / LONGEST_STEP_S - 1e-6).ceil() as usize).max(1);
+        let torque = StepTorque::new([&commands], &held, [from], [to], substeps);
+        rollout.advance(&mut state, &torque.mean, [from], [to - from], substeps);
+    }
+    Some(())
 }
 
 /// Whether a joint goes round.
@@ -72,32 +200,23 @@ pub(super) fn is_turn(q: &[f64]) -> bool {
     high - low > TAU
 }
 
-/// Consecutive windows of `length_s` in simulated logs: their states are known at every row.
-pub(super) fn windows(logs: &[Log], length_s: f64) -> Vec<Window> {
+/// Consecutive windows of `length_s` from a row on.
+fn windows(log: &Log, index: usize, first: usize, length_s: f64) -> Vec<Window> {
+    let step_s = log.median_step();
     let mut windows = Vec::new();
-    for (index, log) in logs.iter().enumerate() {
-        let slack = 0.5 * log.median_step();
-        let mut first = 0;
-        while first + 1 < log.rows() {
-            let end = log.time[first] + length_s;
-            let last = log.time.partition_point(|t| *t <= end + slack) - 1;
-            if last == first || log.time[last] < end - slack {
-                break;
-            }
-            windows.push(Window {
-                log: index,
-                first,
-                last,
-            });
-            first = last;
+    let mut first = first;
+    while first + 1 < log.rows() {
+        let end = log.time[first] + length_s;
+        let last = log.time.partition_point(|t| *t <= end + 0.5 * step_s) - 1;
+        if last == first || log.time[last] < end - 0.5 * step_s {
+            break;
         }
+        windows.push(Window {
+            log: index,
+            first,
+            last,
+        });
+        first = last;
     }
     windows
-}
-
-/// The state of a simulated log at a window's start.
-pub(super) fn start_of(logs: &[Log], window: &Window) -> Vec<f64> {
-    let log = &logs[window.log];
-    let columns = log.q.iter().chain(&log.qd);
-    columns.map(|column| column[window.first]).collect()
 }
