@@ -144,3 +144,71 @@ fn cubic_damping_is_proposed_with_its_size() {
 fn nothing_is_proposed_for_noise() {
     assert_eq!(proposed(&logs(WHITE, "0*size", 3), 3), None);
 }
+
+/// A spring between motor and link, and the logs of the motor alone.
+const COMPLIANT: &str = r#"
+[system]
+name = "compliant"
+joints = 2
+[parameters]
+k = { value = 30.0, unit = "N m/rad" }
+[dynamics]
+qdd1 = "20*(tau1 - k*(q1 - q2) - 0.02*(qd1 - qd2))"
+qdd2 = "6*(k*(q1 - q2) + 0.02*(qd1 - qd2)) - 17.4*sin(q2)"
+"#;
+
+/// A bristle that bends before the joint slides (Dahl 1968): its deflection stands as the second joint's velocity.
+const PRESLIDING: &str = r#"
+[system]
+name = "presliding"
+joints = 2
+[parameters]
+k = { value = 4.0, unit = "N m/rad" }
+[dynamics]
+qdd1 = "-17.4*sin(q1) + 4.6*(tau1 - k*qd2)"
+qdd2 = "qd1 - 20*abs(qd1)*qd2"
+"#;
+
+/// Logs of the first of two joints.
+fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("rig.toml"), model).unwrap();
+    let text = RIG
+        .replace("pendulum", "rig.toml")
+        .replace("{ C_g = -17.4, C_i = 4.6 }", "{}");
+    let text = text
+        .replace("[1.6]", "[1.6, 0.0]")
+        .replace("[0, 0]", "[0, 0, 0, 0]");
+    let text = format!("{text}sensor = {{ rate_hz = 100, {WHITE} }}\n");
+    let plant = Plant::from_text(
+        &folder.path().join("plant.toml"),
+        &text,
+        &Library::built_in(),
+    );
+    let (plant, mut rng) = (plant.unwrap(), rng(seed));
+    (0..plant.recording.logs)
+        .map(|_| {
+            let mut log = plant.record(&mut rng).unwrap();
+            for columns in [&mut log.q, &mut log.qd, &mut log.tau] {
+                columns.truncate(1);
+            }
+            log
+        })
+        .collect()
+}
+
+/// What has a state of its own is no function of angle, speed, torque and time; it is seen all the same, beside
+/// the effects that come nearest.
+#[test]
+fn what_has_a_memory_is_not_taken_for_noise() {
+    for model in [COMPLIANT, PRESLIDING] {
+        let logs = logs_of_first(model, 1);
+        for effects in [&[][..], &["viscous_friction", "coulomb_friction"]] {
+            let left = left(&logs, effects, 1);
+            assert!(
+                left.is_significant() && left.p_value < 0.01,
+                "{model}, {effects:?}: {left:?}"
+            );
+        }
+    }
+}

@@ -25,9 +25,11 @@ pub struct Evidence {
 pub(super) const WORTHWHILE: f64 = 0.1;
 /// Candidates within this many standard errors of the best explain the logs as well as it does.
 const AS_GOOD: f64 = 2.0;
-/// And they save this share of what it saves: where both cut the loss to a sliver, differences of slivers do not
-/// matter either.
+/// And they save this share of what it saves,
 const AS_MUCH: f64 = 0.8;
+/// and leave not more than so many times the loss that it leaves, a seventh more in error: few stretches may fail to
+/// tell models apart of which one leaves plainly more.
+const AS_LITTLE: f64 = 1.3;
 
 impl Evidence {
     /// Number of values, one a log where they differ by log, then of the simpler effects that it contains.
@@ -68,7 +70,9 @@ impl Evidence {
     /// Whether the losses on left-out stretches do not tell this candidate from a better one.
     pub fn is_as_good_as(&self, best: &Self) -> bool {
         let (mean, error) = mean_and_error(&differences(&self.losses, &best.losses));
-        mean <= AS_GOOD * error && self.gain > AS_MUCH * best.gain
+        mean <= AS_GOOD * error
+            && self.gain > AS_MUCH * best.gain
+            && 1.0 - self.gain <= AS_LITTLE * (1.0 - best.gain)
     }
 }
 

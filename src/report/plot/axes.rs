@@ -11,7 +11,7 @@ pub(super) const FOOT: f64 = 46.0;
 /// Room above a frame for its heading.
 pub(super) const HEAD: f64 = 24.0;
 
-const X_TICK_PX: f64 = 75.0;
+const X_TICK_PX: f64 = 60.0;
 const Y_TICK_PX: f64 = 42.0;
 const LABEL_GAP_PX: f64 = 14.0;
 

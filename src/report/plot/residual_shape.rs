@@ -194,10 +194,7 @@ fn draw_panel(canvas: &mut Canvas, frame: &Frame, shown: &[Shown<'_>]) {
     if total == 0 {
         canvas.add(no_data(frame.area));
     } else if outside > 0 {
-        canvas.add(remark(
-            frame.area,
-            &format!("{outside} of {total} points outside"),
-        ));
+        canvas.add(remark(frame.area, &format!("{outside} of {total} outside")));
     }
 }
 
@@ -262,7 +259,7 @@ mod tests {
         let mut samples: Vec<_> = (0..500).map(|i| sample(f64::from(i) / 500.0)).collect();
         samples.push(sample(1e4));
         let figure = residual_shape(&[panel(samples)], "outlier").unwrap();
-        assert!(figure.contains("of 501 points outside"));
+        assert!(figure.contains("of 501 outside"));
         assert!(!figure.contains(">10000<"));
     }
 
