@@ -156,7 +156,7 @@ fn contenders(paths: &[PathBuf], system: &System, library: &Library) -> Result<V
         }
         Ok(Contender {
             name: path.display().to_string(),
-            dynamics: other.dynamics(&other.sign()),
+            system: other,
         })
     };
     paths.iter().map(contender).collect()

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{Answer, Common, inputs};
 use crate::data::{LeaveOut, Log};
 use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
-use crate::model::{Dynamics, System, put_own};
+use crate::model::{Dynamics, System};
 use crate::train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -82,12 +82,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .calibrate
         .map(|share| calibrate(&dynamics, &values, &mut logs, share))
         .transpose()?;
-    let known = |log: &Log| {
-        let mut values = values.clone();
-        put_own(&mut values, system.parameters.len(), &system.effects, log);
-        values
-    };
-    let known: Vec<Vec<f64>> = logs.iter().map(known).collect();
+    let known = logs.iter().map(|log| system.values_in(&dynamics, log));
+    let known: Vec<Vec<f64>> = known.collect();
     let assessment = match &offsets {
         Some(Offsets {
             dynamics, values, ..

@@ -13,7 +13,7 @@ use super::unexplained::Unexplained;
 use crate::data::{Audit, Log};
 use crate::evaluate::Assessment;
 use crate::identify::Identifiability;
-use crate::model::{Dynamics, FittedEffect, OwnValue, Parameter, System};
+use crate::model::{FittedEffect, OwnValue, Parameter, System};
 
 /// The answer in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -140,7 +140,7 @@ pub struct Contender {
     /// As the user calls it.
     pub name: String,
     /// With the same joints as the declared model.
-    pub dynamics: Dynamics,
+    pub system: System,
 }
 
 /// Open-loop errors on the test logs.

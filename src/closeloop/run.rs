@@ -120,16 +120,22 @@ pub fn close_loop(
             &horizons_s,
         )
     };
-    let as_written = system.dynamics(&system.sign());
-    let judge_as_is = |model: &Dynamics| {
+    let judge_as_is = |model: &System| {
+        let dynamics = model.dynamics(&model.sign());
+        let values: Vec<Vec<f64>> = (split.test.iter())
+            .map(|log| model.values_in(&dynamics, log))
+            .collect();
+        assess(&dynamics, |log| &values[log], &split.test, &horizons_s)
+    };
+    let judge_hybrid = |model: &Dynamics| {
         let values = model.values();
         assess(model, |_| &values, &split.test, &horizons_s)
     };
-    let scored = |other: &Contender| (other.name.clone(), judge_as_is(&other.dynamics));
+    let scored = |other: &Contender| (other.name.clone(), judge_as_is(&other.system));
     let (error_before, error_after) = (judge(&before), judge(&after));
     let errors = Errors {
-        declared: judge_as_is(&as_written),
-        hybrid: learned.as_ref().map(|model| judge_as_is(&model.hybrid)),
+        declared: judge_as_is(system),
+        hybrid: learned.as_ref().map(|model| judge_hybrid(&model.hybrid)),
         against: against.iter().map(scored).collect(),
         reduction_ci95: reduction_interval(error_before.middle(), error_after.middle(), rng),
         before: error_before,
@@ -149,7 +155,10 @@ pub fn close_loop(
         alternatives,
         taken_back,
         confirmed_on,
-        contradicted: contradicted(&as_written.values(), &with_intervals(&study, &before)),
+        contradicted: contradicted(
+            &system.dynamics(&system.sign()).values(),
+            &with_intervals(&study, &before),
+        ),
         before,
         after,
         parameters,

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
-use super::{Parameter, sections};
+use super::{Dynamics, Parameter, sections};
 use crate::data::{Columns, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
@@ -218,6 +218,13 @@ impl System {
         names.push("t".into());
         names.extend(self.parameters.iter().map(|p| p.name.clone()));
         names
+    }
+
+    /// All parameters of `dynamics`, of this model or of one with a network on top, as they are in a log.
+    pub fn values_in(&self, dynamics: &Dynamics, log: &Log) -> Vec<f64> {
+        let mut values = dynamics.values();
+        put_own(&mut values, self.parameters.len(), &self.effects, log);
+        values
     }
 
     /// How dry friction is written in each joint: as the file says, else in the default width.
