@@ -367,7 +367,15 @@ fn play_comes_back_within_its_interval() {
         let model = pendulum(&[backlash(0.0, driven)]);
         let start = [14.0, 3.3, 0.0, driven];
         let locals = shooting.initial_locals(0);
-        let found = fit(&shooting, &model, &[0, 1, 2], start.as_slice(), locals, None).unwrap();
+        let found = fit(
+            &shooting,
+            &model,
+            &[0, 1, 2],
+            start.as_slice(),
+            locals,
+            None,
+        )
+        .unwrap();
         let half = uncertainty(&shooting, &found).half_width(2);
         let value = found.values[2];
         assert!(
