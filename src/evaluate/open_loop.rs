@@ -1,9 +1,11 @@
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
 
 /// Squared errors of one window.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +107,9 @@ fn run<'v>(
     let commands: Vec<Commands<'_>> = (logs.iter().enumerate())
         .map(|(index, log)| Commands::of_log(dynamics, values(index), log))
         .collect();
+    let own: Vec<Cow<'_, Log>> = (logs.iter().enumerate())
+        .map(|(index, log)| with_own_angles(dynamics, values(index), log))
+        .collect();
     let one = |&horizon_s: &f64| {
         let windows: Vec<Window> = logs
             .iter()
@@ -123,6 +128,7 @@ fn run<'v>(
                     values(pack[0].log),
                     &commands[pack[0].log],
                     &logs[pack[0].log],
+                    &own[pack[0].log],
                     pack,
                     step_s,
                 )
@@ -176,12 +182,13 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
         .collect()
 }
 
-/// Integrate up to [`LANES`] windows of one log.
+/// Integrate up to [`LANES`] windows of one log, started from `own`, the log with the rig's own angles.
 fn roll(
     dynamics: &Dynamics,
     values: &[f64],
     commands: &Commands<'_>,
     log: &Log,
+    own: &Log,
     pack: &[Window],
     step_s: f64,
 ) -> Vec<WindowError> {
@@ -190,7 +197,7 @@ fn roll(
     let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
     let starts: Vec<Vec<f64>> = pack
         .iter()
-        .map(|w| initial_state(log, half_width, w.first).expect("windows() checks this"))
+        .map(|w| initial_state(own, half_width, w.first).expect("windows() checks this"))
         .collect();
     let mut state: Vec<[f64; LANES]> = (0..2 * n)
         .map(|k| std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k]))
@@ -199,8 +206,6 @@ fn roll(
     let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
     let mut sensors = Sensors::<LANES>::new(dynamics, values);
     let before = |at: [usize; LANES]| move || Commands::just_before([commands; LANES], at);
-    let first = std::array::from_fn(|l| lane(l).first);
-    sensors.correct(&mut state, before(first), first.map(|row| log.time[row]));
     let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
     for row in 0..rows - 1 {
         let at: [usize; LANES] =

@@ -1,6 +1,6 @@
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]
@@ -14,11 +14,16 @@ pub struct Trace {
 /// picture of an open-loop error shows.
 pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) -> Vec<Trace> {
     let commands = Commands::of_log(dynamics, values, log);
+    let own = with_own_angles(dynamics, values, log);
     // Windows for the error overlap by half; a picture wants each second one.
     super::open_loop::windows(0, log, horizon_s)
         .iter()
         .step_by(2)
-        .map(|window| trace(dynamics, values, &commands, log, window))
+        .map(|window| {
+            let start = initial_state(&own, half_width_s(log.median_step()), window.first)
+                .expect("windows() checks this");
+            trace(dynamics, values, &commands, log, window, &start)
+        })
         .collect()
 }
 
@@ -28,14 +33,12 @@ fn trace(
     commands: &Commands<'_>,
     log: &Log,
     window: &Window,
+    start: &[f64],
 ) -> Trace {
-    let start = initial_state(log, half_width_s(log.median_step()), window.first)
-        .expect("windows() checks this");
     let mut state: Vec<[f64; 1]> = start.iter().map(|value| [*value]).collect();
     let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
     let mut sensors = Sensors::<1>::new(dynamics, values);
     let before = |row: usize| move || Commands::just_before([commands], [row]);
-    sensors.correct(&mut state, before(window.first), [log.time[window.first]]);
     let mut trace = Trace {
         time: Vec::new(),
         q: vec![Vec::new(); dynamics.joints],

@@ -32,6 +32,6 @@ pub use network::{
 };
 pub use reader::FileError;
 pub use rollout::Rollout;
-pub use sensors::{Sensors, as_modelled};
+pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use shift::absorbed;
 pub use system::{FittedEffect, OwnValue, System, put_own};

@@ -1,5 +1,7 @@
+use std::borrow::Cow;
+
 use super::{Commands, Dynamics};
-use crate::data::Log;
+use crate::data::{Log, half_width_s, local_cubic};
 use crate::expr::Tape;
 
 /// What the sensors of a model show of `W` trajectories: the angles of the rig itself unless an effect stands between
@@ -77,20 +79,37 @@ impl<'d, const W: usize> Sensors<'d, W> {
     }
 }
 
-/// A log as a model with parameters `values` sees it: with the torques that act and the angles of the rig itself.
-#[must_use]
-pub fn as_modelled(dynamics: &Dynamics, values: &[f64], log: &Log) -> Log {
+/// A log with the angles of the rig itself in place of those that sensors show, by a model with parameters `values`.
+/// Velocities are taken from the logged angles, as those that rigs report are noisy.
+pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) -> Cow<'l, Log> {
+    if dynamics.reading.is_none() {
+        return Cow::Borrowed(log);
+    }
     let commands = Commands::of_log(dynamics, values, log);
-    let mut own = commands.acting_on(log);
     let mut sensors = Sensors::<1>::new(dynamics, values);
+    let half_width = half_width_s(log.median_step());
+    let mut own = log.clone();
     for row in 0..log.rows() {
-        let logged = log.q.iter().chain(&log.qd);
-        let mut state: Vec<[f64; 1]> = logged.map(|column| [column[row]]).collect();
+        let speed = |j: usize| {
+            let cubic = local_cubic(&log.time, &log.q[j], row, half_width);
+            cubic.map_or(log.qd[j][row], |cubic| cubic.slope)
+        };
+        let angles = log.q.iter().map(|q| [q[row]]);
+        let mut state: Vec<[f64; 1]> = angles
+            .chain((0..log.joints()).map(|j| [speed(j)]))
+            .collect();
         let before = || Commands::just_before([&commands], [row]);
         sensors.correct(&mut state, before, [log.time[row]]);
         for (column, angle) in own.q.iter_mut().zip(&state) {
             column[row] = angle[0];
         }
     }
-    own
+    Cow::Owned(own)
+}
+
+/// A log as a model sees it: with the angles of the rig itself, and the torques that act.
+#[must_use]
+pub fn as_modelled(dynamics: &Dynamics, values: &[f64], log: &Log) -> Log {
+    let own = with_own_angles(dynamics, values, log);
+    Commands::of_log(dynamics, values, log).acting_on(&own)
 }
