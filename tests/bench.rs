@@ -68,15 +68,11 @@ fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code(
         if !(plain && cell.effects.iter().all(in_equations)) {
             continue;
         }
-        let Source::Simulated {
-            mechanics,
-            condition,
-            ..
-        } = &mut cell.source
-        else {
+        let Source::Simulated(simulation) = &mut cell.source else {
             panic!("the grid's rigs are simulated")
         };
-        let mechanics = mechanics.clone();
+        let mechanics = simulation.mechanics.clone();
+        let condition = &mut simulation.condition;
         condition.noise = 0.0;
         condition.rate_hz = 500.0;
         condition.logs = 2;

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
-use super::grid::{Cell, Source, hash};
+use super::grid::{Cell, Simulation, Source, hash};
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
@@ -57,25 +57,24 @@ impl Cell {
                 let logs = logs.iter().map(read).collect::<Result<_, _>>()?;
                 Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
             }
-            Source::Simulated {
-                mechanics,
-                driving,
-                condition,
-            } => {
-                let machine = Machine::with(mechanics.clone(), &self.effects)
-                    .expect("the effects were checked when the grid was read");
-                // Cells share neither their motions nor their noise.
-                let mut rng = ChaCha8Rng::seed_from_u64(hash(self.id.as_bytes()));
-                let offsets: Vec<Pair> = (0..condition.logs)
-                    .map(|_| self.draw_offset(&mut rng))
-                    .collect();
-                let truth = Truth::of(&self.effects, machine.mechanics.declared(), &offsets);
-                let record = |(index, offset): (usize, &Pair)| {
-                    machine.record(driving, condition, index, *offset, &mut rng)
-                };
-                Ok((offsets.iter().enumerate().map(record).collect(), truth))
-            }
+            Source::Simulated(simulation) => Ok(self.simulate(simulation)),
         }
+    }
+
+    fn simulate(&self, simulation: &Simulation) -> (Vec<Log>, Truth) {
+        let (driving, condition) = (&simulation.driving, &simulation.condition);
+        let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
+            .expect("the effects were checked when the grid was read");
+        // Cells share neither their motions nor their noise.
+        let mut rng = ChaCha8Rng::seed_from_u64(hash(self.id.as_bytes()));
+        let offsets: Vec<Pair> = (0..condition.logs)
+            .map(|_| self.draw_offset(&mut rng))
+            .collect();
+        let truth = Truth::of(&self.effects, machine.mechanics.declared(), &offsets);
+        let record = |(index, offset): (usize, &Pair)| {
+            machine.record(driving, condition, index, *offset, &mut rng)
+        };
+        (offsets.iter().enumerate().map(record).collect(), truth)
     }
 
     fn draw_offset(&self, rng: &mut ChaCha8Rng) -> Pair {

@@ -82,16 +82,20 @@ pub struct Cell {
     pub source: Source,
 }
 
+/// A simulated rig and how its logs are taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Simulation {
+    pub mechanics: Mechanics,
+    pub driving: Driving,
+    pub condition: Condition,
+}
+
 /// Where the logs of a cell come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// Recorded when they are asked for.
-    Simulated {
-        mechanics: Mechanics,
-        driving: Driving,
-        condition: Condition,
-    },
+    Simulated(Box<Simulation>),
     /// Recorded by another program.
     Files {
         logs: Vec<PathBuf>,
@@ -193,11 +197,11 @@ impl File {
                     effects: effects.clone(),
                     seed,
                     model: beside_or_named(path, &plant.model),
-                    source: Source::Simulated {
+                    source: Source::Simulated(Box::new(Simulation {
                         mechanics: plant.mechanics.clone(),
                         driving: plant.driving.clone(),
                         condition: condition.clone(),
-                    },
+                    })),
                 }));
             }
         }
