@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use residyn::bench::{Cell, Group, Hidden, read};
+use residyn::bench::{Group, Hidden, Mechanics, Source, read};
 use residyn::evaluate::assess;
 use residyn::expr::SignForm;
 use residyn::model::{FittedEffect, Library};
@@ -31,9 +31,9 @@ fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
 }
 
 /// Values of the rig's parameters as the model file calls them.
-fn true_value(cell: &Cell, name: &str) -> Option<f64> {
-    let rig = serde_json::to_value(&cell.bench.mechanics).unwrap();
-    let declared = cell.bench.mechanics.declared(name);
+fn true_value(mechanics: &Mechanics, name: &str) -> Option<f64> {
+    let rig = serde_json::to_value(mechanics).unwrap();
+    let declared = mechanics.declared().get(name).copied();
     declared.or_else(|| rig.get(name)?.as_f64())
 }
 
@@ -64,25 +64,27 @@ fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code(
     let mut compared = 0;
     for mut cell in read(&path("effects.toml")).unwrap() {
         let in_equations = |hidden: &Hidden| !NOT_IN_THE_EQUATIONS.contains(&hidden.name.as_str());
-        let plain = cell.condition_name == "base" && cell.group == Group::Single;
+        let plain = cell.condition == "base" && cell.group == Group::Single;
         if !(plain && cell.effects.iter().all(in_equations)) {
             continue;
         }
-        let condition = &mut cell.condition;
-        (
-            condition.noise,
-            condition.rate_hz,
-            condition.logs,
-            condition.seconds,
-        ) = (0.0, 500.0, 2, 6.0);
-        let (logs, _) = cell.record();
-        let system = library.system(&cell.bench.model).unwrap();
+        let Source::Simulated(simulation) = &mut cell.source else {
+            panic!("the grid's rigs are simulated")
+        };
+        let mechanics = simulation.mechanics.clone();
+        let condition = &mut simulation.condition;
+        condition.noise = 0.0;
+        condition.rate_hz = 500.0;
+        condition.logs = 2;
+        condition.seconds = 6.0;
+        let system = library.system(&cell.model).unwrap();
+        let (logs, _) = cell.record(&system).unwrap();
         let error = |effects: &[FittedEffect]| {
             let sign = vec![SignForm::Smooth { width: 1e-4 }; system.joints];
             let dynamics = system.dynamics_with(effects, &sign);
             let mut values = dynamics.values();
             for (value, parameter) in values.iter_mut().zip(&system.parameters) {
-                *value = true_value(&cell, &parameter.name).expect("the rig has it");
+                *value = true_value(&mechanics, &parameter.name).expect("the rig has it");
             }
             assess(&dynamics, |_| &values, &logs, &[0.5]).position_rms()
         };

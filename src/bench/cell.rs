@@ -1,18 +1,17 @@
-//! One cell: simulate, close the loop, fit what a person who knew the truth would, judge.
-
-use std::path::Path;
+//! One cell: record its logs, close the loop, fit what a person who knew the truth would, judge.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
-use super::grid::{Cell, hash};
+use super::grid::{Cell, Simulation, Source, hash};
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
+use super::mechanics::Pair;
 use super::told::told;
 use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
-use crate::data::Log;
+use crate::data::{Log, LogError};
 use crate::model::{Library, System};
 
 /// Errors are compared at the middle one \[s\].
@@ -44,27 +43,41 @@ impl Errors {
 }
 
 impl Cell {
-    /// The logs of the cell, and how much its encoders read too much in each \[log\]\[joint\].
+    /// The logs of the cell, and what is true of them.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
     ///
     /// # Panics
     /// Never: the effects were checked when the grid was read.
-    pub fn record(&self) -> (Vec<Log>, Vec<[f64; 2]>) {
-        let machine = Machine::with(self.bench.mechanics.clone(), &self.effects)
+    pub fn record(&self, system: &System) -> Result<(Vec<Log>, Truth), LogError> {
+        match &self.source {
+            Source::Files { logs, declared } => {
+                let read = |path| Log::read(path, system.joints, &system.columns);
+                let logs = logs.iter().map(read).collect::<Result<_, _>>()?;
+                Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
+            }
+            Source::Simulated(simulation) => Ok(self.simulate(simulation)),
+        }
+    }
+
+    fn simulate(&self, simulation: &Simulation) -> (Vec<Log>, Truth) {
+        let (driving, condition) = (&simulation.driving, &simulation.condition);
+        let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
             .expect("the effects were checked when the grid was read");
         // Cells share neither their motions nor their noise.
         let mut rng = ChaCha8Rng::seed_from_u64(hash(self.id.as_bytes()));
-        let offsets: Vec<[f64; 2]> = (0..self.condition.logs)
+        let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();
-        let record = |(index, offset): (usize, &[f64; 2])| {
-            let (driving, condition) = (&self.bench.driving, &self.condition);
+        let truth = Truth::of(&self.effects, machine.mechanics.declared(), &offsets);
+        let record = |(index, offset): (usize, &Pair)| {
             machine.record(driving, condition, index, *offset, &mut rng)
         };
-        let logs = offsets.iter().enumerate().map(record).collect();
-        (logs, offsets)
+        (offsets.iter().enumerate().map(record).collect(), truth)
     }
 
-    fn draw_offset(&self, rng: &mut ChaCha8Rng) -> [f64; 2] {
+    fn draw_offset(&self, rng: &mut ChaCha8Rng) -> Pair {
         let mut offset = [0.0; 2];
         for effect in &self.effects {
             if effect.name == "sensor_offset" {
@@ -74,14 +87,13 @@ impl Cell {
         offset
     }
 
-    /// Simulate, close the loop, judge.
+    /// Record the logs, close the loop, judge.
     ///
     /// # Errors
-    /// A model file that cannot be read, or logs from which the loop cannot be closed.
+    /// A model file or log that cannot be read, or logs from which the loop cannot be closed.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
-        let system = library.system(Path::new(&self.bench.model))?;
-        let (logs, offsets) = self.record();
-        let truth = Truth::of(self, &offsets);
+        let system = library.system(&self.model)?;
+        let (logs, truth) = self.record(&system)?;
         let mut split = Split::given(logs, Vec::new());
         split.test.extend(split.train.pop());
         let outcome = close(&system, library, split.clone(), self.seed)?;

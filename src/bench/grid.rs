@@ -38,13 +38,13 @@ pub enum Group {
 }
 
 /// A simulated rig and the model that is declared for it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Bench {
+struct Plant {
     /// A model file, as seen from the grid, or the name of a built-in system.
-    pub model: PathBuf,
-    pub mechanics: Mechanics,
-    pub driving: Driving,
+    model: PathBuf,
+    mechanics: Mechanics,
+    driving: Driving,
 }
 
 /// Every set of effects under every condition with every seed.
@@ -61,7 +61,7 @@ struct Series {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    plants: BTreeMap<String, Bench>,
+    plants: BTreeMap<String, Plant>,
     conditions: BTreeMap<String, Condition>,
     series: Vec<Series>,
 }
@@ -73,11 +73,35 @@ pub struct Cell {
     pub id: String,
     pub group: Group,
     pub plant: String,
-    pub condition_name: String,
+    /// The name of the condition, or of the program that recorded the logs.
+    pub condition: String,
     pub effects: Vec<Hidden>,
     pub seed: u64,
-    pub bench: Bench,
+    /// A model file, or the name of a built-in system.
+    pub model: PathBuf,
+    pub source: Source,
+}
+
+/// A simulated rig and how its logs are taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Simulation {
+    pub mechanics: Mechanics,
+    pub driving: Driving,
     pub condition: Condition,
+}
+
+/// Where the logs of a cell come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// Recorded when they are asked for.
+    Simulated(Box<Simulation>),
+    /// Recorded by another program.
+    Files {
+        logs: Vec<PathBuf>,
+        /// True values of declared parameters, where the rig fixes them.
+        declared: BTreeMap<String, f64>,
+    },
 }
 
 /// All cells of a grid, in the order of its series.
@@ -118,9 +142,9 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
 
 impl File {
     fn check(&self) -> Result<(), String> {
-        for (name, bench) in &self.plants {
-            let driving = &bench.driving;
-            let joints = bench.mechanics.joints();
+        for (name, plant) in &self.plants {
+            let driving = &plant.driving;
+            let joints = plant.mechanics.joints();
             let lists = [
                 &driving.torque,
                 &driving.reference,
@@ -157,28 +181,27 @@ impl File {
     }
 
     fn expand(&self, series: &Series, path: &Path) -> Result<Vec<Cell>, String> {
-        let plant = &series.plant;
-        let bench = self.plants.get(plant);
-        let mut bench = bench.ok_or(format!("no plant `{plant}`"))?.clone();
-        let beside = path.parent().unwrap_or(Path::new("")).join(&bench.model);
-        if beside.is_file() {
-            bench.model = beside;
-        }
+        let plant = self.plants.get(&series.plant);
+        let plant = plant.ok_or(format!("no plant `{}`", series.plant))?;
         let mut all = Vec::new();
         for effects in &series.effects {
-            Machine::with(bench.mechanics.clone(), effects)?;
+            Machine::with(plant.mechanics.clone(), effects)?;
             for name in &series.conditions {
                 let condition = self.conditions.get(name);
                 let condition = condition.ok_or(format!("no condition `{name}`"))?;
                 all.extend(series.seeds.iter().map(|&seed| Cell {
-                    id: id(plant, effects, name, seed),
+                    id: id(&series.plant, effects, name, seed),
                     group: series.group,
-                    plant: plant.clone(),
-                    condition_name: name.clone(),
+                    plant: series.plant.clone(),
+                    condition: name.clone(),
                     effects: effects.clone(),
                     seed,
-                    bench: bench.clone(),
-                    condition: condition.clone(),
+                    model: beside_or_named(path, &plant.model),
+                    source: Source::Simulated(Box::new(Simulation {
+                        mechanics: plant.mechanics.clone(),
+                        driving: plant.driving.clone(),
+                        condition: condition.clone(),
+                    })),
                 }));
             }
         }
@@ -186,8 +209,18 @@ impl File {
     }
 }
 
+/// A file beside the grid or, where there is none, the name of something built in.
+pub(super) fn beside_or_named(grid: &Path, model: &Path) -> PathBuf {
+    let beside = grid.parent().unwrap_or(Path::new("")).join(model);
+    if beside.is_file() {
+        beside
+    } else {
+        model.to_owned()
+    }
+}
+
 /// `pendulum/coulomb_friction@1(F_c=0.1)/base/1`
-fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) -> String {
+pub(super) fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) -> String {
     let effect = |hidden: &Hidden| {
         let values = hidden.values.iter();
         let values: Vec<String> = values
@@ -260,7 +293,7 @@ mod tests {
                 "p/joint_spring@1(k=0.5,q_0=-0.25)/base/2",
             ]
         );
-        assert_eq!(all[0].bench.model, Path::new("pendulum"));
+        assert_eq!(all[0].model, Path::new("pendulum"));
     }
 
     #[test]

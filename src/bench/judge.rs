@@ -5,8 +5,9 @@ use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use super::grid::{Cell, Group};
+use super::grid::Group;
 use super::hidden::Hidden;
+use super::mechanics::Pair;
 use super::recording::log_name;
 use crate::closeloop::Verdict;
 
@@ -104,34 +105,25 @@ pub fn of_log(parameter: &str, log: &str) -> String {
 }
 
 /// An effect's numbers; of an offset what it was in each log.
-fn values(effect: &Hidden, offsets: &[[f64; 2]]) -> BTreeMap<String, f64> {
+fn values(effect: &Hidden, offsets: &[Pair]) -> BTreeMap<String, f64> {
     if effect.name != "sensor_offset" {
         return effect.values.clone();
     }
     let in_log =
-        |(k, offset): (usize, &[f64; 2])| (of_log("q_z", &log_name(k)), offset[effect.joint - 1]);
+        |(k, offset): (usize, &Pair)| (of_log("q_z", &log_name(k)), offset[effect.joint - 1]);
     offsets.iter().enumerate().map(in_log).collect()
 }
 
 impl Truth {
-    /// Of a cell whose encoders read too much by `offsets` rad, `[log][joint]`.
-    pub fn of(cell: &Cell, offsets: &[[f64; 2]]) -> Self {
-        let mut machine = cell.bench.mechanics.clone();
-        for shift in cell.effects.iter().filter(|e| e.name == "parameter_shift") {
-            for (name, value) in &shift.values {
-                machine.set(name, *value);
-            }
-        }
-        let declared = ["C_g", "C_i"].iter();
+    /// Of a rig with these effects and `declared` parameters, whose encoders read too much by `offsets` rad,
+    /// `[log][joint]`.
+    pub fn of(effects: &[Hidden], declared: BTreeMap<String, f64>, offsets: &[Pair]) -> Self {
         Self {
-            effects: cell
-                .effects
+            effects: effects
                 .iter()
                 .map(|effect| (effect.label(), values(effect, offsets)))
                 .collect(),
-            declared: declared
-                .filter_map(|name| Some(((*name).to_owned(), machine.declared(name)?)))
-                .collect(),
+            declared,
         }
     }
 

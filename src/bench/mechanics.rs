@@ -1,3 +1,5 @@
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 /// Numbers of the two joints. A rig of one joint carries an idle second one.
@@ -109,15 +111,15 @@ impl Mechanics {
         Some(())
     }
 
-    /// The true value of a parameter as the declared model writes it, where that is a function of the rig.
-    pub fn declared(&self, name: &str) -> Option<f64> {
+    /// True values of the parameters that a declared model names otherwise and that its logs determine.
+    pub fn declared(&self) -> BTreeMap<String, f64> {
         match *self {
-            Self::Pendulum { inertia, moment, g } => match name {
-                "C_g" => Some(-moment * g / inertia),
-                "C_i" => Some(1.0 / inertia),
-                _ => None,
-            },
-            Self::DoublePendulum { .. } => None,
+            Self::Pendulum { inertia, moment, g } => [
+                ("C_g".to_owned(), -moment * g / inertia),
+                ("C_i".to_owned(), 1.0 / inertia),
+            ]
+            .into(),
+            Self::DoublePendulum { .. } => BTreeMap::new(),
         }
     }
 }

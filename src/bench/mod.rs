@@ -8,6 +8,7 @@ mod answer;
 mod cell;
 mod drive;
 mod excitation;
+mod files;
 mod force;
 mod friction;
 mod grid;
@@ -22,7 +23,8 @@ mod told;
 mod transmission;
 
 pub use cell::{Errors, Findings};
-pub use grid::{Bench, Cell, GridError, Group, cells, hash, read};
+pub use files::recorded;
+pub use grid::{Cell, GridError, Group, Simulation, Source, cells, hash, read};
 pub use hidden::Hidden;
 pub use judge::{Answer, Coverage, Estimate, Judgement, Label, Named, Truth, judge};
 pub use machine::{Machine, State};

@@ -180,7 +180,7 @@ impl Machine {
     /// Move over one step of the log, halting where a delay brings in the next command.
     fn hold(&self, state: &mut State, wires: &mut Wires, row: usize, dt: f64) {
         let changes = [0, 1].map(|j| whole_steps(self.drives[j].delay, dt).1);
-        let mut cuts = vec![0.0, changes[0], changes[1], dt];
+        let mut cuts = [0.0, changes[0], changes[1], dt];
         cuts.sort_by(f64::total_cmp);
         for span in cuts.windows(2).filter(|span| span[1] > span[0]) {
             wires.set(self, row, dt, span[0]);

@@ -170,7 +170,7 @@ pub fn summarise(lines: &[Line]) -> Summary {
             d.cell.effects.iter().map(|e| e.name.clone()).collect()
         }),
         by_condition: by(&done, |d| {
-            vec![format!("{}, {}", d.cell.plant, d.cell.condition_name)]
+            vec![format!("{}, {}", d.cell.plant, d.cell.condition)]
         }),
         by_parameter: by_parameter(&done),
         failures: done.iter().filter_map(failure).collect(),

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 
 use super::{Answer, Common, inputs, progress};
-use crate::bench::{Cell, Line, hash, markdown, read, summarise};
+use crate::bench::{Cell, Line, Source, hash, markdown, read, recorded, summarise};
 use crate::model::Library;
 
 /// Measure the program itself on simulated rigs
@@ -38,6 +38,9 @@ struct Effects {
         value_name = "FILE"
     )]
     grid: PathBuf,
+    /// Logs that another program recorded (scripts/mujoco-logs, say) instead of the grid's own rigs
+    #[arg(long, value_name = "DIR")]
+    logs: Option<PathBuf>,
     /// Folder of the results
     #[arg(long, default_value = "bench-effects", value_name = "DIR")]
     out: PathBuf,
@@ -73,7 +76,10 @@ fn effects(arguments: &Effects) -> Result<Answer> {
 }
 
 fn wanted(arguments: &Effects) -> Result<Vec<Cell>> {
-    let mut all = read(&arguments.grid)?;
+    let mut all = match &arguments.logs {
+        Some(folder) => recorded(folder, &arguments.grid)?,
+        None => read(&arguments.grid)?,
+    };
     let only = &arguments.only;
     all.retain(|cell| only.is_empty() || only.iter().any(|text| cell.id.contains(text)));
     if all.is_empty() {
@@ -158,11 +164,16 @@ impl Store {
     }
 }
 
-/// Of the cell and of the model file that it uses, which may change without the grid.
+/// Of the cell and of the files that it uses, which may change without the grid.
 fn configuration(cell: &Cell) -> Result<String> {
     let mut bytes = serde_json::to_vec(cell)?;
-    if cell.bench.model.is_file() {
-        bytes.extend(fs::read(&cell.bench.model)?);
+    if cell.model.is_file() {
+        bytes.extend(fs::read(&cell.model)?);
+    }
+    if let Source::Files { logs, .. } = &cell.source {
+        for log in logs {
+            bytes.extend(fs::read(log).with_context(|| log.display().to_string())?);
+        }
     }
     Ok(format!("{:016x}", hash(&bytes)))
 }
