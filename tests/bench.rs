@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use residyn::bench::{Group, Hidden, Mechanics, Source, read};
+use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
 use residyn::evaluate::assess;
 use residyn::expr::SignForm;
 use residyn::model::{FittedEffect, Library};
@@ -159,4 +159,34 @@ fn a_wrong_grid_or_selection_is_refused() {
     assert!(message.contains("no cell's name contains"), "{message}");
     let message = refuses(&["bench", "effects", "--grid", "no-such-grid.toml"]);
     assert!(message.contains("give a grid with --grid"), "{message}");
+}
+
+#[test]
+fn logs_of_another_program_are_cells_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = folder.path().join("rig-01");
+    std::fs::create_dir(&rig).unwrap();
+    let cell = &read(&path("smoke.toml")).unwrap()[0];
+    let system = Library::built_in().system(&cell.model).unwrap();
+    let (logs, truth) = cell.record(&system).unwrap();
+    for log in &logs {
+        log.write(rig.join(&log.path)).unwrap();
+    }
+    let described = serde_json::json!({
+        "group": "single", "plant": "rig", "recorded_by": "another", "model": "pendulum",
+        "effects": [{"name": "coulomb_friction", "joint": 1, "F_c": 0.2}],
+        "logs": ["log1.csv", "log2.csv", "log3.csv"],
+        "declared": truth.declared,
+    });
+    std::fs::write(rig.join("cell.json"), described.to_string()).unwrap();
+    let cells = recorded(folder.path(), &path("smoke.toml")).unwrap();
+    assert_eq!(cells[0].id, "rig/coulomb_friction@1(F_c=0.2)/another/1");
+    let (again, same_truth) = cells[0].record(&system).unwrap();
+    assert_eq!((again[2].q.clone(), same_truth), (logs[2].q.clone(), truth));
+    std::fs::write(rig.join("cell.json"), "{}").unwrap();
+    let message = refuses(&["bench", "effects", "--logs", text(folder.path())]);
+    assert!(
+        message.contains("cell.json: missing field `group`"),
+        "{message}"
+    );
 }
