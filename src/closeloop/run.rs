@@ -97,10 +97,12 @@ pub fn close_loop(
     };
     let (residual_before, residual_after) = (residual(&before), residual(&after));
     let curves = |samples: &[ForceSample]| curves(samples, &system.prismatic);
+    let fine = study.refined();
+    let after = fine.estimate(&after);
     let (curves_before, curves_after) = (curves(&residual_before), curves(&residual_after));
     let proposal = proposal(&study, &after, &left);
     let learned = match backend {
-        Some(backend) => learn_residual(&study, &after, backend, rng, &mut |text| {
+        Some(backend) => learn_residual(&fine, &after, backend, rng, &mut |text| {
             progress(Stage { number: 4, text });
         })?,
         None => None,
@@ -141,7 +143,7 @@ pub fn close_loop(
         before: error_before,
         after: error_after,
     };
-    let parameters = with_intervals(&study, &after);
+    let parameters = with_intervals(&fine, &after);
     let findings = findings(&study, &after, &parameters, &errors.after, judge);
     let (verdict, reason) = verdict(&study, &after, &left, &errors);
     Ok(Outcome {
@@ -149,7 +151,7 @@ pub fn close_loop(
         reason,
         how_split: split.how.clone(),
         audits,
-        sign_widths: study.sign_widths.clone(),
+        sign_widths: fine.sign_widths.clone(),
         prismatic: system.prismatic.clone(),
         identifiability: study.identifiability.clone(),
         alternatives,

@@ -31,6 +31,10 @@ pub(super) const WINDOW_S: f64 = 0.5;
 /// same on a slow axis and on a fast arm.
 const SIGN_WIDTH: f64 = 5e-4;
 
+/// The model that is reported is fitted once more in finer steps (s), with friction that reverses over half the
+/// speed: smoothing and steps shift dry friction by a few parts in a thousand, more than the noise of long logs does.
+const FINE_STEP_S: f64 = 5e-4;
+
 /// A declared system, logs to learn from, and what both imply.
 pub struct Study<'a> {
     pub system: &'a System,
@@ -120,10 +124,7 @@ impl<'a> Study<'a> {
         Self {
             system,
             logs,
-            sign: sign_widths
-                .iter()
-                .map(|&width| SignForm::Smooth { width })
-                .collect(),
+            sign: smooth(&sign_widths),
             sign_widths,
             sample: Sample::of(&shooting),
             shooting,
@@ -150,6 +151,29 @@ impl<'a> Study<'a> {
             shooting,
             identifiability: Identifiability::default(),
         }
+    }
+
+    /// The same study in finer numbers, to estimate a model that has been chosen. A width of friction's reversal that
+    /// the model file gives stays.
+    pub fn refined(&self) -> Self {
+        let narrower = self.system.sign_width.as_ref().map_or(0.5, |_| 1.0);
+        let sign_widths: Vec<f64> = self.sign_widths.iter().map(|w| narrower * w).collect();
+        let windows = self.shooting.windows.clone();
+        let shooting = Shooting::new(self.logs, windows, &self.shooting.noise);
+        Self {
+            sign: smooth(&sign_widths),
+            sign_widths,
+            shooting: shooting.in_steps_of(FINE_STEP_S),
+            identifiability: self.identifiability.clone(),
+            ..self.on(self.logs)
+        }
+    }
+
+    /// A chosen model estimated anew; as it was where that fails.
+    pub fn estimate(&self, chosen: &Fitted) -> Fitted {
+        let locals = chosen.fit.locals.clone();
+        self.refit(&chosen.effects, &chosen.declared, locals, None)
+            .unwrap_or_else(|_| chosen.clone())
     }
 
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
@@ -262,6 +286,11 @@ impl<'a> Study<'a> {
             |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
     }
+}
+
+fn smooth(widths: &[f64]) -> Vec<SignForm> {
+    let smooth = |&width: &f64| SignForm::Smooth { width };
+    widths.iter().map(smooth).collect()
 }
 
 /// Declared values, then those of the effects: all parameters of the model, in its order, as they are in a log

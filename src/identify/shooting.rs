@@ -81,6 +81,15 @@ impl<'l> Shooting<'l> {
         }
     }
 
+    /// The same windows integrated in steps no longer than this (s).
+    #[must_use]
+    pub fn in_steps_of(mut self, longest_s: f64) -> Self {
+        for pack in &mut self.packs {
+            pack.substeps = pack.dt.iter().map(|dt| substeps(dt, longest_s)).collect();
+        }
+        self
+    }
+
     /// Each window's first guess of its state, with `extra` zeros behind.
     pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
         let half_widths: Vec<f64> = self
@@ -231,7 +240,11 @@ impl Pack {
                 }
             }
         }
-        pack.substeps = pack.dt.iter().map(substeps).collect();
+        pack.substeps = pack
+            .dt
+            .iter()
+            .map(|dt| substeps(dt, LONGEST_STEP_S))
+            .collect();
         pack
     }
 
@@ -346,10 +359,10 @@ impl Pack {
     }
 }
 
-fn substeps(dt: &Lane) -> usize {
+fn substeps(dt: &Lane, longest_s: f64) -> usize {
     let longest = dt.iter().fold(0.0_f64, |a, b| a.max(*b));
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
-    let steps = (longest / LONGEST_STEP_S - 1e-6).ceil() as usize;
+    let steps = (longest / longest_s - 1e-6).ceil() as usize;
     steps.max(1)
 }
 
