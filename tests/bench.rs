@@ -33,7 +33,7 @@ fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
 /// Values of the rig's parameters as the model file calls them.
 fn true_value(mechanics: &Mechanics, name: &str) -> Option<f64> {
     let rig = serde_json::to_value(mechanics).unwrap();
-    let declared = mechanics.declared().get(name).copied();
+    let declared = mechanics.declared(0.0).get(name).copied();
     declared.or_else(|| rig.get(name)?.as_f64())
 }
 

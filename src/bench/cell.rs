@@ -70,7 +70,7 @@ impl Cell {
         let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();
-        let truth = Truth::of(&self.effects, machine.mechanics.declared(), &offsets);
+        let truth = Truth::of(&self.effects, machine.declared(), &offsets);
         let record = |(index, offset): (usize, &Pair)| {
             machine.record(driving, condition, index, *offset, &mut rng)
         };

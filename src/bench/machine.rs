@@ -1,3 +1,5 @@
+use std::collections::BTreeMap;
+
 use super::drive::{Approach, Drive};
 use super::force::Force;
 use super::friction::{DryFriction, Presliding};
@@ -83,6 +85,12 @@ impl Machine {
 
     pub fn joints(&self) -> usize {
         self.mechanics.joints()
+    }
+
+    /// True values of declared parameters; a motor behind a gear turns with its link on the whole.
+    pub fn declared(&self) -> BTreeMap<String, f64> {
+        let motor = self.transmissions[0].as_ref().map_or(0.0, |t| t.inertia);
+        self.mechanics.declared(self.rotor[0] + motor)
     }
 
     /// Angles that the encoders see: of the motors where there is play or give behind them.

@@ -111,12 +111,13 @@ impl Mechanics {
         Some(())
     }
 
-    /// True values of the parameters that a declared model names otherwise and that its logs determine.
-    pub fn declared(&self) -> BTreeMap<String, f64> {
+    /// True values of the parameters that a declared model names otherwise and that its logs determine, where the
+    /// first joint turns a rotor of inertia `rotor` \[kg m^2\] as well.
+    pub fn declared(&self, rotor: f64) -> BTreeMap<String, f64> {
         match *self {
             Self::Pendulum { inertia, moment, g } => [
-                ("C_g".to_owned(), -moment * g / inertia),
-                ("C_i".to_owned(), 1.0 / inertia),
+                ("C_g".to_owned(), -moment * g / (inertia + rotor)),
+                ("C_i".to_owned(), 1.0 / (inertia + rotor)),
             ]
             .into(),
             Self::DoublePendulum { .. } => BTreeMap::new(),

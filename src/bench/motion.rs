@@ -280,5 +280,6 @@ mod tests {
         // Half of the play, and what the contact gives way.
         assert!((ahead - (0.01 + 0.5 / 2000.0)).abs() < 1e-6, "{ahead}");
         assert_eq!(machine.encoders(&state)[0], state.motor_q[0]);
+        assert!((machine.declared()["C_i"] - 1.0 / 0.152).abs() < 1e-12);
     }
 }

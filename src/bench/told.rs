@@ -38,10 +38,14 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
     let mut fitted = FittedEffect::absent(&effect, joint);
     for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
-        // What differs by log is found from zero.
-        if !parameter.per_log {
-            slot.0 = *hidden.values.get(&parameter.name)?;
-        }
+        slot.0 = match hidden.values.get(&parameter.name) {
+            // What differs by log is found from zero.
+            _ if parameter.per_log => 0.0,
+            Some(value) => *value,
+            // A form of the effect's formula, not a number of the rig.
+            None if parameter.whole => parameter.typical,
+            None => return None,
+        };
     }
     Some(fitted)
 }
