@@ -107,7 +107,8 @@ pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) ->
 
 /// Velocities from the angles, as those that rigs report are noisy; near the log's ends as reported.
 fn speeds(log: &Log) -> Vec<Vec<f64>> {
-    let half_width = half_width_s(log.median_step());
+    // Twice as wide as for start states: a jump by the play beside a row must not turn the sign of its velocity.
+    let half_width = 2.0 * half_width_s(log.median_step());
     let speed = |q: &Vec<f64>, row: usize, reported: f64| {
         local_cubic(&log.time, q, row, half_width).map_or(reported, |cubic| cubic.slope)
     };
