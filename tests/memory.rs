@@ -3,7 +3,9 @@
 use residyn::data::Log;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit, uncertainty};
-use residyn::model::{Commands, Dynamics, FittedEffect, Library, Sensors, StepTorque};
+use residyn::model::{
+    Commands, Dynamics, FittedEffect, Library, Sensors, StepTorque, with_own_angles,
+};
 
 use serde_json::Value;
 
@@ -179,7 +181,6 @@ fn a_delay_and_a_lag_come_back_within_their_intervals() {
         let uncertainty = uncertainty(&shooting, &found);
         for (i, wanted) in [15.0, 3.0, truth].into_iter().enumerate() {
             let (value, half) = (found.values[i], uncertainty.half_width(i));
-            println!("{name} {value} +- {half}");
             assert!(
                 (value - wanted).abs() < half,
                 "{name}: {value} +- {half}, wanted {wanted}"
@@ -382,5 +383,32 @@ fn play_comes_back_within_its_interval() {
             (value - 0.01).abs() < half && half < 1e-3,
             "{driven}: {value} +- {half}"
         );
+    }
+}
+
+/// Rows from each row whose angle is more than 1 mrad off to the nearest reversal of the motion.
+fn distances(log: &Log, truth: &Log) -> Vec<usize> {
+    let turns = truth.qd[0].windows(2).enumerate();
+    let reversals: Vec<usize> = turns
+        .filter(|(_, v)| v[0] * v[1] <= 0.0)
+        .map(|(k, _)| k)
+        .collect();
+    let to_reversal = |row: usize| reversals.iter().map(|at| at.abs_diff(row)).min().unwrap();
+    let off = |row: &usize| (log.q[0][*row] - truth.q[0][*row]).abs() > 1e-3;
+    (0..truth.rows()).filter(off).map(to_reversal).collect()
+}
+
+#[test]
+fn the_rigs_own_angles_are_found_behind_play() {
+    let truth = simulate(&pendulum(&[]), &[3.0, 0.0], 1.5, 1500, 4);
+    for driven in [0.0, 1.0] {
+        let model = pendulum(&[backlash(0.01, driven)]);
+        let shown = simulate(&model, &[3.0, 0.0], 1.5, 1500, 4);
+        assert!(distances(&shown, &truth).len() > 1300);
+        let own = with_own_angles(&model, &model.values(), &shown);
+        let left = distances(&own, &truth);
+        // The torque is logged; a reversal of the motion is seen through velocities over 8 rows on either side.
+        let reach = if driven > 0.0 { None } else { Some(8) };
+        assert!(left.iter().max().copied() <= reach, "{driven}: {left:?}");
     }
 }

@@ -79,32 +79,42 @@ impl<'d, const W: usize> Sensors<'d, W> {
     }
 }
 
+/// What stands between may depend on velocities, which come from the angles found: so often they are found anew.
+const PASSES: usize = 5;
+
 /// A log with the angles of the rig itself in place of those that sensors show, by a model with parameters `values`.
-/// Velocities are taken from the logged angles, as those that rigs report are noisy.
 pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) -> Cow<'l, Log> {
     if dynamics.reading.is_none() {
         return Cow::Borrowed(log);
     }
     let commands = Commands::of_log(dynamics, values, log);
     let mut sensors = Sensors::<1>::new(dynamics, values);
-    let half_width = half_width_s(log.median_step());
     let mut own = log.clone();
-    for row in 0..log.rows() {
-        let speed = |j: usize| {
-            let cubic = local_cubic(&log.time, &log.q[j], row, half_width);
-            cubic.map_or(log.qd[j][row], |cubic| cubic.slope)
-        };
-        let angles = log.q.iter().map(|q| [q[row]]);
-        let mut state: Vec<[f64; 1]> = angles
-            .chain((0..log.joints()).map(|j| [speed(j)]))
-            .collect();
-        let before = || Commands::just_before([&commands], [row]);
-        sensors.correct(&mut state, before, [log.time[row]]);
-        for (column, angle) in own.q.iter_mut().zip(&state) {
-            column[row] = angle[0];
+    for _ in 0..PASSES {
+        let speeds = speeds(&own);
+        for row in 0..log.rows() {
+            let columns = log.q.iter().chain(&speeds);
+            let mut state: Vec<[f64; 1]> = columns.map(|column| [column[row]]).collect();
+            let before = || Commands::just_before([&commands], [row]);
+            sensors.correct(&mut state, before, [log.time[row]]);
+            for (column, angle) in own.q.iter_mut().zip(&state) {
+                column[row] = angle[0];
+            }
         }
     }
     Cow::Owned(own)
+}
+
+/// Velocities from the angles, as those that rigs report are noisy; near the log's ends as reported.
+fn speeds(log: &Log) -> Vec<Vec<f64>> {
+    // Twice as wide as for start states: a jump by the play beside a row must not turn the sign of its velocity.
+    let half_width = 2.0 * half_width_s(log.median_step());
+    let speed = |q: &Vec<f64>, row: usize, reported: f64| {
+        local_cubic(&log.time, q, row, half_width).map_or(reported, |cubic| cubic.slope)
+    };
+    (log.q.iter().zip(&log.qd))
+        .map(|(q, qd)| (0..).zip(qd).map(|(row, v)| speed(q, row, *v)).collect())
+        .collect()
 }
 
 /// A log as a model sees it: with the angles of the rig itself, and the torques that act.
