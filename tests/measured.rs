@@ -2,14 +2,14 @@
 
 use serde_json::Value;
 
-use crate::support::{measured, succeeds, text};
+use crate::support::{answers, measured, succeeds, text};
 
 /// Close the loop with these arguments and return its report.
 fn report(arguments: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("report");
     let all = [&["closeloop", "--json", "--out", text(&out)], arguments].concat();
-    serde_json::from_str(&succeeds(&all)).expect("the report is JSON")
+    serde_json::from_str(&answers(&all)).expect("the report is JSON")
 }
 
 /// Position error at 0.5 s, after as a share of before.

@@ -19,6 +19,15 @@ pub fn succeeds(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("output is UTF-8")
 }
 
+/// Run the program, which must come to an answer, be it "no", and return its standard output.
+pub fn answers(arguments: &[&str]) -> String {
+    let output = residyn(arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let status = output.status.code();
+    assert!(matches!(status, Some(0 | 1)), "{arguments:?}:\n{errors}");
+    String::from_utf8(output.stdout).expect("output is UTF-8")
+}
+
 /// Run the program, which must fail as one that could not run, and return its message.
 pub fn refuses(arguments: &[&str]) -> String {
     let output = residyn(arguments);
