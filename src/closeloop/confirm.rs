@@ -1,4 +1,4 @@
-use super::evidence::{gain, p_of_gains};
+use super::evidence::{PLAIN, gain, p_of_gains};
 use super::per_log::values_on;
 use super::study::{Fitted, Study};
 use crate::identify::{blocks, fit};
@@ -22,7 +22,7 @@ pub struct Confirmed {
 }
 
 /// An effect stands that lowers the loss on data it was not chosen by, with this probability of doing so by
-/// accident: they are few, and it was significant over the whole library before.
+/// accident, or that plainly helps: they are few, and it was significant over the whole library before.
 const CONFIRMED: f64 = 0.1;
 /// Fewer stretches than this prove nothing either way.
 const FEWEST: usize = 4;
@@ -67,7 +67,7 @@ fn most_doubtful(
             let less = study.refit(&effects, &model.declared, locals, scale).ok()?;
             let without = losses(aside, &less, model.fit.scale, members)?;
             let (p, saved) = (p_of_gains(&without, &with), gain(&without, &with));
-            (p > CONFIRMED && saved.abs() > NOT_SHOWN).then(|| {
+            (p > CONFIRMED && saved < PLAIN && saved.abs() > NOT_SHOWN).then(|| {
                 let reason = format!(
                     "on stretches that it was not chosen by it changes the loss by {:.0} % (p = {p:.2})",
                     -100.0 * saved

@@ -23,6 +23,9 @@ pub struct Evidence {
 /// An effect must lower the loss on left-out stretches by this share, the error itself thus by a twentieth: less
 /// is of no use to anyone, and on real rigs it is what a wrong effect saves by standing in for others.
 pub(super) const WORTHWHILE: f64 = 0.1;
+/// An effect plainly helps that takes away half of the loss on stretches that it was not fitted to: chance does
+/// not do that.
+pub(super) const PLAIN: f64 = 0.5;
 /// Candidates within this many standard errors of the best explain the logs as well as it does.
 const AS_GOOD: f64 = 2.0;
 /// And they save this share of what it saves,

@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 
 use super::candidate::{beside, best_start, candidates, starts};
-use super::evidence::{Evidence, WORTHWHILE};
+use super::evidence::{Evidence, PLAIN, WORTHWHILE};
 use super::folds::{folds, left_out_losses};
 use super::simpler::simpler;
 use super::study::{Fitted, Study};
@@ -39,9 +39,8 @@ impl Rival {
 
 /// Probability of a false alarm that a look admits, over all candidates and all their starting points.
 pub(super) const FALSE_ALARM: f64 = 0.05;
-/// Few stretches cannot prove so much. There an effect is admitted that takes away half of the loss on stretches
-/// left out, which chance does not do, if it alone is this significant.
-pub(super) const PLAIN: f64 = 0.5;
+/// Few stretches cannot prove so much. There an effect is admitted that plainly helps if it alone is this
+/// significant.
 pub(super) const SIGNIFICANT_ALONE: f64 = 0.01;
 /// Candidates that are fitted after all have been screened.
 const FITTED: usize = 8;

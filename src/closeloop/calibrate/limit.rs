@@ -3,10 +3,10 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Limit;
 use crate::closeloop::candidate::{candidates, starts};
-use crate::closeloop::evidence::WORTHWHILE;
+use crate::closeloop::evidence::{PLAIN, WORTHWHILE};
 use crate::closeloop::folds::{folds, left_out_losses};
 use crate::closeloop::per_log::values_on;
-use crate::closeloop::search::{FALSE_ALARM, PLAIN, SIGNIFICANT_ALONE};
+use crate::closeloop::search::{FALSE_ALARM, SIGNIFICANT_ALONE};
 use crate::closeloop::split::set_aside;
 use crate::closeloop::study::{Fitted, Study};
 use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty};
