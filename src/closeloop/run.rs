@@ -98,6 +98,7 @@ pub fn close_loop(
     let (residual_before, residual_after) = (residual(&before), residual(&after));
     let curves = |samples: &[ForceSample]| curves(samples, &system.prismatic);
     let fine = study.refined();
+    let coarse = after.fit.values.clone();
     let after = fine.estimate(&after);
     let (curves_before, curves_after) = (curves(&residual_before), curves(&residual_after));
     let proposal = proposal(&study, &after, &left);
@@ -143,7 +144,7 @@ pub fn close_loop(
         before: error_before,
         after: error_after,
     };
-    let parameters = with_intervals(&fine, &after);
+    let parameters = with_intervals(&fine, &after, &coarse);
     let findings = findings(&study, &after, &parameters, &errors.after, judge);
     let (verdict, reason) = verdict(&study, &after, &left, &errors);
     Ok(Outcome {
@@ -159,7 +160,7 @@ pub fn close_loop(
         confirmed_on,
         contradicted: contradicted(
             &system.dynamics(&system.sign()).values(),
-            &with_intervals(&study, &before),
+            &with_intervals(&study, &before, &before.fit.values),
         ),
         before,
         after,
@@ -180,8 +181,10 @@ pub fn close_loop(
     })
 }
 
-/// Fitted values with their 95 % intervals; parameters that were not free have none.
-fn with_intervals(study: &Study<'_>, model: &Fitted) -> Vec<Parameter> {
+/// Fitted values with their 95 % intervals; parameters that were not free have none. An interval reaches as much
+/// further as the value was off in coarser numbers: smoothing and steps err to first order, so that what halving
+/// them changes is what is left of their error (Richardson 1911).
+fn with_intervals(study: &Study<'_>, model: &Fitted, coarse: &[f64]) -> Vec<Parameter> {
     let uncertainty = uncertainty(&study.shooting, &model.fit);
     let mut parameters = model.dynamics.parameters.clone();
     for (parameter, value) in parameters.iter_mut().zip(&model.fit.values) {
@@ -193,7 +196,8 @@ fn with_intervals(study: &Study<'_>, model: &Fitted) -> Vec<Parameter> {
         if column.log.is_some() {
             continue;
         }
-        let (value, half) = (model.fit.values[k], uncertainty.half_width(i));
+        let value = model.fit.values[k];
+        let half = uncertainty.half_width(i) + (value - coarse[k]).abs();
         let [low, high] = parameters[k].bounds;
         parameters[k].ci95 = Some([(value - half).max(low), (value + half).min(high)]);
     }
