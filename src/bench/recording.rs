@@ -199,12 +199,7 @@ pub fn log_name(index: usize) -> String {
 fn empty(index: usize, joints: usize) -> Log {
     Log {
         path: PathBuf::from(log_name(index)),
-        time: Vec::new(),
-        q: vec![Vec::new(); joints],
-        qd: vec![Vec::new(); joints],
-        tau: vec![Vec::new(); joints],
-        leave_out: Vec::new(),
-        notes: Vec::new(),
+        ..Log::empty(joints)
     }
 }
 

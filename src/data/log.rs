@@ -58,6 +58,19 @@ pub struct Log {
 }
 
 impl Log {
+    /// A log of so many joints without a row, for whoever records one.
+    pub fn empty(joints: usize) -> Self {
+        Self {
+            path: PathBuf::new(),
+            time: Vec::new(),
+            q: vec![Vec::new(); joints],
+            qd: vec![Vec::new(); joints],
+            tau: vec![Vec::new(); joints],
+            leave_out: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.time.len()

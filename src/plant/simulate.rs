@@ -1,5 +1,3 @@
-use std::path::PathBuf;
-
 use rand::Rng;
 use rand_distr::{Distribution, Normal};
 
@@ -39,7 +37,7 @@ impl Plant {
             ((dt / STEP_S).ceil() as usize).max(1),
         );
         let mut state: Vec<[f64; 1]> = self.start().iter().map(|value| [*value]).collect();
-        let mut log = empty_log(n);
+        let mut log = Log::empty(n);
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
         let torques: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
@@ -113,16 +111,4 @@ fn by_joint(rows: &[Vec<f64>], joints: usize) -> Vec<Vec<f64>> {
     (0..joints)
         .map(|j| rows.iter().map(|row| row[j]).collect())
         .collect()
-}
-
-fn empty_log(joints: usize) -> Log {
-    Log {
-        path: PathBuf::new(),
-        time: Vec::new(),
-        q: vec![Vec::new(); joints],
-        qd: vec![Vec::new(); joints],
-        tau: vec![Vec::new(); joints],
-        leave_out: Vec::new(),
-        notes: Vec::new(),
-    }
 }

@@ -1,5 +1,4 @@
 use std::f64::consts::TAU;
-use std::path::PathBuf;
 
 use crate::data::Log;
 use crate::identify::{Values, Window};
@@ -80,7 +79,7 @@ impl Record {
             return known;
         }
         self.origins.push(origin);
-        self.logs.push(empty_log(joints));
+        self.logs.push(Log::empty(joints));
         self.logs.len() - 1
     }
 
@@ -115,18 +114,6 @@ impl Record {
     pub fn duration_s(&self, windows: std::ops::RangeFrom<usize>) -> f64 {
         let windows = self.windows[windows].iter();
         windows.map(|w| w.duration_s(&self.logs)).sum()
-    }
-}
-
-fn empty_log(joints: usize) -> Log {
-    Log {
-        path: PathBuf::new(),
-        time: Vec::new(),
-        q: vec![Vec::new(); joints],
-        qd: vec![Vec::new(); joints],
-        tau: vec![Vec::new(); joints],
-        leave_out: Vec::new(),
-        notes: Vec::new(),
     }
 }
 
