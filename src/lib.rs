@@ -44,6 +44,7 @@ pub mod data;
 pub mod evaluate;
 pub mod expr;
 pub mod identify;
+pub mod lanes;
 pub mod model;
 pub mod plant;
 pub mod recipe;
