@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
+use crate::lanes::Row;
 use crate::identify::{Window, initial_state};
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
 
@@ -199,8 +200,8 @@ fn roll(
         .iter()
         .map(|w| initial_state(own, half_width, w.first).expect("windows() checks this"))
         .collect();
-    let mut state: Vec<[f64; LANES]> = (0..2 * n)
-        .map(|k| std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k]))
+    let mut state: Vec<Row<f64, LANES>> = (0..2 * n)
+        .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
         .collect();
     let mut errors: Vec<WindowError> = pack.iter().map(|w| WindowError::none(w, log, n)).collect();
     let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
@@ -210,10 +211,11 @@ fn roll(
     for row in 0..rows - 1 {
         let at: [usize; LANES] =
             std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
-        let time = at.map(|row| log.time[row]);
-        let end = at.map(|row| log.time[row + 1]);
-        let dt = std::array::from_fn(|lane| end[lane] - time[lane]);
-        let tau: Vec<[f64; LANES]> = log.tau.iter().map(|tau| at.map(|row| tau[row])).collect();
+        let time = Row(at.map(|row| log.time[row]));
+        let end = Row(at.map(|row| log.time[row + 1]));
+        let dt = Row(std::array::from_fn(|lane| end[lane] - time[lane]));
+        let tau: Vec<Row<f64, LANES>> =
+            (log.tau.iter()).map(|tau| Row(at.map(|row| tau[row]))).collect();
         let longest = dt.iter().fold(0.0_f64, |a: f64, b: &f64| a.max(*b));
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // a small positive number
@@ -245,7 +247,7 @@ impl WindowError {
     }
 
     /// Keep a state that left every sensible range at its edge: it counts as what it is, and stays a number.
-    fn hold(&mut self, state: &mut [[f64; LANES]], lane: usize) {
+    fn hold(&mut self, state: &mut [Row<f64, LANES>], lane: usize) {
         for value in state.iter_mut() {
             let value = &mut value[lane];
             if !(value.abs() <= SENSIBLE) {
@@ -262,8 +264,8 @@ impl WindowError {
     /// Compare angles shown and velocities with a row of the log.
     fn add(
         &mut self,
-        angles: &[[f64; LANES]],
-        velocities: &[[f64; LANES]],
+        angles: &[Row<f64, LANES>],
+        velocities: &[Row<f64, LANES>],
         lane: usize,
         log: &Log,
         row: usize,

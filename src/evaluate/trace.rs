@@ -1,4 +1,5 @@
 use crate::data::{Log, half_width_s};
+use crate::lanes::Row;
 use crate::identify::{Window, initial_state};
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
 
@@ -35,7 +36,7 @@ fn trace(
     window: &Window,
     start: &[f64],
 ) -> Trace {
-    let mut state: Vec<[f64; 1]> = start.iter().map(|value| [*value]).collect();
+    let mut state: Vec<Row<f64, 1>> = start.iter().map(|value| Row([*value])).collect();
     let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
     let mut sensors = Sensors::<1>::new(dynamics, values);
     let before = |row: usize| move || Commands::just_before([commands], [row]);
@@ -45,19 +46,19 @@ fn trace(
     };
     for row in window.first..=window.last {
         trace.time.push(log.time[row]);
-        let shown = sensors.show(&state, before(row), [log.time[row]]);
+        let shown = sensors.show(&state, before(row), Row([log.time[row]]));
         for (q, value) in trace.q.iter_mut().zip(shown) {
             q.push(value[0]);
         }
         if row < window.last {
             let (from, to) = (log.time[row], log.time[row + 1]);
             let dt = to - from;
-            let tau: Vec<[f64; 1]> = log.tau.iter().map(|tau| [tau[row]]).collect();
+            let tau: Vec<Row<f64, 1>> = log.tau.iter().map(|tau| Row([tau[row]])).collect();
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             // a small positive number
             let substeps = ((dt / super::open_loop::LONGEST_STEP_S).ceil() as usize).max(1);
-            let torque = StepTorque::new([commands], &tau, [from], [to], substeps);
-            rollout.advance(&mut state, &torque.mean, [from], [dt], substeps);
+            let torque = StepTorque::new([commands], &tau, Row([from]), Row([to]), substeps);
+            rollout.advance(&mut state, &torque.mean, Row([from]), Row([dt]), substeps);
         }
     }
     trace

@@ -16,6 +16,7 @@ mod print;
 mod program;
 mod replay;
 mod scope;
+mod steps;
 
 pub use error::{FormulaError, suggestion};
 pub use eval::{Real, Tape};

@@ -1,5 +1,6 @@
 use super::Node;
 use super::op::Op;
+use super::steps::{Steps, steps};
 
 /// A closed list of operations: inputs by name, then values each made from earlier ones, and the
 /// positions of the outputs. Made by [`Graph::finish`](super::Graph::finish); never changed afterwards.
@@ -9,6 +10,7 @@ pub struct Program {
     pub(super) ops: Vec<Op>,
     pub(super) outputs: Vec<Node>,
     pub(super) labels: Vec<(Node, String)>,
+    pub(super) steps: Steps,
 }
 
 impl Program {
@@ -50,10 +52,13 @@ impl Program {
             renamed[old] = Node(new);
         }
         let rename = |node: Node| renamed[node.index()];
+        let ops: Vec<Op> = order.iter().map(|&i| ops[i].map(rename)).collect();
+        let outputs: Vec<Node> = outputs.iter().map(|&o| rename(o)).collect();
         Self {
             inputs,
-            ops: order.iter().map(|&i| ops[i].map(rename)).collect(),
-            outputs: outputs.iter().map(|&o| rename(o)).collect(),
+            steps: steps(&ops, outputs.iter().map(|output| output.index())),
+            ops,
+            outputs,
             labels: labels
                 .into_iter()
                 .filter(|(node, _)| needed[node.index()])

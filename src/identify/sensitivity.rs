@@ -1,9 +1,10 @@
 use crate::expr::{Graph, Program, Tape};
+use crate::lanes::Row;
 use crate::model::{Dynamics, StepTorque};
 
 /// Lanes of the identification: one AVX-512 register, two AVX2 registers of f64.
 pub(super) const LANES: usize = 8;
-pub(super) type Lane = [f64; LANES];
+pub(super) type Lane = Row<f64, LANES>;
 
 /// What is free in each window, besides the parameters that all windows share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,24 +129,24 @@ impl<'t> Flow<'t> {
         let n = tangent.joints;
         let mut tape = tangent.program.tape();
         for (slot, value) in tape.inputs()[3 * n + 1..].iter_mut().zip(values) {
-            *slot = [*value; LANES];
+            *slot = Row::splat(*value);
         }
         let mut reading = tangent.reading.as_ref().map(Program::tape);
         if let Some(reading) = &mut reading {
             for (slot, value) in reading.inputs()[3 * n + 1..].iter_mut().zip(values) {
-                *slot = [*value; LANES];
+                *slot = Row::splat(*value);
             }
         }
         let size = 2 * n * (1 + tangent.columns());
         Self {
             tangent,
             tape,
-            now: vec![[0.0; LANES]; size],
-            inner: vec![[0.0; LANES]; size],
-            slope: vec![[0.0; LANES]; size],
-            sum: vec![[0.0; LANES]; size],
+            now: vec![Row::splat(0.0); size],
+            inner: vec![Row::splat(0.0); size],
+            slope: vec![Row::splat(0.0); size],
+            sum: vec![Row::splat(0.0); size],
             reading,
-            shown: vec![[0.0; LANES]; size / 2],
+            shown: vec![Row::splat(0.0); size / 2],
         }
     }
 
@@ -178,7 +179,7 @@ impl<'t> Flow<'t> {
                 let mut sum = if column < shared {
                     *reading.output(direct)
                 } else {
-                    [0.0; LANES]
+                    Row::splat(0.0)
                 };
                 for state in 0..2 * n {
                     let slope = reading.output(n + joint * 2 * n + state);
@@ -196,10 +197,10 @@ impl<'t> Flow<'t> {
     /// Start at these states; only the columns of the initial state are sensitive to them.
     pub fn start(&mut self, states: &[Lane]) {
         let (n, columns) = (self.tangent.joints, self.tangent.columns());
-        self.now.fill([0.0; LANES]);
+        self.now.fill(Row::splat(0.0));
         self.now[..2 * n].copy_from_slice(&states[..2 * n]);
         for row in 0..2 * n {
-            self.now[2 * n + row * columns + self.tangent.active.len() + row] = [1.0; LANES];
+            self.now[2 * n + row * columns + self.tangent.active.len() + row] = Row::splat(1.0);
         }
     }
 
@@ -208,7 +209,7 @@ impl<'t> Flow<'t> {
     pub fn advance(&mut self, torque: &StepTorque<LANES>, time: Lane, dt: Lane, substeps: usize) {
         let n = self.tangent.joints;
         #[allow(clippy::cast_precision_loss)] // few substeps
-        let h = dt.map(|dt| dt / substeps as f64);
+        let h = Row(dt.map(|dt| dt / substeps as f64));
         let mut now = time;
         for part in 0..substeps {
             let (tau, slopes) = torque.part(n, part);
@@ -217,7 +218,7 @@ impl<'t> Flow<'t> {
             let own = inputs.len() - slopes.len();
             inputs[own..].copy_from_slice(slopes);
             self.step(now, h);
-            now = std::array::from_fn(|lane| now[lane] + h[lane]);
+            now = Row(std::array::from_fn(|lane| now[lane] + h[lane]));
         }
     }
 
@@ -225,7 +226,7 @@ impl<'t> Flow<'t> {
         self.inner.copy_from_slice(&self.now);
         self.sum.copy_from_slice(&self.now);
         for (part, reach, weight) in STAGES {
-            let stage_time = std::array::from_fn(|lane| time[lane] + part * h[lane]);
+            let stage_time = Row(std::array::from_fn(|lane| time[lane] + part * h[lane]));
             self.derivative(stage_time);
             for (((sum, inner), slope), now) in self
                 .sum
@@ -274,7 +275,7 @@ impl<'t> Flow<'t> {
                     force if force >= shared + 2 * n => Some(force),
                     _ => None,
                 };
-                let mut out = direct.map_or([0.0; LANES], |at| *self.tape.output(row + at));
+                let mut out = direct.map_or(Row::splat(0.0), |at| *self.tape.output(row + at));
                 for state in 0..2 * n {
                     let slope = self.tape.output(row + state);
                     let inner = &inner[state * columns + column];

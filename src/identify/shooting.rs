@@ -5,6 +5,7 @@ use super::sensitivity::{Flow, LANES, Lane, Tangent};
 use super::values::Values;
 use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
+use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
@@ -207,13 +208,13 @@ impl Pack {
             .map(|&w| windows[w].rows())
             .max()
             .unwrap_or(0);
-        let zeros = || vec![vec![[0.0; LANES]; n]; rows];
+        let zeros = || vec![vec![Row::splat(0.0); n]; rows];
         let mut pack = Self {
             windows: members.to_vec(),
             logs: std::array::from_fn(|lane| windows[members[lane.min(members.len() - 1)]].log),
             at: vec![[0; LANES]; rows],
-            time: vec![[0.0; LANES]; rows],
-            dt: vec![[0.0; LANES]; rows],
+            time: vec![Row::splat(0.0); rows],
+            dt: vec![Row::splat(0.0); rows],
             substeps: Vec::new(),
             tau: zeros(),
             q: zeros(),
@@ -256,7 +257,7 @@ impl Pack {
     fn gather(&self, locals: &[Vec<f64>]) -> Vec<Lane> {
         let lane_of = |lane: usize| &locals[self.windows[lane.min(self.windows.len() - 1)]];
         (0..lane_of(0).len())
-            .map(|k| std::array::from_fn(|lane| lane_of(lane)[k]))
+            .map(|k| Row(std::array::from_fn(|lane| lane_of(lane)[k])))
             .collect()
     }
 
@@ -343,9 +344,9 @@ impl Pack {
             let before = || self.torque_before(commands, row);
             let (angles, slopes) = flow.shown(before, self.time[row]);
             for j in 0..n {
-                let weight = self.weight[row][j].map(|w| w / scale);
+                let weight = Row(self.weight[row][j].map(|w| w / scale));
                 let residual =
-                    std::array::from_fn(|l| (angles[j][l] - self.q[row][j][l]) * weight[l]);
+                    Row(std::array::from_fn(|l| (angles[j][l] - self.q[row][j][l]) * weight[l]));
                 sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
             let torque = self.torque(commands, row, &states[2 * n..]);
@@ -378,9 +379,9 @@ impl Sums {
     fn new(columns: usize) -> Self {
         Self {
             columns,
-            cost: [0.0; LANES],
-            gradient: vec![[0.0; LANES]; columns],
-            triangle: vec![[0.0; LANES]; columns * (columns + 1) / 2],
+            cost: Row::splat(0.0),
+            gradient: vec![Row::splat(0.0); columns],
+            triangle: vec![Row::splat(0.0); columns * (columns + 1) / 2],
         }
     }
 
@@ -392,7 +393,7 @@ impl Sums {
         }
         let mut entries = self.triangle.iter_mut();
         for (i, a) in sensitivities.iter().enumerate() {
-            let scaled: Lane = std::array::from_fn(|l| losses[l].1 * weight[l] * a[l]);
+            let scaled: Lane = Row(std::array::from_fn(|l| losses[l].1 * weight[l] * a[l]));
             for lane in 0..LANES {
                 self.gradient[i][lane] += scaled[lane] * residual[lane];
             }

@@ -1,6 +1,7 @@
 //! Many numbers at a time: vectors as wide as the processor at hand has them (AVX-512, AVX2, NEON or one by one),
 //! chosen when the program runs. What is written once here, for f32 and f64, serves every engine.
 
+mod math;
 mod row;
 mod vector;
 

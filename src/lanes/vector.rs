@@ -2,10 +2,11 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use pulp::Simd;
 
+use super::math::Constants;
 use crate::expr::Real;
 
 /// A number type of which a processor holds several in one register.
-pub trait Element: Real {
+pub trait Element: Real + Constants {
     /// One register.
     type Register<S: Simd>: Copy;
     /// Which lanes a comparison holds in.
@@ -45,6 +46,21 @@ pub trait Element: Real {
         b: Self::Register<S>,
     ) -> Self::Register<S>;
     fn sum<S: Simd>(simd: S, a: Self::Register<S>) -> Self;
+    fn equal<S: Simd>(simd: S, a: Self::Register<S>, b: Self::Register<S>) -> Self::Mask<S>;
+    /// Whether a comparison holds in some lane.
+    fn any<S: Simd>(simd: S, mask: Self::Mask<S>) -> bool;
+    /// Whether this bit of a number's representation is set, counted from the lowest.
+    fn bit<S: Simd>(simd: S, a: Self::Register<S>, bit: u32) -> Self::Mask<S>;
+    /// The size of `a` with the sign of `sign`.
+    fn with_sign_of<S: Simd>(
+        simd: S,
+        a: Self::Register<S>,
+        sign: Self::Register<S>,
+    ) -> Self::Register<S>;
+    /// 2^k for whole k of which 2^k is a normal number.
+    fn power_of_two<S: Simd>(simd: S, k: Self::Register<S>) -> Self::Register<S>;
+    /// The numbers of one register.
+    fn numbers<S: Simd>(register: &mut Self::Register<S>) -> &mut [Self];
 }
 
 /// One register of numbers, with the operators of numbers.
@@ -127,6 +143,47 @@ impl<S: Simd, T: Element> Vector<S, T> {
         Self::new(self.simd, chosen)
     }
 
+    /// `then` where `self == other`, else `otherwise`; what is not a number equals nothing.
+    #[inline(always)]
+    pub fn if_equal(self, other: Self, then: Self, otherwise: Self) -> Self {
+        let mask = <T as Element>::equal(self.simd, self.register, other.register);
+        let chosen = <T as Element>::select(self.simd, mask, then.register, otherwise.register);
+        Self::new(self.simd, chosen)
+    }
+
+    /// Whether `self < other` in some lane.
+    #[inline(always)]
+    pub fn any_less(self, other: Self) -> bool {
+        let mask = <T as Element>::less(self.simd, self.register, other.register);
+        <T as Element>::any(self.simd, mask)
+    }
+
+    /// This size with that sign.
+    #[inline(always)]
+    pub fn with_sign_of(self, sign: Self) -> Self {
+        let register = <T as Element>::with_sign_of(self.simd, self.register, sign.register);
+        Self::new(self.simd, register)
+    }
+
+    /// A function of numbers, one lane after the other.
+    #[inline(always)]
+    pub fn each(mut self, function: impl Fn(T) -> T) -> Self {
+        for number in T::numbers::<S>(&mut self.register) {
+            *number = function(*number);
+        }
+        self
+    }
+
+    /// The same for two numbers.
+    #[inline(always)]
+    pub fn each_with(mut self, mut other: Self, function: impl Fn(T, T) -> T) -> Self {
+        let others = T::numbers::<S>(&mut other.register);
+        for (number, other) in T::numbers::<S>(&mut self.register).iter_mut().zip(others) {
+            *number = function(*number, *other);
+        }
+        self
+    }
+
     /// Sum over the lanes.
     #[inline(always)]
     pub fn sum(self) -> T {
@@ -164,7 +221,9 @@ impl<S: Simd, T: Element> Neg for Vector<S, T> {
 
 macro_rules! element {
     ($number:ty, $register:ident, $mask:ident, $lanes:ident, $read:ident, $write:ident, $sum:ident, $select:ident,
-     $splat:ident, $mul_add:ident, $less:ident, {$($unary:ident: $unary_of:ident),*}, {$($binary:ident: $of:ident),*}) => {
+     $splat:ident, $mul_add:ident, $less:ident, {$($unary:ident: $unary_of:ident),*}, {$($binary:ident: $of:ident),*},
+     $equal:ident, $first:ident, {$bits:ident, $to_bits:ident, $of_bits:ident, $splat_bits:ident, $same_bits:ident, $and:ident, $shift:ident},
+     {$and_not:ident, $and_number:ident, $or_number:ident}) => {
         impl Element for $number {
             type Register<S: Simd> = S::$register;
             type Mask<S: Simd> = S::$mask;
@@ -232,13 +291,61 @@ macro_rules! element {
             fn sum<S: Simd>(simd: S, a: S::$register) -> Self {
                 simd.$sum(a)
             }
+
+            #[inline(always)]
+            fn equal<S: Simd>(simd: S, a: S::$register, b: S::$register) -> S::$mask {
+                simd.$equal(a, b)
+            }
+
+            #[inline(always)]
+            fn any<S: Simd>(simd: S, mask: S::$mask) -> bool {
+                simd.$first(mask) < S::$lanes
+            }
+
+            #[inline(always)]
+            fn bit<S: Simd>(simd: S, a: S::$register, bit: u32) -> S::$mask {
+                let bit = simd.$splat_bits(1 << bit);
+                simd.$same_bits(simd.$and(simd.$to_bits(a), bit), bit)
+            }
+
+            #[inline(always)]
+            fn with_sign_of<S: Simd>(
+                simd: S,
+                a: S::$register,
+                sign: S::$register,
+            ) -> S::$register {
+                let sign_bit = simd.$splat(-0.0);
+                simd.$or_number(
+                    simd.$and_number(simd.$and_not(sign_bit), a),
+                    simd.$and_number(sign_bit, sign),
+                )
+            }
+
+            #[inline(always)]
+            fn power_of_two<S: Simd>(simd: S, k: S::$register) -> S::$register {
+                // Added to this, the biased exponent stands in the lowest bits; multiplied as a whole number, they move
+                // to where the exponent belongs and all others out of the number.
+                const PLACE: u32 = <$number>::MANTISSA_DIGITS - 1;
+                const LOWEST: $number = 1.0 / <$number>::EPSILON + (<$number>::MAX_EXP - 1) as $number;
+                let biased = simd.$to_bits(<Self as Element>::add(simd, k, simd.$splat(LOWEST)));
+                simd.$of_bits(simd.$shift(biased, simd.$splat_bits(1 << PLACE)))
+            }
+
+            #[inline(always)]
+            fn numbers<S: Simd>(register: &mut S::$register) -> &mut [Self] {
+                pulp::bytemuck::cast_slice_mut(std::slice::from_mut(register))
+            }
         }
     };
 }
 
 element!(f32, f32s, m32s, F32_LANES, as_simd_f32s, as_mut_simd_f32s, reduce_sum_f32s, select_f32s,
     splat_f32s, mul_add_e_f32s, less_than_f32s, {neg: neg_f32s, abs: abs_f32s, sqrt: sqrt_f32s},
-    {add: add_f32s, sub: sub_f32s, mul: mul_f32s, div: div_f32s, min: min_f32s, max: max_f32s});
+    {add: add_f32s, sub: sub_f32s, mul: mul_f32s, div: div_f32s, min: min_f32s, max: max_f32s},
+    equal_f32s, first_true_m32s, {u32, transmute_u32s_f32s, transmute_f32s_u32s, splat_u32s, equal_u32s, and_u32s, mul_u32s},
+    {not_f32s, and_f32s, or_f32s});
 element!(f64, f64s, m64s, F64_LANES, as_simd_f64s, as_mut_simd_f64s, reduce_sum_f64s, select_f64s,
     splat_f64s, mul_add_e_f64s, less_than_f64s, {neg: neg_f64s, abs: abs_f64s, sqrt: sqrt_f64s},
-    {add: add_f64s, sub: sub_f64s, mul: mul_f64s, div: div_f64s, min: min_f64s, max: max_f64s});
+    {add: add_f64s, sub: sub_f64s, mul: mul_f64s, div: div_f64s, min: min_f64s, max: max_f64s},
+    equal_f64s, first_true_m64s, {u64, transmute_u64s_f64s, transmute_f64s_u64s, splat_u64s, equal_u64s, and_u64s, mul_u64s},
+    {not_f64s, and_f64s, or_f64s});

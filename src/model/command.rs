@@ -3,6 +3,7 @@
 
 use super::Dynamics;
 use crate::data::Log;
+use crate::lanes::Row;
 
 /// How a command is filtered; each kind has one parameter, in s. At zero both leave the command as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,7 +88,7 @@ impl<'l> Commands<'l> {
     }
 
     /// The torque (`[joint][lane]`) that acted until a row of each history.
-    pub fn just_before<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<[f64; W]> {
+    pub fn just_before<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
         let of_lane = |joint: usize, lane: usize| {
             let (own, row) = (commands[lane], rows[lane]);
             match &own.histories[joint] {
@@ -96,7 +97,7 @@ impl<'l> Commands<'l> {
             }
         };
         (0..commands[0].joints)
-            .map(|joint| std::array::from_fn(|lane| of_lane(joint, lane)))
+            .map(|joint| Row(std::array::from_fn(|lane| of_lane(joint, lane))))
             .collect()
     }
 
@@ -118,9 +119,9 @@ impl<'l> Commands<'l> {
 #[derive(Debug, Clone)]
 pub struct StepTorque<const W: usize> {
     /// `[part * n + joint][lane]`, in N m (or N). Without filters one part stands for the whole step.
-    pub mean: Vec<[f64; W]>,
+    pub mean: Vec<Row<f64, W>>,
     /// `[part * filters + filter][lane]`: derivative of the mean on the filter's joint by its parameter.
-    pub slopes: Vec<[f64; W]>,
+    pub slopes: Vec<Row<f64, W>>,
 }
 
 impl<const W: usize> StepTorque<W> {
@@ -131,9 +132,9 @@ impl<const W: usize> StepTorque<W> {
     /// them the torque jumps, and its result smooth in the filters' parameters.
     pub fn new(
         commands: [&Commands<'_>; W],
-        held: &[[f64; W]],
-        from: [f64; W],
-        to: [f64; W],
+        held: &[Row<f64, W>],
+        from: Row<f64, W>,
+        to: Row<f64, W>,
         parts: usize,
     ) -> Self {
         let model = commands[0];
@@ -145,7 +146,7 @@ impl<const W: usize> StepTorque<W> {
             return torque;
         }
         torque.mean = held.repeat(parts);
-        torque.slopes = vec![[0.0; W]; parts * model.filters.len()];
+        torque.slopes = vec![Row::splat(0.0); parts * model.filters.len()];
         for lane in 0..W {
             for joint in 0..model.joints {
                 if let Some(history) = &commands[lane].histories[joint] {
@@ -158,7 +159,7 @@ impl<const W: usize> StepTorque<W> {
     }
 
     /// Means over one part, one a joint, and the slopes there, one a filter.
-    pub fn part(&self, joints: usize, part: usize) -> (&[[f64; W]], &[[f64; W]]) {
+    pub fn part(&self, joints: usize, part: usize) -> (&[Row<f64, W>], &[Row<f64, W>]) {
         let parts = self.mean.len() / joints;
         let filters = self.slopes.len() / parts;
         let part = part % parts;

@@ -1,16 +1,17 @@
 use super::Dynamics;
-use crate::expr::{Real, Tape};
+use crate::expr::Tape;
+use crate::lanes::{Element, Row};
 
 /// Open-loop integration of `W` independent trajectories of one model, by the classical Runge-Kutta
 /// method of order 4 with the torque held over each step or substep.
 pub struct Rollout<'d, T, const W: usize> {
     tape: Tape<'d, T, W>,
     joints: usize,
-    slopes: [Vec<[T; W]>; 4],
-    inner: Vec<[T; W]>,
+    slopes: [Vec<Row<T, W>>; 4],
+    inner: Vec<Row<T, W>>,
 }
 
-impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
+impl<'d, T: Element, const W: usize> Rollout<'d, T, W> {
     /// Working memory for `dynamics` with parameters `values`, in its order.
     ///
     /// # Panics
@@ -24,9 +25,9 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
         let mut tape = dynamics.program.tape();
         let joints = dynamics.joints;
         for (slot, value) in tape.inputs()[3 * joints + 1..].iter_mut().zip(values) {
-            *slot = [T::from_f64(*value).expect("every f64 has a nearest float"); W];
+            *slot = Row::splat(T::from_f64(*value).expect("every f64 has a nearest float"));
         }
-        let states = || vec![[T::zero(); W]; 2 * joints];
+        let states = || vec![Row::splat(T::zero()); 2 * joints];
         Self {
             tape,
             joints,
@@ -47,24 +48,24 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
     /// substep.
     pub fn advance(
         &mut self,
-        state: &mut [[T; W]],
-        tau: &[[T; W]],
-        time: [T; W],
-        dt: [T; W],
+        state: &mut [Row<T, W>],
+        tau: &[Row<T, W>],
+        time: Row<T, W>,
+        dt: Row<T, W>,
         substeps: usize,
     ) {
         let n = self.joints;
         let parts = T::from_usize(substeps).expect("few substeps");
-        let h = dt.map(|dt| dt / parts);
+        let h = Row(dt.map(|dt| dt / parts));
         let mut now = time;
         for tau in tau.chunks(n).cycle().take(substeps) {
             self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
             self.step(state, now, h);
-            now = std::array::from_fn(|lane| now[lane] + h[lane]);
+            now = Row(std::array::from_fn(|lane| now[lane] + h[lane]));
         }
     }
 
-    fn step(&mut self, state: &mut [[T; W]], time: [T; W], h: [T; W]) {
+    fn step(&mut self, state: &mut [Row<T, W>], time: Row<T, W>, h: Row<T, W>) {
         let number = |value: f64| T::from_f64(value).expect("a small constant");
         let stages = [(0.0, None), (0.5, Some(0)), (0.5, Some(1)), (1.0, Some(2))];
         for (k, (part, previous)) in stages.into_iter().enumerate() {
@@ -78,7 +79,7 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
                     }
                 }
             }
-            let stage_time = std::array::from_fn(|lane| time[lane] + part * h[lane]);
+            let stage_time = Row(std::array::from_fn(|lane| time[lane] + part * h[lane]));
             self.derivative(stage_time, k);
         }
         let (sixth, two) = (number(1.0 / 6.0), number(2.0));
@@ -92,7 +93,7 @@ impl<'d, T: Real, const W: usize> Rollout<'d, T, W> {
     }
 
     /// Slope number `k` at the inner state.
-    fn derivative(&mut self, time: [T; W], k: usize) {
+    fn derivative(&mut self, time: Row<T, W>, k: usize) {
         let n = self.joints;
         let inputs = self.tape.inputs();
         inputs[..2 * n].copy_from_slice(&self.inner);

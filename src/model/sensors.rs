@@ -3,13 +3,14 @@ use std::borrow::Cow;
 use super::{Commands, Dynamics};
 use crate::data::{Log, half_width_s, local_cubic};
 use crate::expr::Tape;
+use crate::lanes::Row;
 
 /// What the sensors of a model show of `W` trajectories: the angles of the rig itself unless an effect stands between
 /// joint and sensor.
 pub struct Sensors<'d, const W: usize> {
     tape: Option<Tape<'d, f64, W>>,
     joints: usize,
-    shown: Vec<[f64; W]>,
+    shown: Vec<Row<f64, W>>,
 }
 
 impl<'d, const W: usize> Sensors<'d, W> {
@@ -20,13 +21,13 @@ impl<'d, const W: usize> Sensors<'d, W> {
         if let Some(tape) = &mut tape {
             let own = &mut tape.inputs()[3 * joints + 1..];
             for (slot, value) in own.iter_mut().zip(values) {
-                *slot = [*value; W];
+                *slot = Row::splat(*value);
             }
         }
         Self {
             tape,
             joints,
-            shown: vec![[0.0; W]; joints],
+            shown: vec![Row::splat(0.0); joints],
         }
     }
 
@@ -42,10 +43,10 @@ impl<'d, const W: usize> Sensors<'d, W> {
     /// (`[n][lane]`).
     pub fn show<'s>(
         &'s mut self,
-        state: &'s [[f64; W]],
-        tau: impl FnOnce() -> Vec<[f64; W]>,
-        time: [f64; W],
-    ) -> &'s [[f64; W]] {
+        state: &'s [Row<f64, W>],
+        tau: impl FnOnce() -> Vec<Row<f64, W>>,
+        time: Row<f64, W>,
+    ) -> &'s [Row<f64, W>] {
         let n = self.joints;
         let Some(tape) = &mut self.tape else {
             return &state[..n];
@@ -65,9 +66,9 @@ impl<'d, const W: usize> Sensors<'d, W> {
     /// taken at the angles shown.
     pub fn correct(
         &mut self,
-        state: &mut [[f64; W]],
-        tau: impl FnOnce() -> Vec<[f64; W]>,
-        time: [f64; W],
+        state: &mut [Row<f64, W>],
+        tau: impl FnOnce() -> Vec<Row<f64, W>>,
+        time: Row<f64, W>,
     ) {
         let seen = state.to_vec();
         let shown = self.show(&seen, tau, time);
@@ -94,9 +95,10 @@ pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) ->
         let speeds = speeds(&own);
         for row in 0..log.rows() {
             let columns = log.q.iter().chain(&speeds);
-            let mut state: Vec<[f64; 1]> = columns.map(|column| [column[row]]).collect();
+            let mut state: Vec<Row<f64, 1>> =
+                columns.map(|column| Row([column[row]])).collect();
             let before = || Commands::just_before([&commands], [row]);
-            sensors.correct(&mut state, before, [log.time[row]]);
+            sensors.correct(&mut state, before, Row([log.time[row]]));
             for (column, angle) in own.q.iter_mut().zip(&state) {
                 column[row] = angle[0];
             }

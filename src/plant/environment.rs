@@ -1,4 +1,5 @@
 use crate::expr::Tape;
+use crate::lanes::Row;
 use crate::model::{Dynamics, Integrator, Rollout};
 
 /// A model that is stepped as a controlled environment is: a fixed step under a held torque, in f64.
@@ -57,11 +58,11 @@ impl<'d> Environment<'d> {
                 semi_implicit(tape, self.joints, state, tau, time_s, self.step_s);
             }
             Method::RungeKutta { rollout, substeps } => {
-                let column = |values: &[f64]| values.iter().map(|x| [*x]).collect::<Vec<_>>();
+                let column = |values: &[f64]| values.iter().map(|x| Row([*x])).collect::<Vec<_>>();
                 let mut lanes = column(state);
-                let (time, step) = ([time_s], [self.step_s]);
+                let (time, step) = (Row([time_s]), Row([self.step_s]));
                 rollout.advance(&mut lanes, &column(tau), time, step, *substeps);
-                for (value, [lane]) in state.iter_mut().zip(lanes) {
+                for (value, Row([lane])) in state.iter_mut().zip(lanes) {
                     *value = lane;
                 }
             }
@@ -75,7 +76,7 @@ fn tape<'d>(dynamics: &'d Dynamics, values: &[f64]) -> Tape<'d, f64, 1> {
     let mut tape = dynamics.program.tape();
     let first = 3 * dynamics.joints + 1;
     for (slot, value) in tape.inputs()[first..].iter_mut().zip(values) {
-        *slot = [*value];
+        *slot = Row([*value]);
     }
     tape
 }
@@ -91,7 +92,7 @@ fn semi_implicit(
 ) {
     let inputs = state.iter().chain(tau).chain([&time_s]);
     for (slot, value) in tape.inputs()[..=3 * joints].iter_mut().zip(inputs) {
-        *slot = [*value];
+        *slot = Row([*value]);
     }
     tape.run();
     for j in 0..joints {

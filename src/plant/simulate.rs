@@ -5,6 +5,7 @@ use super::file::{Plant, PlantError};
 use crate::closeloop::joined;
 use crate::data::Log;
 use crate::expr::SignForm;
+use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// The rig moves in steps of this length (s), far below what any fit uses.
@@ -36,7 +37,7 @@ impl Plant {
             (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1,
             ((dt / STEP_S).ceil() as usize).max(1),
         );
-        let mut state: Vec<[f64; 1]> = self.start().iter().map(|value| [*value]).collect();
+        let mut state: Vec<Row<f64, 1>> = self.start().iter().map(|value| Row([*value])).collect();
         let mut log = Log::empty(n);
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
@@ -49,13 +50,13 @@ impl Plant {
             self.measure(
                 &mut log,
                 time,
-                sensors.show(&state, before, [time]),
+                sensors.show(&state, before, Row([time])),
                 &tau,
                 rng,
             );
-            let held: Vec<[f64; 1]> = tau.iter().map(|tau| [*tau]).collect();
-            let torque = StepTorque::new([&commands], &held, [time], [time + dt], substeps);
-            rollout.advance(&mut state, &torque.mean, [time], [dt], substeps);
+            let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();
+            let torque = StepTorque::new([&commands], &held, Row([time]), Row([time + dt]), substeps);
+            rollout.advance(&mut state, &torque.mean, Row([time]), Row([dt]), substeps);
             if state.iter().any(|value| !value[0].is_finite()) {
                 return Err(PlantError::Diverged { time_s: time });
             }
@@ -79,7 +80,7 @@ impl Plant {
         &self,
         log: &mut Log,
         time: f64,
-        angles: &[[f64; 1]],
+        angles: &[Row<f64, 1>],
         tau: &[f64],
         rng: &mut impl Rng,
     ) {

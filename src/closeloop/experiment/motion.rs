@@ -2,6 +2,7 @@ use std::f64::consts::TAU;
 
 use crate::data::Log;
 use crate::identify::{Values, Window};
+use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// A motion of a rig before it is simulated.
@@ -147,7 +148,7 @@ fn simulate(
     let commands = Commands::of_log(dynamics, values, &commanded);
     let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
     let mut sensors = Sensors::<1>::new(dynamics, values);
-    let mut state: Vec<[f64; 1]> = start.iter().map(|value| [*value]).collect();
+    let mut state: Vec<Row<f64, 1>> = start.iter().map(|value| Row([*value])).collect();
     // The row of the pause, which nothing reads, is as the motion begins.
     let columns = log.q.iter_mut().chain(&mut log.qd);
     columns
@@ -158,7 +159,7 @@ fn simulate(
             return None;
         }
         let before = || Commands::just_before([&commands], [row]);
-        let shown = sensors.show(&state, before, [log.time[row]]).to_vec();
+        let shown = sensors.show(&state, before, Row([log.time[row]])).to_vec();
         let columns = log.q.iter_mut().chain(&mut log.qd);
         let read = shown.iter().chain(&state[dynamics.joints..]);
         columns
@@ -167,15 +168,15 @@ fn simulate(
         let Some(&to) = log.time.get(row + 1) else {
             break;
         };
-        let (from, held): (f64, Vec<[f64; 1]>) = (
+        let (from, held): (f64, Vec<Row<f64, 1>>) = (
             log.time[row],
-            log.tau.iter().map(|tau| [tau[row]]).collect(),
+            log.tau.iter().map(|tau| Row([tau[row]])).collect(),
         );
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // a small positive number
         let substeps = (((to - from) / LONGEST_STEP_S - 1e-6).ceil() as usize).max(1);
-        let torque = StepTorque::new([&commands], &held, [from], [to], substeps);
-        rollout.advance(&mut state, &torque.mean, [from], [to - from], substeps);
+        let torque = StepTorque::new([&commands], &held, Row([from]), Row([to]), substeps);
+        rollout.advance(&mut state, &torque.mean, Row([from]), Row([to - from]), substeps);
     }
     Some(())
 }

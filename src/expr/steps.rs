@@ -1,0 +1,258 @@
+//! A program as an evaluator carries it out: fewer and cheaper operations with the same results to within rounding.
+
+use std::collections::HashMap;
+
+use super::op::{Binary, Op, Unary};
+
+/// What a [`Step`] does with the values at `a`, `b` and `c`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Neg,
+    Sin,
+    Cos,
+    /// The cosine goes to `b`.
+    SinCos,
+    Tan,
+    Exp,
+    Log,
+    Sqrt,
+    Abs,
+    Sign,
+    Tanh,
+    /// 1 / a
+    Reciprocal,
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Pow,
+    Atan2,
+    Min,
+    Max,
+    Less,
+    Where,
+    /// a b + c
+    MulAdd,
+    /// a b - c
+    MulSub,
+    /// c - a b
+    SubMul,
+}
+
+/// One operation, between places of values. Those of a program's operations come first, in its order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Step {
+    pub kind: Kind,
+    pub to: u32,
+    pub a: u32,
+    pub b: u32,
+    pub c: u32,
+    /// Of the inputs that the result depends on, the first.
+    pub first_input: u32,
+}
+
+/// The steps of a program, each after those that it needs.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Steps {
+    pub steps: Vec<Step>,
+    /// Values behind those of the program's operations: reciprocals.
+    pub more: Vec<Option<f64>>,
+}
+
+/// Sums take in the products and changes of sign that only they need, sines and cosines of one angle are found
+/// together, and divisions by one value share its reciprocal.
+pub(super) fn steps(ops: &[Op], outputs: impl Iterator<Item = usize>) -> Steps {
+    let mut writer = Writer::new(ops, outputs);
+    for (place, op) in ops.iter().enumerate() {
+        writer.write(place, *op);
+    }
+    Steps {
+        steps: writer.steps.into_iter().flatten().collect(),
+        more: writer.more,
+    }
+}
+
+struct Writer<'o> {
+    ops: &'o [Op],
+    /// How often each operation's value is read, by others or as an output.
+    uses: Vec<u32>,
+    /// How often it divides.
+    divides: Vec<u32>,
+    /// The sine and the cosine of an angle.
+    waves: HashMap<u32, [Option<usize>; 2]>,
+    first_input: Vec<u32>,
+    steps: Vec<Option<Step>>,
+    /// Where the step of an operation stands.
+    step_of: Vec<Option<usize>>,
+    reciprocals: HashMap<u32, u32>,
+    more: Vec<Option<f64>>,
+}
+
+impl<'o> Writer<'o> {
+    fn new(ops: &'o [Op], outputs: impl Iterator<Item = usize>) -> Self {
+        let mut uses = vec![0; ops.len()];
+        let mut divides = vec![0; ops.len()];
+        let mut waves = HashMap::new();
+        let mut first_input = Vec::with_capacity(ops.len());
+        for output in outputs {
+            uses[output] += 1;
+        }
+        for (place, op) in ops.iter().enumerate() {
+            for operand in op.operands() {
+                uses[operand.index()] += 1;
+            }
+            let of_operands = op.operands().map(|operand| first_input[operand.index()]);
+            first_input.push(match op {
+                Op::Input(k) => *k,
+                _ => of_operands.min().unwrap_or(u32::MAX),
+            });
+            match op {
+                Op::Binary(Binary::Div, _, by) => divides[by.index()] += 1,
+                Op::Unary(Unary::Sin, angle) => waves.entry(angle.0).or_insert([None; 2])[0] = Some(place),
+                Op::Unary(Unary::Cos, angle) => waves.entry(angle.0).or_insert([None; 2])[1] = Some(place),
+                _ => {}
+            }
+        }
+        Self {
+            ops,
+            uses,
+            divides,
+            waves,
+            first_input,
+            steps: Vec::with_capacity(ops.len()),
+            step_of: vec![None; ops.len()],
+            reciprocals: HashMap::new(),
+            more: Vec::new(),
+        }
+    }
+
+    fn write(&mut self, place: usize, op: Op) {
+        match op {
+            Op::Const(_) | Op::Input(_) => {}
+            Op::Unary(Unary::Sin | Unary::Cos, angle) => self.wave(place, op, angle.0),
+            Op::Unary(op, a) => self.push(place, of_unary(op), [a.0, 0, 0]),
+            Op::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {
+                self.sum(place, op == Binary::Sub, a.0, b.0);
+            }
+            Op::Binary(Binary::Div, a, b) => match self.reciprocal(b.0) {
+                Some(reciprocal) => self.push(place, Kind::Mul, [a.0, reciprocal, 0]),
+                None => self.push(place, Kind::Div, [a.0, b.0, 0]),
+            },
+            Op::Binary(op, a, b) => self.push(place, of_binary(op), [a.0, b.0, 0]),
+            Op::Where(condition, a, b) => self.push(place, Kind::Where, [a.0, b.0, condition.0]),
+        }
+    }
+
+    fn push(&mut self, place: usize, kind: Kind, [a, b, c]: [u32; 3]) {
+        self.step_of[place] = Some(self.steps.len());
+        self.steps.push(Some(Step {
+            kind,
+            to: number(place),
+            a,
+            b,
+            c,
+            first_input: self.first_input[place],
+        }));
+    }
+
+    /// The first of a sine and a cosine of one angle finds both.
+    fn wave(&mut self, place: usize, op: Op, angle: u32) {
+        match self.waves[&angle] {
+            [Some(sine), Some(cosine)] if place == sine.min(cosine) => {
+                self.push(place, Kind::SinCos, [angle, number(cosine), 0]);
+                let step = self.steps.last_mut().and_then(Option::as_mut);
+                step.expect("it was pushed just now").to = number(sine);
+            }
+            [Some(_), Some(_)] => {}
+            _ if matches!(op, Op::Unary(Unary::Sin, _)) => self.push(place, Kind::Sin, [angle, 0, 0]),
+            _ => self.push(place, Kind::Cos, [angle, 0, 0]),
+        }
+    }
+
+    fn sum(&mut self, place: usize, minus: bool, a: u32, b: u32) {
+        let (b, minus) = match self.take(b, Kind::Neg) {
+            Some(negated) => (negated.a, !minus),
+            None => (b, minus),
+        };
+        let (a, b, minus) = match (!minus).then(|| self.take(a, Kind::Neg)).flatten() {
+            Some(negated) => (b, negated.a, true),
+            None => (a, b, minus),
+        };
+        if let Some(product) = self.take(b, Kind::Mul) {
+            let kind = if minus { Kind::SubMul } else { Kind::MulAdd };
+            self.push(place, kind, [product.a, product.b, a]);
+        } else if let Some(product) = self.take(a, Kind::Mul) {
+            let kind = if minus { Kind::MulSub } else { Kind::MulAdd };
+            self.push(place, kind, [product.a, product.b, b]);
+        } else {
+            let kind = if minus { Kind::Sub } else { Kind::Add };
+            self.push(place, kind, [a, b, 0]);
+        }
+    }
+
+    /// Take back the step at a place that nothing else needs, if it is of this kind.
+    fn take(&mut self, place: u32, kind: Kind) -> Option<Step> {
+        let place = place as usize;
+        let step = &mut self.steps[(*self.step_of.get(place)?)?];
+        step.take_if(|step| step.kind == kind && self.uses[place] == 1)
+    }
+
+    /// The place of 1 / value, where it pays.
+    fn reciprocal(&mut self, of: u32) -> Option<u32> {
+        if let Some(known) = self.reciprocals.get(&of) {
+            return Some(*known);
+        }
+        let place = self.ops.len() + self.more.len();
+        let to = number(place);
+        match self.ops[of as usize] {
+            Op::Const(value) => self.more.push(Some(1.0 / value)),
+            _ if self.divides[of as usize] < 2 => return None,
+            _ => {
+                self.more.push(None);
+                self.steps.push(Some(Step {
+                    kind: Kind::Reciprocal,
+                    to,
+                    a: of,
+                    b: 0,
+                    c: 0,
+                    first_input: self.first_input[of as usize],
+                }));
+            }
+        }
+        self.reciprocals.insert(of, to);
+        Some(to)
+    }
+}
+
+fn number(place: usize) -> u32 {
+    u32::try_from(place).expect("fewer than 2^32 operations")
+}
+
+fn of_unary(op: Unary) -> Kind {
+    match op {
+        Unary::Neg => Kind::Neg,
+        Unary::Sin => Kind::Sin,
+        Unary::Cos => Kind::Cos,
+        Unary::Tan => Kind::Tan,
+        Unary::Exp => Kind::Exp,
+        Unary::Log => Kind::Log,
+        Unary::Sqrt => Kind::Sqrt,
+        Unary::Abs => Kind::Abs,
+        Unary::Sign => Kind::Sign,
+        Unary::Tanh => Kind::Tanh,
+    }
+}
+
+fn of_binary(op: Binary) -> Kind {
+    match op {
+        Binary::Add => Kind::Add,
+        Binary::Sub => Kind::Sub,
+        Binary::Mul => Kind::Mul,
+        Binary::Div => Kind::Div,
+        Binary::Pow => Kind::Pow,
+        Binary::Atan2 => Kind::Atan2,
+        Binary::Min => Kind::Min,
+        Binary::Max => Kind::Max,
+        Binary::Less => Kind::Less,
+    }
+}

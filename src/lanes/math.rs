@@ -1,0 +1,372 @@
+//! Sine, cosine, exponential and hyperbolic tangent of whole registers, within two units in the last place. Elsewhere
+//! than on vectors, and for the rarer functions, the standard library's.
+
+use pulp::Simd;
+
+use super::{Element, Vector};
+
+/// What the functions need to know of a number type. Polynomials have their lowest power first; they are the best
+/// ones of their degree by relative error (Remez 1934).
+pub trait Constants: Sized + 'static {
+    /// Added and taken off again, it rounds to whole numbers; between the two they stand in the lowest bits.
+    const ROUNDER: f64;
+    /// pi / 2 in parts, so that few multiples of the first ones are exact.
+    const QUARTER_TURN: [f64; 3];
+    /// To this angle the parts suffice.
+    const LARGEST_ANGLE: f64;
+    /// log 2 in parts.
+    const LN_2: [f64; 2];
+    /// Beyond these the exponential is zero or infinite.
+    const EXPONENTS: [f64; 2];
+    /// (sin r - r) / r^3 and (cos r - 1 + r^2 / 2) / r^4 by r^2, for r up to pi / 4.
+    const SINE: &'static [f64];
+    const COSINE: &'static [f64];
+    /// (exp r - 1 - r) / r^2 by r, for r up to log 2 / 2.
+    const EXPONENTIAL: &'static [f64];
+    /// (tanh x - x) / x^3 by x^2, for x up to 5 / 8.
+    const TANGENT: &'static [f64];
+}
+
+impl Constants for f64 {
+    const ROUNDER: f64 = 6_755_399_441_055_744.0;
+    const QUARTER_TURN: [f64; 3] = [
+        1.570_796_326_734_125_6,
+        6.077_100_506_303_966e-11,
+        2.022_266_248_795_950_6e-21,
+    ];
+    const LARGEST_ANGLE: f64 = 1e5;
+    const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
+    const EXPONENTS: [f64; 2] = [-746.0, 710.0];
+    const SINE: &'static [f64] = &[
+        -0.166_666_666_666_666_3,
+        0.008_333_333_333_322_108,
+        -0.000_198_412_698_295_809_93,
+        2.755_731_361_828_611_5e-6,
+        -2.505_074_725_744_922_6e-8,
+        1.589_619_974_905_320_6e-10,
+    ];
+    const COSINE: &'static [f64] = &[
+        0.041_666_666_666_666_595,
+        -0.001_388_888_888_887_304_3,
+        2.480_158_728_884_212_2e-5,
+        -2.755_731_417_641_526_6e-7,
+        2.087_570_043_621_029e-9,
+        -1.135_851_483_053_011e-11,
+    ];
+    const EXPONENTIAL: &'static [f64] = &[
+        0.5,
+        0.166_666_666_666_666_82,
+        0.041_666_666_666_666_095,
+        0.008_333_333_333_317_035,
+        0.001_388_888_888_911_575_4,
+        0.000_198_412_698_963_824_75,
+        2.480_158_692_644_338e-5,
+        2.755_723_486_303_478_4e-6,
+        2.755_758_198_018_014e-7,
+        2.511_203_651_587_947e-8,
+        2.082_659_238_994_117_6e-9,
+    ];
+    const TANGENT: &'static [f64] = &[
+        -0.333_333_333_333_333_15,
+        0.133_333_333_333_297_08,
+        -0.053_968_253_966_039_61,
+        0.021_869_488_468_186_364,
+        -0.008_863_234_304_189_28,
+        0.003_592_113_916_547_210_6,
+        -0.001_455_725_407_635_055,
+        0.000_589_449_474_724_533_6,
+        -0.000_237_005_158_452_369_16,
+        9.154_667_214_413_075e-5,
+        -3.017_521_063_689_924e-5,
+        6.037_107_295_572_1e-6,
+    ];
+}
+
+impl Constants for f32 {
+    const ROUNDER: f64 = 12_582_912.0;
+    const QUARTER_TURN: [f64; 3] = [
+        1.570_796_251_296_997,
+        7.549_789_415_861_596e-8,
+        5.390_302_529_957_765e-15,
+    ];
+    const LARGEST_ANGLE: f64 = 1e5;
+    const LN_2: [f64; 2] = [0.693_145_751_953_125, 1.428_606_765_330_187e-6];
+    const EXPONENTS: [f64; 2] = [-105.0, 89.0];
+    const SINE: &'static [f64] = &[
+        -0.166_666_545_991_796_5,
+        0.008_332_160_165_004_564,
+        -0.000_195_152_051_192_446_12,
+    ];
+    const COSINE: &'static [f64] = &[
+        0.041_666_645_664_173_06,
+        -0.001_388_731_537_794_747_8,
+        2.443_305_949_576_347_4e-5,
+    ];
+    const EXPONENTIAL: &'static [f64] = &[
+        0.500_000_006_768_185_5,
+        0.166_666_658_660_681_72,
+        0.041_666_294_948_832_58,
+        0.008_333_497_266_228_715,
+        0.001_394_465_964_229_863_4,
+        0.000_197_902_436_621_001_5,
+    ];
+    const TANGENT: &'static [f64] = &[
+        -0.333_333_307_895_671_9,
+        0.133_332_054_580_538_15,
+        -0.053_946_689_949_164_73,
+        0.021_700_285_750_237_323,
+        -0.008_176_328_233_767_363,
+        0.002_141_950_437_785_587,
+    ];
+}
+
+impl<S: Simd, T: Element> Vector<S, T> {
+    #[inline(always)]
+    pub fn sin(self) -> Self {
+        self.sin_cos().0
+    }
+
+    #[inline(always)]
+    pub fn cos(self) -> Self {
+        self.sin_cos().1
+    }
+
+    /// Sine and cosine for hardly more than the price of one.
+    #[inline(always)]
+    pub fn sin_cos(self) -> (Self, Self) {
+        if S::IS_SCALAR || self.like(T::LARGEST_ANGLE).any_less(self.abs()) {
+            return (self.each(T::sin), self.each(T::cos));
+        }
+        let rounder = self.like(T::ROUNDER);
+        let turns = self.mul_add(self.like(std::f64::consts::FRAC_2_PI), rounder);
+        let count = -(turns - rounder);
+        let [first, second, third] = T::QUARTER_TURN.map(|part| self.like(part));
+        let most = count.mul_add(second, count.mul_add(first, self));
+        let angle = count.mul_add(third, most);
+        let square = angle * angle;
+        let odd = (angle * square).mul_add(square.polynomial(T::SINE), angle);
+        // The halves of the cosine first: what is rounded off is small.
+        let half = square * self.like(0.5);
+        let one = self.like(1.0);
+        let large = one - half;
+        let small = (square * square).mul_add(square.polynomial(T::COSINE), (one - large) - half);
+        let (odd, even) = (odd.with_sign_of(angle), large + small);
+        let (sine, cosine) = (turns.if_bit(0, even, odd), turns.if_bit(0, odd, even));
+        // Of the four quarters of a turn the sine is turned in the last two, the cosine in the middle ones.
+        let middle = turns + one;
+        (
+            turns.if_bit(1, -sine, sine),
+            middle.if_bit(1, -cosine, cosine),
+        )
+    }
+
+    #[inline(always)]
+    pub fn exp(self) -> Self {
+        if S::IS_SCALAR {
+            return self.each(T::exp);
+        }
+        let [low, high] = T::EXPONENTS.map(|limit| self.like(limit));
+        let inside = self.if_less(low, low, high.if_less(self, high, self));
+        let (power, factor) = inside.split_exp();
+        // In two parts, as the power alone may be no number where the result is one.
+        let rounder = self.like(T::ROUNDER);
+        let half = power.mul_add(self.like(0.5), rounder) - rounder;
+        factor * half.power_of_two() * (power - half).power_of_two()
+    }
+
+    #[inline(always)]
+    pub fn tanh(self) -> Self {
+        if S::IS_SCALAR {
+            return self.each(T::tanh);
+        }
+        let (size, square, one) = (self.abs(), self * self, self.like(1.0));
+        let near = (self * square).mul_add(square.polynomial(T::TANGENT), self);
+        // 1 - 2 / (exp(2 |x|) + 1), beyond 20 one to the last bit.
+        let most = self.like(20.0);
+        let double = most.if_less(size, most, size) * self.like(2.0);
+        let (power, factor) = double.split_exp();
+        let far = one - self.like(2.0) / factor.mul_add(power.power_of_two(), one);
+        size.if_less(self.like(0.625), near, far).with_sign_of(self)
+    }
+
+    #[inline(always)]
+    pub fn tan(self) -> Self {
+        self.each(T::tan)
+    }
+
+    #[inline(always)]
+    pub fn ln(self) -> Self {
+        self.each(T::ln)
+    }
+
+    #[inline(always)]
+    pub fn pow(self, exponent: Self) -> Self {
+        self.each_with(exponent, T::powf)
+    }
+
+    #[inline(always)]
+    pub fn atan2(self, x: Self) -> Self {
+        self.each_with(x, T::atan2)
+    }
+
+    /// Whole k and f so that exp(self) = 2^k f.
+    #[inline(always)]
+    fn split_exp(self) -> (Self, Self) {
+        let rounder = self.like(T::ROUNDER);
+        let power = self.mul_add(self.like(std::f64::consts::LOG2_E), rounder) - rounder;
+        let [most, rest] = T::LN_2.map(|part| -self.like(part));
+        let left = power.mul_add(rest, power.mul_add(most, self));
+        let curved = (left * left).mul_add(left.polynomial(T::EXPONENTIAL), left);
+        (power, curved + self.like(1.0))
+    }
+
+    #[inline(always)]
+    fn polynomial(self, coefficients: &[f64]) -> Self {
+        let mut value = self.like(coefficients[coefficients.len() - 1]);
+        for coefficient in coefficients[..coefficients.len() - 1].iter().rev() {
+            value = value.mul_add(self, self.like(*coefficient));
+        }
+        value
+    }
+
+    #[inline(always)]
+    fn if_bit(self, bit: u32, then: Self, otherwise: Self) -> Self {
+        let mask = T::bit(self.simd, self.register, bit);
+        let chosen = T::select(self.simd, mask, then.register, otherwise.register);
+        Self::new(self.simd, chosen)
+    }
+
+    #[inline(always)]
+    fn power_of_two(self) -> Self {
+        Self::new(self.simd, T::power_of_two(self.simd, self.register))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pulp::{Arch, Scalar, Simd, WithSimd};
+
+    use crate::lanes::{Element, Vector};
+
+    /// A function on vectors, and what it should be.
+    #[derive(Clone, Copy)]
+    enum Function {
+        Sin,
+        Cos,
+        Exp,
+        Tanh,
+    }
+
+    use Function::{Cos, Exp, Sin, Tanh};
+
+    impl Function {
+        fn of_number(self, x: f64) -> f64 {
+            match self {
+                Sin => x.sin(),
+                Cos => x.cos(),
+                Exp => x.exp(),
+                Tanh => x.tanh(),
+            }
+        }
+
+        fn of_vector<S: Simd, T: Element>(self, x: Vector<S, T>) -> Vector<S, T> {
+            match self {
+                Sin => x.sin(),
+                Cos => x.cos(),
+                Exp => x.exp(),
+                Tanh => x.tanh(),
+            }
+        }
+    }
+
+    struct Apply<'a, T>(Function, &'a [T]);
+
+    impl<T: Element> WithSimd for Apply<'_, T> {
+        type Output = Vec<T>;
+
+        fn with_simd<S: Simd>(self, simd: S) -> Vec<T> {
+            let mut numbers = self.1.to_vec();
+            numbers.resize(numbers.len().next_multiple_of(16), T::zero());
+            for register in T::registers_mut::<S>(&mut numbers) {
+                *register = self.0.of_vector(Vector::<S, T>::new(simd, *register)).register;
+            }
+            numbers
+        }
+    }
+
+    /// The function on every set of instructions that this processor has.
+    fn everywhere<T: Element>(function: Function, x: &[T]) -> Vec<Vec<T>> {
+        let apply = || Apply(function, x);
+        let mut all = vec![Arch::new().dispatch(apply()), Scalar.vectorize(apply())];
+        #[cfg(target_arch = "x86_64")]
+        all.extend(pulp::x86::V3::try_new().map(|simd| Simd::vectorize(simd, apply())));
+        all
+    }
+
+    /// Evenly spread numbers, and multiples of a quarter of pi, near to which sines and cosines vanish.
+    fn arguments(largest: f64) -> Vec<f64> {
+        let spread = (0..40_000).map(|k| largest * (f64::from(k) / 20_000.0 - 1.0));
+        let multiples = (-2000..2000).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
+        let small = (0..300).map(|k| 1.3 * 0.9_f64.powi(k));
+        let all = spread.chain(multiples).chain(small);
+        all.filter(|x| x.abs() <= largest).collect()
+    }
+
+    const CASES: [(Function, f64); 8] = [
+        (Sin, 1e5),
+        (Cos, 1e5),
+        (Sin, 10.0),
+        (Cos, 10.0),
+        (Exp, 740.0),
+        (Exp, 2.0),
+        (Tanh, 25.0),
+        (Tanh, 1.0),
+    ];
+
+    #[test]
+    fn doubles_are_within_two_units_of_the_standard_library() {
+        for (function, largest) in CASES {
+            let x = arguments(largest);
+            for found in everywhere(function, &x) {
+                for (x, found) in x.iter().zip(found) {
+                    let wanted = function.of_number(*x);
+                    let unit = wanted.abs().next_up() - wanted.abs();
+                    let off = (found - wanted).abs();
+                    assert!(found == wanted || off <= 2.0 * unit, "{x:e}: {found:e} {wanted:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn floats_are_within_two_units_of_the_truth() {
+        for (function, largest) in CASES {
+            let x: Vec<f32> = arguments(largest.min(100.0)).iter().map(|x| *x as f32).collect();
+            for found in everywhere(function, &x) {
+                for (x, found) in x.iter().zip(found) {
+                    let wanted = function.of_number(f64::from(*x));
+                    let nearest = wanted as f32;
+                    let unit = f64::from(nearest.abs().next_up() - nearest.abs());
+                    let off = (f64::from(found) - wanted).abs();
+                    assert!(found == nearest || off <= 2.0 * unit, "{x:e}: {found:e} {wanted:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_or_beyond_all_is_as_in_the_standard_library() {
+        let x = [f64::NAN, f64::INFINITY, -f64::INFINITY, -0.0, 0.0, 1e300, -1e6, 3e5, 5e-324, 709.7, -745.0];
+        for function in [Sin, Cos, Exp, Tanh] {
+            // Apart, as one large angle sends all lanes the long way.
+            for x in x {
+                for found in everywhere(function, &[x; 3]) {
+                    let wanted = function.of_number(x);
+                    let close = (found[0] - wanted).abs() <= 4e-16 * wanted.abs();
+                    let same = found[0] == wanted && found[0].is_sign_negative() == wanted.is_sign_negative();
+                    assert!(same || close && wanted != 0.0 || found[0].is_nan() && wanted.is_nan(), "{x} {} {wanted}", found[0]);
+                }
+            }
+        }
+    }
+}
