@@ -37,6 +37,7 @@
 //! # }
 //! ```
 
+pub mod batch;
 pub mod bench;
 pub mod cli;
 pub mod closeloop;

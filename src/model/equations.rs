@@ -70,6 +70,11 @@ impl Equations {
         self.scaled.id
     }
 
+    /// value / scale of every parameter.
+    pub(super) fn scaled(&self) -> Tensor<1> {
+        self.scaled.val()
+    }
+
     /// The equations with the current values; fixed ones as declared, to the last bit.
     pub(super) fn current(&self) -> Dynamics {
         let mut dynamics = (*self.dynamics).clone();

@@ -1,7 +1,10 @@
+use std::sync::Arc;
+
 use burn::module::{Module, ParamId};
 use burn::tensor::{Device, Tensor};
 
 use super::equations::Equations;
+use super::frame::Frame;
 use super::mlp::Mlp;
 use super::network::{MlpWeights, ResidualOn, network_dynamics, with_residual};
 use super::{Dynamics, Parameter};
@@ -41,7 +44,7 @@ pub enum HybridError {
     },
 }
 
-// Tensors of the networks are numbered from these on, so that an optimiser's saved state finds them.
+// The names of the networks' tensors, by which an optimiser's saved state finds them.
 const PRIOR_ID: u64 = 1_000;
 const RESIDUAL_ID: u64 = 2_000;
 
@@ -57,6 +60,8 @@ pub struct HybridModel {
     system: String,
     #[module(skip)]
     joints: usize,
+    #[module(skip)]
+    frame: Arc<Frame>,
 }
 
 // A box would make it smaller, but Burn knows no boxed modules, and there are few models at a time.
@@ -101,11 +106,13 @@ impl HybridModel {
     /// # Errors
     /// A parameter that is not finite, outside of its bounds, or without a scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
+        let equations = Equations::new(dynamics, device)?;
         Ok(Self {
-            prior: Prior::Equations(Equations::new(dynamics, device)?),
+            prior: Prior::Equations(equations),
             residual: None,
             system: dynamics.name.clone(),
             joints: dynamics.joints,
+            frame: Arc::new(Frame::new(dynamics.joints, Some(dynamics), None, None)),
         })
     }
 
@@ -121,11 +128,14 @@ impl HybridModel {
         device: &Device,
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
+        let prior = Mlp::new(weights, PRIOR_ID, device);
+        let frame = Frame::new(joints, None, Some(prior.made()), None);
         Ok(Self {
-            prior: Prior::Network(Mlp::new(weights, PRIOR_ID, device)),
+            prior: Prior::Network(prior),
             residual: None,
             system: system.to_owned(),
             joints,
+            frame: Arc::new(frame),
         })
     }
 
@@ -135,9 +145,15 @@ impl HybridModel {
     /// A network that is not one for the model's joints.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints)?;
-        let device = self.device();
+        let residual = Mlp::new(weights, RESIDUAL_ID, &self.device());
+        let (equations, prior) = match &self.prior {
+            Prior::Equations(equations) => (Some(equations.declared()), None),
+            Prior::Network(mlp) => (None, Some(mlp.made())),
+        };
+        let frame = Frame::new(self.joints, equations, prior, Some(residual.made()));
         Ok(Self {
-            residual: Some(Mlp::new(weights, RESIDUAL_ID, &device)),
+            residual: Some(residual),
+            frame: Arc::new(frame),
             ..self
         })
     }
@@ -284,14 +300,29 @@ impl HybridModel {
         }
     }
 
+    /// What the model is without its learnable numbers.
+    pub(crate) fn frame(&self) -> &Arc<Frame> {
+        &self.frame
+    }
+
+    /// The learnable numbers: the prior's (its parameters divided by their scales, or its network), and the
+    /// residual's.
+    pub(crate) fn tensors(&self) -> (Tensor<1>, Option<Tensor<1>>) {
+        let prior = match &self.prior {
+            Prior::Equations(equations) => equations.scaled(),
+            Prior::Network(mlp) => mlp.flat(),
+        };
+        (prior, self.residual.as_ref().map(Mlp::flat))
+    }
+
     /// The optimiser's names of the parameters of: the equations, the prior network, the residual.
     pub(crate) fn ids(&self) -> [Vec<ParamId>; 3] {
         let (equations, network) = match &self.prior {
             Prior::Equations(equations) => (vec![equations.id()], Vec::new()),
-            Prior::Network(mlp) => (Vec::new(), mlp.ids()),
+            Prior::Network(mlp) => (Vec::new(), vec![mlp.id()]),
         };
-        let residual = self.residual.as_ref().map(Mlp::ids);
-        [equations, network, residual.unwrap_or_default()]
+        let residual = self.residual.iter().map(Mlp::id).collect();
+        [equations, network, residual]
     }
 }
 

@@ -189,6 +189,32 @@ impl MlpWeights {
         first.into_iter().chain(outputs).collect()
     }
 
+    /// All weights and biases as one list: layer after layer, the weights `[output][input]` before the biases.
+    pub fn flat(&self) -> Vec<f64> {
+        let layers = self.layers.iter();
+        layers
+            .flat_map(|layer| layer.weight.iter().chain(&layer.bias).copied())
+            .collect()
+    }
+
+    /// The same network with other weights and biases, in the order of [`MlpWeights::flat`].
+    ///
+    /// # Panics
+    /// When there are fewer than the network has.
+    #[must_use]
+    pub fn with_flat(&self, flat: &[f64]) -> Self {
+        let mut network = self.clone();
+        let mut rest = flat;
+        for layer in &mut network.layers {
+            let (weight, after) = rest.split_at(layer.weight.len());
+            let (bias, after) = after.split_at(layer.bias.len());
+            layer.weight.copy_from_slice(weight);
+            layer.bias.copy_from_slice(bias);
+            rest = after;
+        }
+        network
+    }
+
     /// Does this network belong to a system of `joints` joints?
     ///
     /// # Errors
@@ -235,7 +261,14 @@ impl MlpWeights {
         values
     }
 
-    fn features(&self, graph: &mut Graph, q: &[Node], qd: &[Node], tau: &[Node]) -> Vec<Node> {
+    /// Write the network's scaled inputs into a graph.
+    pub(super) fn features(
+        &self,
+        graph: &mut Graph,
+        q: &[Node],
+        qd: &[Node],
+        tau: &[Node],
+    ) -> Vec<Node> {
         let mut features: Vec<Node> = Vec::new();
         match self.angles {
             Angles::Raw => features.extend(q),
@@ -258,6 +291,11 @@ impl MlpWeights {
 }
 
 impl LayerWeights {
+    /// How many weights and biases it has.
+    pub fn numbers(&self) -> usize {
+        self.outputs * (self.inputs + 1)
+    }
+
     fn zero(inputs: usize, outputs: usize) -> Self {
         Self {
             inputs,

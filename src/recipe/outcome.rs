@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::{Job, Kind};
 use crate::model::HybridModel;
-use crate::train::{Segments, StateScale, TrainError, Training, loss};
+use crate::train::{Objective, Segments, TrainError, Training};
 
 /// What came of a run, as `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -108,10 +108,11 @@ impl Job {
 
 fn error_on(model: &HybridModel, run: &Training, segments: &Segments) -> Result<f64, TrainError> {
     let settings = run.settings();
-    let scale = StateScale::new(settings.error_scale.as_deref(), model.joints())?;
+    let scale = settings.error_scale.as_deref();
+    let objective = Objective::new(settings.integrator, scale, model.joints())?;
     let batch = segments.all(&model.device());
-    let error = loss(model, &batch, settings.integrator, &scale).error;
-    Ok(f64::from(error.into_scalar::<f32>()))
+    let [error, _] = objective.loss(model, &batch).numbers();
+    Ok(error)
 }
 
 impl Outcome {

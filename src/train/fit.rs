@@ -3,11 +3,10 @@ use std::ops::ControlFlow;
 use burn::lr_scheduler::module_lr_scheduler::{ModuleLearningRate, ModuleLrScheduler};
 use burn::module::{Module, ParamGroup};
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
-use burn::tensor::Tensor;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Batch, Batching, Best, FitSettings, Record, Segments, StateScale, TrainError, loss};
+use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
 use crate::model::HybridModel;
 
 // PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
@@ -26,7 +25,7 @@ pub struct Training {
     pub(super) penalty_weight: f64,
     pub(super) history: Vec<Record>,
     pub(super) best: Option<Best>,
-    scale: StateScale,
+    objective: Objective,
     rates: ModuleLearningRate,
 }
 
@@ -73,7 +72,11 @@ impl Training {
     ) -> Result<Self, TrainError> {
         settings.check()?;
         Ok(Self {
-            scale: StateScale::new(settings.error_scale.as_deref(), model.joints())?,
+            objective: Objective::new(
+                settings.integrator,
+                settings.error_scale.as_deref(),
+                model.joints(),
+            )?,
             rates: learning_rates(&model, &settings),
             optimizer: AdamConfig::new().with_epsilon(ADAM_EPSILON).init(),
             epoch: 0,
@@ -200,32 +203,24 @@ impl Training {
 
     /// One step of the optimiser on one batch.
     fn step(&mut self, batch: &Batch) -> Result<Epoch, TrainError> {
-        let parts = loss(&self.model, batch, self.settings.integrator, &self.scale);
-        let error = number(&parts.error);
-        let penalty = self.settings.penalty;
-        let total = penalty.total(self.penalty_weight, parts.error, parts.residual_norm);
-        let loss = self.finite(number(&total))?;
-        let gradients = GradientsParams::from_grads(total.backward(), &self.model);
+        let loss = self.objective.loss(&self.model, batch);
+        let weights = self.weights();
+        let (total, [error, _]) = self.total(&loss, weights)?;
+        let gradients = loss.weighted(weights).backward();
+        let gradients = GradientsParams::from_grads(gradients, &self.model);
         let stepped = self
             .optimizer
             .step(self.rates.clone(), self.model.clone(), gradients);
         self.model = stepped.project();
-        Ok(Epoch { loss, error })
+        Ok(Epoch { loss: total, error })
     }
 
     /// Judge the present model on all training segments and on validation.
     fn record(&mut self, judged: &Batch, validation: Option<&Batch>) -> Result<(), TrainError> {
         let model = self.model.clone().valid();
-        let judge = |batch| loss(&model, batch, self.settings.integrator, &self.scale);
-        let parts = judge(judged);
-        let (error, norm) = (
-            number(&parts.error),
-            parts.residual_norm.as_ref().map(number),
-        );
-        let penalty = self.settings.penalty;
-        let total = penalty.total(self.penalty_weight, parts.error, parts.residual_norm);
-        let loss = self.finite(number(&total))?;
-        let validation = validation.map(|batch| match number(&judge(batch).error) {
+        let judge = |batch| self.objective.loss(&model, batch);
+        let (loss, [error, residual_norm]) = self.total(&judge(judged), self.weights())?;
+        let validation = validation.map(|batch| match judge(batch).numbers()[0] {
             error if error.is_finite() => error,
             _ => f64::INFINITY,
         });
@@ -234,7 +229,7 @@ impl Training {
             epoch: self.epoch,
             loss,
             error,
-            residual_norm: norm.unwrap_or(0.0),
+            residual_norm,
             validation,
             penalty_weight: self.penalty_weight,
             parameters: weights.parameters.clone(),
@@ -254,15 +249,23 @@ impl Training {
         Ok(())
     }
 
-    fn finite(&self, loss: f64) -> Result<f64, TrainError> {
-        if loss.is_finite() {
-            return Ok(loss);
+    fn weights(&self) -> [f64; 2] {
+        let penalty = self.settings.penalty;
+        penalty.weights(self.penalty_weight, self.model.frame().has_residual)
+    }
+
+    /// What is minimised, and its parts before they are weighted.
+    fn total(&self, loss: &Loss, weights: [f64; 2]) -> Result<(f64, [f64; 2]), TrainError> {
+        let parts = loss.numbers();
+        let total = parts[0] * weights[0] + parts[1] * weights[1];
+        if total.is_finite() {
+            return Ok((total, parts));
         }
         let named = self.model.parameters().into_iter();
         let list: Vec<String> = named.map(|(name, v)| format!("{name} = {v:.6}")).collect();
         Err(TrainError::Diverged {
             epoch: self.epoch,
-            loss,
+            loss: total,
             parameters: if list.is_empty() {
                 "no physical parameters".to_owned()
             } else {
@@ -280,8 +283,4 @@ fn learning_rates(model: &HybridModel, settings: &FitSettings) -> ModuleLearning
         .with_group(ParamGroup::from_ids(prior), rates.prior)
         .with_group(ParamGroup::from_ids(residual), rates.residual)
         .step()
-}
-
-fn number(tensor: &Tensor<1>) -> f64 {
-    f64::from(tensor.clone().into_scalar::<f32>())
 }

@@ -1,93 +1,83 @@
-use burn::tensor::Tensor;
+use std::sync::Arc;
 
-use super::{Batch, TrainError};
+use burn::tensor::{Tensor, TensorData};
+
+use super::{Batch, TrainError, composed, fused};
 use crate::model::{HybridModel, Integrator};
 
 /// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
 /// where every residual starts.
-const NORM_FLOOR: f64 = 1e-6;
+pub(super) const NORM_FLOOR: f64 = 1e-6;
 
-/// The units in which errors of the states are measured; by default 1 for each.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct StateScale(Option<Vec<f64>>);
-
-/// The two parts of the loss.
+/// What models are judged by: the way their predictions are made and the units of their errors.
 #[derive(Debug, Clone)]
-pub struct Loss {
-    /// E, `[1]`: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is
-    /// reached from the segment's first state by the unrolled integrator.
-    pub error: Tensor<1>,
-    /// ||F_r||, `[1]`: the root of the mean over all segments and steps of the squared Euclidean norm of
-    /// F_r at the step's start; none in a model without a residual.
-    ///
-    /// This is the norm of F_r as a function, under the distribution of the data. The mean of the norms
-    /// would be another choice; it treats rows one by one and pulls small residuals to zero as hard as
-    /// large ones, so that an effect felt in few rows would vanish first.
-    pub residual_norm: Option<Tensor<1>>,
+pub struct Objective {
+    integrator: Integrator,
+    /// What an error of 1 is in each state.
+    scale: Vec<f64>,
+    memory: Arc<fused::Memory>,
 }
 
-impl StateScale {
-    /// A scale for each of `2n` states.
+/// The two parts of the loss, `[2]`.
+///
+/// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
+/// first state by the unrolled integrator.
+///
+/// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
+/// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean of
+/// the norms would be another choice; it treats rows one by one and pulls small residuals to zero as hard as large
+/// ones, so that an effect felt in few rows would vanish first.
+#[derive(Debug, Clone)]
+pub struct Loss(Tensor<1>);
+
+impl Objective {
+    /// Errors in the units of `error_scale`, one for each of `2n` states, or 1 for each.
     ///
     /// # Errors
     /// Another count, or a number that is not finite and above zero.
-    pub fn new(scale: Option<&[f64]>, joints: usize) -> Result<Self, TrainError> {
-        match scale {
-            Some(scale)
-                if scale.len() != 2 * joints
-                    || !scale.iter().all(|s| s.is_finite() && *s > 0.0) =>
-            {
-                Err(TrainError::ErrorScale {
-                    states: 2 * joints,
-                    scale: scale.to_vec(),
-                })
+    pub fn new(
+        integrator: Integrator,
+        error_scale: Option<&[f64]>,
+        joints: usize,
+    ) -> Result<Self, TrainError> {
+        let scale = error_scale.map_or_else(|| vec![1.0; 2 * joints], <[f64]>::to_vec);
+        if scale.len() != 2 * joints || !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
+            return Err(TrainError::ErrorScale {
+                states: 2 * joints,
+                scale,
+            });
+        }
+        Ok(Self {
+            integrator,
+            scale,
+            memory: Arc::default(),
+        })
+    }
+
+    /// The loss of a model on a batch, through the unrolled integrator.
+    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
+        Loss(match batch {
+            Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
+            Batch::Blocks(blocks) => {
+                fused::loss(model, blocks, self.integrator, &self.scale, &self.memory)
             }
-            _ => Ok(Self(scale.map(<[f64]>::to_vec))),
-        }
-    }
-
-    fn apply(&self, state: usize, difference: Tensor<1>) -> Tensor<1> {
-        match &self.0 {
-            Some(scale) => difference / scale[state],
-            None => difference,
-        }
+        })
     }
 }
 
-/// The loss of a model on a batch, through the unrolled integrator.
-pub fn loss(
-    model: &HybridModel,
-    batch: &Batch,
-    integrator: Integrator,
-    scale: &StateScale,
-) -> Loss {
-    let model = model.prepare();
-    let mut state = batch.states[0].clone();
-    let (mut errors, mut residuals) = (Vec::new(), Vec::new());
-    for (k, input) in batch.inputs.iter().enumerate() {
-        let step = integrator.step(&model, &state, input, &batch.time[k], &batch.dt[k]);
-        errors.push(squared_error(&step.state, &batch.states[k + 1], scale));
-        residuals.extend(step.residual.map(|r| r.square().sum() / batch.size as f64));
-        state = step.state;
+impl Loss {
+    /// E and ||F_r|| as numbers.
+    pub fn numbers(&self) -> [f64; 2] {
+        let data = self.0.to_data();
+        let mut numbers = data.iter::<f32>().map(f64::from);
+        [(); 2].map(|()| numbers.next().expect("a loss has two parts"))
     }
-    let steps = batch.inputs.len() as f64;
-    Loss {
-        error: mean(errors, steps).expect("segments have steps"),
-        residual_norm: mean(residuals, steps)
-            .map(|square| (square + NORM_FLOOR * NORM_FLOOR).sqrt()),
+
+    /// The parts times their weights, `[2]`.
+    pub fn weighted(self, weights: [f64; 2]) -> Tensor<1> {
+        #[allow(clippy::cast_possible_truncation)] // training runs in f32
+        let weights = TensorData::from(weights.map(|weight| weight as f32));
+        let weights = Tensor::from_data(weights, &self.0.device());
+        self.0 * weights
     }
-}
-
-/// Mean over the batch of the squared norm of the error, `[1]`.
-fn squared_error(found: &[Tensor<1>], wanted: &[Tensor<1>], scale: &StateScale) -> Tensor<1> {
-    (found.iter().zip(wanted).enumerate())
-        .map(|(k, (found, wanted))| scale.apply(k, found.clone() - wanted.clone()).square())
-        .reduce(|sum, part| sum + part)
-        .expect("models have states")
-        .mean()
-}
-
-fn mean(parts: Vec<Tensor<1>>, count: f64) -> Option<Tensor<1>> {
-    let sum = parts.into_iter().reduce(|sum, part| sum + part)?;
-    Some(if count == 1.0 { sum } else { sum / count })
 }

@@ -5,7 +5,7 @@ use super::{FitSettings, Record, Training};
 use crate::model::{Angles, InputScaling, MlpWeights, Parameter, ResidualOn};
 
 /// The number of the checkpoint format that this program writes and reads.
-pub const FORMAT: u64 = 1;
+pub const FORMAT: u64 = 2;
 
 /// `checkpoint.json`: everything about a checkpoint but its large numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -3,8 +3,10 @@
 
 mod backend;
 mod checkpoint;
+mod composed;
 mod error;
 mod fit;
+mod fused;
 mod history;
 mod loss;
 mod manifest;
@@ -20,9 +22,10 @@ pub use backend::Backend;
 pub use checkpoint::{Checkpoint, Origin, save};
 pub use error::{CheckpointError, TrainError};
 pub use fit::{Ended, Progress, Training};
+pub use fused::Blocks;
 pub use history::{Best, Record};
-pub use loss::{Loss, StateScale, loss};
+pub use loss::{Loss, Objective};
 pub use manifest::{FORMAT, Manifest};
 pub use penalty::Penalty;
-pub use segments::{Batch, Segments, SegmentsError};
+pub use segments::{Batch, Columns, Segments, SegmentsError};
 pub use settings::{Batching, FitSettings, LearningRates};

@@ -1,4 +1,3 @@
-use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
 
 use super::TrainError;
@@ -41,14 +40,12 @@ impl Penalty {
         }
     }
 
-    /// What is minimised, `[1]`.
-    pub(super) fn total(self, weight: f64, error: Tensor<1>, norm: Option<Tensor<1>>) -> Tensor<1> {
-        match (self, norm) {
-            (_, None) => error,
-            // The term is left out, not multiplied by zero: it would still cost its gradient.
-            (Self::Fixed { .. }, Some(_)) if weight == 0.0 => error,
-            (Self::Fixed { .. }, Some(norm)) => error + norm * weight,
-            (Self::Adaptive { .. }, Some(norm)) => norm + error * weight,
+    /// What E and ||F_r|| are multiplied by in the sum that is minimised. Without a residual that is E alone.
+    pub(super) fn weights(self, weight: f64, has_residual: bool) -> [f64; 2] {
+        match self {
+            _ if !has_residual => [1.0, 0.0],
+            Self::Fixed { .. } => [1.0, weight],
+            Self::Adaptive { .. } => [weight, 1.0],
         }
     }
 

@@ -1,5 +1,8 @@
+use std::sync::Arc;
+
 use burn::tensor::{Device, Tensor, TensorData};
 
+use super::Blocks;
 use crate::model::{Angles, InputScaling};
 
 /// Why rows of numbers are no segments.
@@ -48,9 +51,18 @@ pub struct Segments {
     start: Vec<f32>,
 }
 
+/// Segments ready for a loss, in the form that suits the device.
+#[derive(Debug, Clone)]
+pub enum Batch {
+    /// For Burn's operations.
+    Columns(Columns),
+    /// For the one operation that the processor's own backend has for the whole loss.
+    Blocks(Arc<Blocks>),
+}
+
 /// Segments as columns on a device.
 #[derive(Debug, Clone)]
-pub struct Batch {
+pub struct Columns {
     /// `[step][joint]`, each `[batch]`
     pub inputs: Vec<Vec<Tensor<1>>>,
     /// `[k + 1][state]`, each `[batch]`
@@ -200,8 +212,41 @@ impl Segments {
         InputScaling::from_rows(angles.features(n), rows)
     }
 
-    /// The chosen segments on a device.
+    /// The chosen segments for losses on a device.
     pub fn batch(&self, chosen: &[usize], device: &Device) -> Batch {
+        if *device == Device::flex() {
+            Batch::Blocks(Arc::new(self.blocks(chosen)))
+        } else {
+            Batch::Columns(self.columns(chosen, device))
+        }
+    }
+
+    /// All segments for losses on a device.
+    pub fn all(&self, device: &Device) -> Batch {
+        self.batch(&(0..self.len()).collect::<Vec<_>>(), device)
+    }
+
+    fn blocks(&self, chosen: &[usize]) -> Blocks {
+        let (n, k) = (self.joints, self.steps);
+        Blocks::new(n, k, chosen.len(), |row| {
+            let segment = chosen[row];
+            let states = &self.states[2 * n * segment * (k + 1)..][..2 * n * (k + 1)];
+            let inputs = &self.inputs[n * k * segment..][..n * k];
+            let mut time = self.start[segment];
+            let mut values = Vec::new();
+            for step in 0..k {
+                let dt = self.dt[segment * k + step];
+                values.extend_from_slice(&states[2 * n * step..][..2 * n]);
+                values.extend_from_slice(&inputs[n * step..][..n]);
+                values.extend([dt, time]);
+                time += dt;
+            }
+            values.extend_from_slice(&states[2 * n * k..]);
+            values
+        })
+    }
+
+    pub(super) fn columns(&self, chosen: &[usize], device: &Device) -> Columns {
         let (n, k) = (self.joints, self.steps);
         let column = |from: &[f32], width: usize, offset: usize| {
             let values: Vec<f32> = chosen.iter().map(|i| from[i * width + offset]).collect();
@@ -222,18 +267,13 @@ impl Segments {
         for step in 1..k {
             time.push(time[step - 1].clone() + dt[step - 1].clone());
         }
-        Batch {
+        Columns {
             inputs: group(&self.inputs, k, n),
             states: group(&self.states, k + 1, 2 * n),
             dt,
             time,
             size: chosen.len(),
         }
-    }
-
-    /// All segments on a device.
-    pub fn all(&self, device: &Device) -> Batch {
-        self.batch(&(0..self.len()).collect::<Vec<_>>(), device)
     }
 }
 
@@ -256,7 +296,7 @@ mod tests {
             .push_trajectory(&time, &states, &[10.0, 11.0, 12.0, 13.0], 1)
             .unwrap();
         assert_eq!(segments.len(), 2);
-        let batch = segments.all(&Backend::Flex.device());
+        let batch = segments.columns(&[0, 1], &Backend::Flex.device());
         let numbers = |t: &burn::tensor::Tensor<1>| t.to_data().iter::<f32>().collect::<Vec<_>>();
         assert_eq!(numbers(&batch.states[0][1]), [1.0, 3.0]);
         assert_eq!(numbers(&batch.states[2][0]), [4.0, 6.0]);

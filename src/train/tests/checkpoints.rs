@@ -163,12 +163,12 @@ fn edit(dir: &Path, from: &str, to: &str) {
 #[test]
 fn another_format_and_another_shape_are_refused() {
     let (_parent, dir) = saved();
-    edit(&dir, "\"format\": 1", "\"format\": 7");
+    edit(&dir, "\"format\": 2", "\"format\": 7");
     let version = env!("CARGO_PKG_VERSION");
     assert_eq!(
         message(&dir),
         format!(
-            "the checkpoint has format 7, this program reads format 1; use the residyn that wrote it \
+            "the checkpoint has format 7, this program reads format 2; use the residyn that wrote it \
              (version {version}) or train again, in DIR"
         )
     );

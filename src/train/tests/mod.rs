@@ -1,6 +1,7 @@
 //! Tests of training on a simulated pendulum, whose parts they share.
 
 mod checkpoints;
+mod fused;
 mod gradients;
 mod parity;
 mod recovery;

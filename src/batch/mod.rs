@@ -1,0 +1,15 @@
+//! Many rows side by side in f32, as wide as the processor's vectors: networks and their derivatives.
+
+mod network;
+mod network_gradient;
+mod product;
+
+pub use network::Network;
+
+use crate::lanes::Row;
+
+/// Rows of a batch that are worked on together.
+pub const W: usize = 32;
+
+/// One value of each of them.
+pub type Rows = Row<f32, W>;

@@ -1,0 +1,120 @@
+use std::sync::{Arc, Mutex};
+
+use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::flex::FlexTensor;
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, Flex, backend_extension};
+use burn::tensor::{Tensor, TensorData};
+
+use super::plan::Plan;
+use super::work::Work;
+use super::{Blocks, Memory};
+use crate::model::{HybridModel, Integrator};
+
+/// E and ||F_r||, `[2]`.
+pub(in crate::train) fn loss(
+    model: &HybridModel,
+    blocks: &Arc<Blocks>,
+    integrator: Integrator,
+    scale: &[f64],
+    memory: &Arc<Memory>,
+) -> Tensor<1> {
+    let (prior, residual) = model.tensors();
+    let residual = residual.unwrap_or_else(|| Tensor::zeros([0], &prior.device()));
+    let plan = Plan::new(model.frame(), blocks, integrator, scale);
+    Tensor::from_dispatch(<Dispatch as LossOperation>::fused_loss(
+        prior.into_dispatch(),
+        residual.into_dispatch(),
+        Arc::new(plan),
+        memory.clone(),
+    ))
+}
+
+/// The operation as backends know it.
+#[backend_extension(Flex, Autodiff)]
+pub(super) trait LossOperation: Backend {
+    fn fused_loss(
+        prior: FloatTensor<Self>,
+        residual: FloatTensor<Self>,
+        plan: Arc<Plan>,
+        memory: Arc<Memory>,
+    ) -> FloatTensor<Self>;
+}
+
+impl LossOperation for Flex {
+    fn fused_loss(
+        prior: FlexTensor,
+        residual: FlexTensor,
+        plan: Arc<Plan>,
+        memory: Arc<Memory>,
+    ) -> FlexTensor {
+        vector(taken(&prior, &residual, &plan, &memory).loss.to_vec())
+    }
+}
+
+impl<C: CheckpointStrategy> LossOperation for Autodiff<Flex, C> {
+    fn fused_loss(
+        prior: FloatTensor<Self>,
+        residual: FloatTensor<Self>,
+        plan: Arc<Plan>,
+        memory: Arc<Memory>,
+    ) -> FloatTensor<Self> {
+        let work = taken(prior.primitive(), residual.primitive(), &plan, &memory);
+        let loss = vector(work.loss.to_vec());
+        let preparation = LossBackward.prepare::<C>([prior.node(), residual.node()]);
+        match preparation.compute_bound().stateful() {
+            OpsKind::Tracked(preparation) => preparation.finish(Arc::new(Mutex::new(work)), loss),
+            OpsKind::UnTracked(preparation) => preparation.finish(loss),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct LossBackward;
+
+impl Backward<Flex, 2> for LossBackward {
+    // Burn asks for a state that can be cloned; it is used once.
+    type State = Arc<Mutex<Work>>;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        gradients: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let by_loss = gradients.consume::<Flex>(&ops.node);
+        let by_loss = numbers(&by_loss.to_contiguous()).try_into();
+        let by_loss = by_loss.expect("the loss is of two numbers");
+        let mut work = ops.state.lock().expect("no other thread uses it");
+        for (parent, slopes) in ops.parents.into_iter().zip(work.derivative(by_loss)) {
+            // An input without numbers has no gradient.
+            if let Some(parent) = parent.filter(|_| !slopes.is_empty()) {
+                gradients.register::<Flex>(parent.id, vector(slopes));
+            }
+        }
+    }
+}
+
+fn taken(
+    prior: &FlexTensor,
+    residual: &FlexTensor,
+    plan: &Arc<Plan>,
+    memory: &Arc<Memory>,
+) -> Work {
+    let (prior, residual) = (prior.to_contiguous(), residual.to_contiguous());
+    Work::new(plan, memory, &numbers(&prior), &numbers(&residual))
+}
+
+fn numbers(tensor: &FlexTensor) -> Vec<f32> {
+    let slice = tensor
+        .as_slice()
+        .expect("parameters are f32 and in one piece");
+    slice.to_vec()
+}
+
+fn vector(numbers: Vec<f32>) -> FlexTensor {
+    let shape = [numbers.len()];
+    FlexTensor::from_data(TensorData::new(numbers, shape))
+}

@@ -1,0 +1,71 @@
+use crate::batch::{Network, Rows};
+
+/// What the way back through a rollout needs of the way there, for the blocks of a chunk: the stages one after the
+/// other, then the state at the end of each step.
+pub(super) struct Layout {
+    blocks: usize,
+    states: usize,
+    /// Values of one stage and block.
+    stage: usize,
+    stages: usize,
+}
+
+/// One stage, each part `[block][value]`.
+pub(super) struct Stage<'a> {
+    pub states: &'a mut [Rows],
+    /// What each network saw, and what its layers made of it.
+    pub networks: [Activations<'a>; 2],
+}
+
+/// A network at work.
+#[derive(Default)]
+pub(super) struct Activations<'a> {
+    pub features: &'a mut [Rows],
+    pub values: &'a mut [Rows],
+}
+
+impl Layout {
+    pub(super) fn new(joints: usize, networks: &[Network], stages: usize, blocks: usize) -> Self {
+        let networks = networks.iter();
+        let of_networks: usize = networks.map(|n| n.features() + n.activations()).sum();
+        Self {
+            blocks,
+            states: 2 * joints,
+            stage: 2 * joints + of_networks,
+            stages,
+        }
+    }
+
+    /// Rows of a whole record with so many steps.
+    pub(super) fn rows(&self, steps: usize) -> usize {
+        self.blocks * (self.stages * self.stage + steps * self.states)
+    }
+
+    pub(super) fn stage<'a>(
+        &self,
+        record: &'a mut [Rows],
+        stage: usize,
+        networks: &[Network],
+    ) -> Stage<'a> {
+        let rows = self.blocks * self.stage;
+        let (states, mut rest) =
+            record[stage * rows..][..rows].split_at_mut(self.blocks * self.states);
+        let mut parts = [Activations::default(), Activations::default()];
+        for (part, network) in parts.iter_mut().zip(networks) {
+            let (features, after) = rest.split_at_mut(self.blocks * network.features());
+            let (values, after) = after.split_at_mut(self.blocks * network.activations());
+            *part = Activations { features, values };
+            rest = after;
+        }
+        Stage {
+            states,
+            networks: parts,
+        }
+    }
+
+    /// The states at the end of step `k`.
+    pub(super) fn end<'a>(&self, record: &'a mut [Rows], k: usize) -> &'a mut [Rows] {
+        let rows = self.blocks * self.states;
+        &mut record[self.stages * self.blocks * self.stage + k * rows..][..rows]
+    }
+}

@@ -1,0 +1,485 @@
+use std::ops::Range;
+
+use pulp::Simd;
+
+use super::part::Part;
+use super::plan::{Numbers, Plan};
+use super::record::{Layout, Stage};
+use crate::batch::{Rows, W};
+use crate::expr::Tape;
+use crate::lanes::{Element, Vector};
+
+/// One thread at work on a chunk of blocks.
+pub(super) struct Worker<'a, S> {
+    pub simd: S,
+    pub plan: &'a Plan,
+    pub numbers: &'a Numbers,
+    pub chunk: Range<usize>,
+    pub layout: Layout,
+}
+
+/// Where a stage stands in the rollout.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub step: usize,
+    pub substep: usize,
+    pub stage: usize,
+}
+
+/// Working memory, each part `[block][state]`.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    pub state: Vec<Rows>,
+    pub rates: Vec<Rows>,
+    pub mean: Vec<Rows>,
+    pub other: Vec<Rows>,
+}
+
+impl Scratch {
+    pub(super) fn resize(&mut self, rows: usize) {
+        for part in [
+            &mut self.state,
+            &mut self.rates,
+            &mut self.mean,
+            &mut self.other,
+        ] {
+            part.resize(rows, Rows::splat(0.0));
+        }
+    }
+}
+
+/// `to` becomes `value(to, of)`, lane by lane.
+#[inline(always)]
+pub(super) fn update<S: Simd, const N: usize>(
+    simd: S,
+    to: &mut Rows,
+    of: [&Rows; N],
+    value: impl Fn(Vector<S, f32>, [Vector<S, f32>; N]) -> Vector<S, f32>,
+) {
+    let to = f32::registers_mut::<S>(&mut to.0);
+    let of = of.map(|rows| f32::registers::<S>(&rows.0));
+    for (k, to) in to.iter_mut().enumerate() {
+        let of = of.map(|registers| Vector::new(simd, registers[k]));
+        *to = value(Vector::new(simd, *to), of).register;
+    }
+}
+
+/// The sum over all lanes.
+#[inline(always)]
+pub(super) fn total<S: Simd>(simd: S, rows: &Rows) -> f64 {
+    let registers = f32::registers::<S>(&rows.0).iter();
+    registers
+        .map(|register| f64::from(Vector::<S, f32>::new(simd, *register).sum()))
+        .sum()
+}
+
+impl<S: Simd> Worker<'_, S> {
+    /// The rollout of the chunk. Returns the sums over its rows and steps of the squared error and of the squared
+    /// residual.
+    #[inline(always)]
+    pub(super) fn forward(
+        &self,
+        program: &mut Tape<f32, W>,
+        scratch: &mut Scratch,
+        record: &mut [Rows],
+    ) -> [f64; 2] {
+        let (blocks, states) = (&self.plan.blocks, self.states());
+        let mut sums = [Rows::splat(0.0); 2];
+        for (block, state) in self
+            .chunk
+            .clone()
+            .zip(scratch.state.chunks_exact_mut(states))
+        {
+            state.copy_from_slice(blocks.given(block, 0).state);
+        }
+        for step in 0..blocks.steps {
+            for substep in 0..self.plan.scheme.substeps {
+                self.substep(program, scratch, record, (step, substep), &mut sums[1]);
+            }
+            let end = self.layout.end(record, step);
+            end.copy_from_slice(&scratch.state[..end.len()]);
+            for (block, end) in self.chunk.clone().zip(end.chunks_exact(states)) {
+                let (next, counted) = (blocks.given(block, step).next, blocks.counted(block));
+                for ((found, wanted), precision) in end.iter().zip(next).zip(&self.plan.precision) {
+                    update(
+                        self.simd,
+                        &mut sums[0],
+                        [found, wanted, counted],
+                        |sum, [found, wanted, counted]| {
+                            let zero = Vector::splat(self.simd, 0.0);
+                            let off = (found - wanted) * Vector::splat(self.simd, *precision);
+                            // Not a product: what is infinite in a row that counts stays so.
+                            let off = zero.if_less(counted, off, zero);
+                            off.mul_add(off, sum)
+                        },
+                    );
+                }
+            }
+        }
+        sums.map(|sum| total(self.simd, &sum))
+    }
+
+    #[inline(always)]
+    fn substep(
+        &self,
+        program: &mut Tape<f32, W>,
+        scratch: &mut Scratch,
+        record: &mut [Rows],
+        (step, substep): (usize, usize),
+        residual: &mut Rows,
+    ) {
+        let Scratch {
+            state, rates, mean, ..
+        } = scratch;
+        let (scheme, states) = (self.plan.scheme, self.states());
+        for (stage, (part, weight)) in scheme.stages.iter().enumerate() {
+            let place = Place {
+                step,
+                substep,
+                stage,
+            };
+            let mut record = self.stage(record, place);
+            for (b, block) in self.chunk.clone().enumerate() {
+                let h = self.part_of_step(block, step, *part);
+                for k in b * states..(b + 1) * states {
+                    let of = [&state[k], &rates[k], &h];
+                    update(
+                        self.simd,
+                        &mut record.states[k],
+                        of,
+                        |_, [state, rate, h]| {
+                            if stage == 0 {
+                                state
+                            } else {
+                                rate.mul_add(h, state)
+                            }
+                        },
+                    );
+                }
+            }
+            self.rates(program, place, &mut record, rates);
+            if self.is_penalised(place) {
+                self.add_residual(&record, residual);
+            }
+            let weight = Vector::splat(self.simd, *weight);
+            for (mean, rate) in mean.iter_mut().zip(&*rates) {
+                update(self.simd, mean, [rate], |mean, [rate]| {
+                    if stage == 0 {
+                        rate * weight
+                    } else {
+                        rate.mul_add(weight, mean)
+                    }
+                });
+            }
+        }
+        for (b, block) in self.chunk.clone().enumerate() {
+            let h = self.part_of_step(block, step, 1.0);
+            let (state, mean) = (
+                &mut state[b * states..][..states],
+                &mean[b * states..][..states],
+            );
+            for (state, mean) in state.iter_mut().zip(mean) {
+                update(self.simd, state, [mean, &h], |state, [rate, h]| {
+                    rate.mul_add(h, state)
+                });
+            }
+            if scheme.semi_implicit {
+                let (q, gains) = (&mut state[..states / 2], &mean[states / 2..]);
+                for (q, gain) in q.iter_mut().zip(gains) {
+                    update(self.simd, q, [gain, &h], |q, [gain, h]| {
+                        (gain * h).mul_add(h, q)
+                    });
+                }
+            }
+        }
+    }
+
+    /// The rates at a stage, whose states are in its record.
+    #[inline(always)]
+    fn rates(
+        &self,
+        program: &mut Tape<f32, W>,
+        place: Place,
+        record: &mut Stage,
+        rates: &mut [Rows],
+    ) {
+        let states = self.states();
+        for (b, block) in self.chunk.clone().enumerate() {
+            self.set_inputs(
+                program,
+                place,
+                block,
+                &record.states[b * states..][..states],
+            );
+            program.run();
+            let rates = &mut rates[b * states..][..states];
+            for (k, rate) in rates.iter_mut().enumerate() {
+                rate.0 = *program.output(k);
+            }
+            let mut output = states;
+            for (network, part) in self.numbers.networks.iter().zip(&mut record.networks) {
+                let features = &mut part.features[b * network.features()..][..network.features()];
+                for feature in &mut *features {
+                    feature.0 = *program.output(output);
+                    output += 1;
+                }
+                let values = &mut part.values[b * network.activations()..][..network.activations()];
+                network.forward(self.simd, features, values);
+                let outputs = &values[network.outputs()];
+                let first = states - outputs.len();
+                for (rate, output) in rates[first..].iter_mut().zip(outputs) {
+                    update(self.simd, rate, [output], |rate, [output]| rate + output);
+                }
+            }
+        }
+    }
+
+    /// Add the squares of the residual's outputs.
+    #[inline(always)]
+    fn add_residual(&self, record: &Stage, sum: &mut Rows) {
+        let last = self.numbers.networks.len() - 1;
+        let network = &self.numbers.networks[last];
+        let values = record.networks[last]
+            .values
+            .chunks_exact(network.activations());
+        for (block, values) in self.chunk.clone().zip(values) {
+            let counted = self.plan.blocks.counted(block);
+            for output in &values[network.outputs()] {
+                update(
+                    self.simd,
+                    sum,
+                    [output, counted],
+                    |sum, [output, counted]| (output * counted).mul_add(output, sum),
+                );
+            }
+        }
+    }
+
+    /// The way back through the rollout that [`Worker::forward`] recorded. `seeds` are the derivatives of a number by
+    /// the sums that it returned; the number's derivatives by the learnable ones are added to those of `part`.
+    #[inline(always)]
+    pub(super) fn backward(
+        &self,
+        adjoints: &mut [Tape<f32, W>; 2],
+        part: &mut Part,
+        record: &mut [Rows],
+        seeds: [f32; 2],
+    ) {
+        let (blocks, states) = (&self.plan.blocks, self.states());
+        part.scratch.state.fill(Rows::splat(0.0));
+        for step in (0..blocks.steps).rev() {
+            let ends = self.layout.end(record, step).chunks_exact(states);
+            for ((b, block), end) in self.chunk.clone().enumerate().zip(ends) {
+                let (next, counted) = (blocks.given(block, step).next, blocks.counted(block));
+                let adjoint = &mut part.scratch.state[b * states..][..states];
+                for k in 0..states {
+                    let precision = self.plan.precision[k];
+                    let seed = Vector::splat(self.simd, 2.0 * seeds[0] * precision * precision);
+                    let of = [&end[k], &next[k], counted];
+                    update(
+                        self.simd,
+                        &mut adjoint[k],
+                        of,
+                        |sum, [found, wanted, counted]| {
+                            ((found - wanted) * counted).mul_add(seed, sum)
+                        },
+                    );
+                }
+            }
+            for substep in (0..self.plan.scheme.substeps).rev() {
+                self.substep_back(adjoints, part, record, (step, substep), seeds[1]);
+            }
+        }
+    }
+
+    /// `scratch.state` goes from the derivative by the state at the substep's end to that at its start.
+    #[inline(always)]
+    fn substep_back(
+        &self,
+        adjoints: &mut [Tape<f32, W>; 2],
+        part: &mut Part,
+        record: &mut [Rows],
+        (step, substep): (usize, usize),
+        seed: f32,
+    ) {
+        let (scheme, states) = (self.plan.scheme, self.states());
+        for (b, block) in self.chunk.clone().enumerate() {
+            let h = self.part_of_step(block, step, 1.0);
+            let adjoint = &part.scratch.state[b * states..][..states];
+            let mean = &mut part.scratch.mean[b * states..][..states];
+            for (mean, adjoint) in mean.iter_mut().zip(adjoint) {
+                update(self.simd, mean, [adjoint, &h], |_, [adjoint, h]| {
+                    adjoint * h
+                });
+            }
+            if scheme.semi_implicit {
+                let (of_q, of_v) = mean.split_at_mut(states / 2);
+                for (v, q) in of_v.iter_mut().zip(of_q) {
+                    update(self.simd, v, [q, &h], |v, [q, h]| q.mul_add(h, v));
+                }
+            }
+        }
+        for (stage, (_, weight)) in scheme.stages.iter().enumerate().rev() {
+            let place = Place {
+                step,
+                substep,
+                stage,
+            };
+            let last = stage + 1 == scheme.stages.len();
+            let Scratch {
+                rates, mean, other, ..
+            } = &mut part.scratch;
+            for (b, block) in self.chunk.clone().enumerate() {
+                let after = scheme.stages.get(stage + 1).map_or(0.0, |(part, _)| *part);
+                let h = self.part_of_step(block, step, after);
+                for k in b * states..(b + 1) * states {
+                    let weight = Vector::splat(self.simd, *weight);
+                    let of = [&mean[k], &other[k], &h];
+                    update(self.simd, &mut rates[k], of, |_, [mean, other, h]| {
+                        if last {
+                            mean * weight
+                        } else {
+                            other.mul_add(h, mean * weight)
+                        }
+                    });
+                }
+            }
+            let mut record = self.stage(record, place);
+            self.rates_back(adjoints, place, &mut record, part, seed);
+            if !place.is_start() {
+                let Scratch { state, other, .. } = &mut part.scratch;
+                for (state, other) in state.iter_mut().zip(&*other) {
+                    update(self.simd, state, [other], |state, [other]| state + other);
+                }
+            }
+        }
+    }
+
+    /// From the derivative by a stage's rates, in `scratch.rates`, to that by its states, in `scratch.other`.
+    #[inline(always)]
+    fn rates_back(
+        &self,
+        adjoints: &mut [Tape<f32, W>; 2],
+        place: Place,
+        record: &mut Stage,
+        part: &mut Part,
+        seed: f32,
+    ) {
+        let states = self.states();
+        let networks = self.numbers.networks.iter().zip(&mut record.networks);
+        for (k, (network, activations)) in networks.enumerate() {
+            let penalised = self.is_penalised(place) && k + 1 == self.numbers.networks.len();
+            let seed = Vector::splat(self.simd, if penalised { 2.0 * seed } else { 0.0 });
+            let values = activations.values.chunks_exact_mut(network.activations());
+            let slopes = part.scratch.rates.chunks_exact(states);
+            for ((block, values), slopes) in self.chunk.clone().zip(values).zip(slopes) {
+                let counted = self.plan.blocks.counted(block);
+                let outputs = &mut values[network.outputs()];
+                let slopes = &slopes[states - outputs.len()..];
+                for (output, slope) in outputs.iter_mut().zip(slopes) {
+                    update(
+                        self.simd,
+                        output,
+                        [slope, counted],
+                        |output, [slope, counted]| (output * counted).mul_add(seed, slope),
+                    );
+                }
+            }
+            let by_features: &mut [Rows] = match place.is_start() {
+                true => &mut [],
+                false => &mut part.by_features[k][..activations.features.len()],
+            };
+            network.backward(
+                self.simd,
+                activations.features,
+                activations.values,
+                by_features,
+                &mut part.network_sums[k],
+            );
+        }
+        let by_states = if place.is_start() { 0 } else { states };
+        let adjoint = &mut adjoints[usize::from(place.is_start())];
+        if by_states + part.parameter_sums.len() == 0 {
+            return;
+        }
+        let first = 3 * self.plan.frame.joints + 1 + self.numbers.parameters.len();
+        for (b, block) in self.chunk.clone().enumerate() {
+            self.set_inputs(
+                adjoint,
+                place,
+                block,
+                &record.states[b * states..][..states],
+            );
+            let seeds = &mut adjoint.inputs()[first..];
+            let rates = &part.scratch.rates[b * states..][..states];
+            let features = (self.numbers.networks.iter().zip(&part.by_features))
+                .flat_map(|(network, by)| &by[b * network.features()..][..network.features()]);
+            for (to, seed) in seeds.iter_mut().zip(rates.iter().chain(features)) {
+                *to = seed.0;
+            }
+            adjoint.run();
+            for (k, by) in part.scratch.other[b * states..][..by_states]
+                .iter_mut()
+                .enumerate()
+            {
+                by.0 = *adjoint.output(k);
+            }
+            for (k, sum) in part.parameter_sums.iter_mut().enumerate() {
+                let slope = &crate::lanes::Row(*adjoint.output(by_states + k));
+                update(self.simd, sum, [slope], |sum, [slope]| sum + slope);
+            }
+        }
+    }
+
+    /// State, input and time of a stage for a program.
+    #[inline(always)]
+    fn set_inputs(&self, program: &mut Tape<f32, W>, place: Place, block: usize, state: &[Rows]) {
+        let given = self.plan.blocks.given(block, place.step);
+        let inputs = program.inputs();
+        for (to, from) in inputs.iter_mut().zip(state.iter().chain(given.input)) {
+            *to = from.0;
+        }
+        let (part, _) = self.plan.scheme.stages[place.stage];
+        #[allow(clippy::cast_precision_loss)] // few substeps
+        let elapsed = self.part_of_step(block, place.step, place.substep as f32 + part);
+        let mut time = *given.time;
+        update(self.simd, &mut time, [&elapsed], |time, [elapsed]| {
+            time + elapsed
+        });
+        inputs[state.len() + given.input.len()] = time.0;
+    }
+
+    /// So much of a substep's length, s.
+    #[inline(always)]
+    fn part_of_step(&self, block: usize, step: usize, part: f32) -> Rows {
+        #[allow(clippy::cast_precision_loss)] // few substeps
+        let part = Vector::splat(self.simd, part / self.plan.scheme.substeps as f32);
+        let mut length = *self.plan.blocks.given(block, step).dt;
+        update(self.simd, &mut length, [], |dt, []| dt * part);
+        length
+    }
+
+    #[inline(always)]
+    fn stage<'r>(&self, record: &'r mut [Rows], place: Place) -> Stage<'r> {
+        let scheme = self.plan.scheme;
+        let index =
+            (place.step * scheme.substeps + place.substep) * scheme.stages.len() + place.stage;
+        self.layout.stage(record, index, &self.numbers.networks)
+    }
+
+    /// Whether the residual counts here: at the start of each step.
+    fn is_penalised(&self, place: Place) -> bool {
+        self.plan.frame.has_residual && place.substep == 0 && place.stage == 0
+    }
+
+    fn states(&self) -> usize {
+        2 * self.plan.frame.joints
+    }
+}
+
+impl Place {
+    /// Whether the state is the given one, which depends on nothing.
+    fn is_start(self) -> bool {
+        (self.step, self.substep, self.stage) == (0, 0, 0)
+    }
+}

@@ -1,0 +1,246 @@
+//! The fused loss against the composed one.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use burn::module::{Module, ParamGroup};
+use burn::optim::GradientsParams;
+use burn::tensor::Device;
+use rand::RngExt;
+
+use super::{hybrid, one_joint, parameter, rng, transitions};
+use crate::expr::SignForm;
+use crate::model::{
+    Angles, Dynamics, HybridModel, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+    ResidualOn,
+};
+use crate::train::{Backend, Batch, FitSettings, Objective, Segments, Training};
+
+const INTEGRATORS: [Integrator; 3] = [
+    Integrator::SemiImplicitEuler,
+    Integrator::Rk4,
+    Integrator::Fine {
+        steps: std::num::NonZeroU32::new(3).unwrap(),
+    },
+];
+
+/// Segments of `steps` irregular steps that lead through random states.
+fn segments(joints: usize, count: usize, steps: usize) -> Segments {
+    let mut rng = rng(5);
+    let mut segments = Segments::new(joints, steps);
+    for _ in 0..count {
+        let mut time = vec![0.3];
+        for k in 0..steps {
+            time.push(time[k] + rng.random_range(0.01..0.05));
+        }
+        let mut numbers = |count| (0..count).map(|_| rng.random_range(-2.0..2.0)).collect();
+        let states: Vec<f64> = numbers(2 * joints * (steps + 1));
+        let inputs: Vec<f64> = numbers(joints * (steps + 1));
+        segments
+            .push_trajectory(&time, &states, &inputs, 1)
+            .unwrap();
+    }
+    segments
+}
+
+/// The library's equations, one of their parameters held.
+fn equations(joints: usize) -> Dynamics {
+    let name = ["pendulum", "acrobot"][joints - 1];
+    let system = Library::built_in().system(Path::new(name)).unwrap();
+    let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; joints]);
+    dynamics.parameters[1].fixed = true;
+    dynamics
+}
+
+fn network(joints: usize, angles: Angles, on: ResidualOn, seed: u64) -> MlpWeights {
+    let settings = MlpSettings {
+        hidden: vec![16, 13],
+        angles,
+        on,
+    };
+    let scaling = segments(joints, 50, 1).scaling(angles);
+    MlpWeights::new(
+        joints,
+        &settings,
+        scaling,
+        LastLayer::Random,
+        &mut rng(seed),
+    )
+}
+
+/// Every kind of model of so many joints.
+fn models(joints: usize, device: &Device) -> Vec<HybridModel> {
+    let physics = HybridModel::physics(&equations(joints), device).unwrap();
+    let mut models = vec![physics.clone()];
+    for angles in [Angles::Raw, Angles::SinCos] {
+        for on in [ResidualOn::Accelerations, ResidualOn::Derivative] {
+            let residual = network(joints, angles, on, 7);
+            let prior = network(joints, angles, on, 8);
+            let network = HybridModel::network("system", joints, &prior, device).unwrap();
+            models.push(physics.clone().with_residual(&residual).unwrap());
+            models.push(network.clone().with_residual(&residual).unwrap());
+            models.push(network);
+        }
+    }
+    models
+}
+
+/// The parts of the loss, and the gradients of all that is learnable, one after the other.
+fn value_and_gradients(
+    model: &HybridModel,
+    batch: &Batch,
+    integrator: Integrator,
+) -> ([f64; 2], Vec<Vec<f64>>) {
+    let scale: Vec<f64> = (1..=2 * model.joints()).map(|k| 0.3 * k as f64).collect();
+    let objective = Objective::new(integrator, Some(&scale), model.joints()).unwrap();
+    let loss = objective.loss(model, batch);
+    let numbers = loss.numbers();
+    let weights = [0.7, if model.frame().has_residual { 1.3 } else { 0.0 }];
+    let gradients = loss.weighted(weights).backward();
+    let gradients = GradientsParams::from_grads(gradients, model);
+    let ids = model.ids().concat();
+    let of = |id| gradients.get::<1>(id).map(|g| g.into_data());
+    let gradients = ids.into_iter().filter_map(of);
+    let gradients = gradients.map(|data| data.iter::<f32>().map(f64::from).collect());
+    (numbers, gradients.collect())
+}
+
+fn norm(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Sums of f32 in another order: some 1e-7 for each of the few hundred operations on the way.
+fn assert_agrees(model: &HybridModel, segments: &Segments, integrator: Integrator) {
+    let all: Vec<usize> = (0..segments.len()).collect();
+    let device = model.device();
+    let fused = segments.batch(&all, &device);
+    assert!(matches!(fused, Batch::Blocks(_)));
+    let composed = Batch::Columns(segments.columns(&all, &device));
+    let (value, gradients) = value_and_gradients(model, &fused, integrator);
+    let (wanted, wanted_gradients) = value_and_gradients(model, &composed, integrator);
+    for (value, wanted) in value.iter().zip(wanted) {
+        assert!((value - wanted).abs() <= 1e-5 * wanted, "{value} {wanted}");
+    }
+    assert_eq!(gradients.len(), wanted_gradients.len());
+    for (found, wanted) in gradients.iter().zip(&wanted_gradients) {
+        assert_eq!(found.len(), wanted.len());
+        let off = norm(found.iter().zip(wanted).map(|(a, b)| a - b));
+        let size = norm(wanted.iter().copied());
+        assert!(
+            off <= 1e-5 * size,
+            "off by {off} of {size}, {integrator:?}, {model:?}"
+        );
+    }
+}
+
+#[test]
+fn the_fused_loss_is_the_composed_one_for_every_model_and_integrator() {
+    for joints in [1, 2] {
+        for steps in [1, 3] {
+            let segments = segments(joints, 37, steps);
+            for model in models(joints, &Backend::Flex.device()) {
+                for integrator in INTEGRATORS {
+                    assert_agrees(&model, &segments, integrator);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn batches_of_any_size_agree() {
+    for size in [1, 31, 32, 33, 128, 257, 1000] {
+        let segments = transitions(size, -0.5, 1);
+        let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Random);
+        assert_agrees(&model, &segments, Integrator::default());
+    }
+}
+
+#[test]
+fn checkpointing_of_gradients_changes_nothing() {
+    let segments = segments(1, 40, 2);
+    for model in models(1, &Backend::Flex.device().gradient_checkpointing()) {
+        assert_agrees(&model, &segments, Integrator::Rk4);
+    }
+}
+
+#[test]
+fn equations_without_parameters_can_have_a_residual() {
+    let segments = segments(1, 40, 2);
+    let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
+    let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
+    let model = HybridModel::physics(&dynamics, &Backend::Flex.device())
+        .and_then(|model| model.with_residual(&residual))
+        .unwrap();
+    assert_agrees(&model, &segments, Integrator::Rk4);
+}
+
+#[test]
+fn a_frozen_input_leaves_the_others_gradient_as_it_is() {
+    let segments = segments(1, 40, 2);
+    let device = Backend::Flex.device();
+    let batch = segments.all(&device);
+    let objective = Objective::new(Integrator::Rk4, None, 1).unwrap();
+    let gradients = |model: &HybridModel| {
+        let loss = objective.loss(model, &batch).weighted([1.0, 1.0]);
+        let gradients = GradientsParams::from_grads(loss.backward(), model);
+        let ids = model.ids().concat().into_iter();
+        ids.map(|id| {
+            gradients
+                .get::<1>(id)
+                .map(|g| g.into_data().to_vec::<f32>().unwrap())
+        })
+        .collect::<Vec<_>>()
+    };
+    for model in models(1, &device)
+        .into_iter()
+        .filter(|m| m.frame().has_residual)
+    {
+        let both = gradients(&model);
+        assert!(both.iter().all(Option::is_some));
+        for frozen in 0..2 {
+            let id = model.ids().concat()[frozen];
+            let part = ParamGroup::from_ids(vec![id]);
+            let some = gradients(&model.clone().set_require_grad_group(part, false));
+            assert_eq!(some[frozen], None);
+            assert_eq!(some[1 - frozen], both[1 - frozen]);
+        }
+        let value = objective.loss(&model, &batch).numbers();
+        assert_eq!(objective.loss(&model.valid(), &batch).numbers(), value);
+    }
+}
+
+#[test]
+fn what_is_not_finite_stays_so() {
+    let segments = segments(1, 40, 3);
+    let dynamics = one_joint("C * exp(1000 * q1 * q1)", vec![parameter("C", 3.0)]);
+    let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
+    let model = HybridModel::physics(&dynamics, &Backend::Flex.device()).unwrap();
+    let objective = Objective::new(Integrator::Rk4, None, 1).unwrap();
+    let batch = segments.all(&model.device());
+    for model in [model.clone(), model.with_residual(&residual).unwrap()] {
+        let [error, _] = objective.loss(&model, &batch).numbers();
+        assert!(!error.is_finite(), "{error}");
+    }
+}
+
+#[test]
+fn the_same_run_twice_has_the_same_bits() {
+    let segments = transitions(777, -0.5, 1);
+    let run = || {
+        let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Random);
+        let settings = FitSettings {
+            epochs: 50,
+            ..FitSettings::default()
+        };
+        let mut training = Training::new(model, settings, rng(3)).unwrap();
+        training
+            .run(&segments, None, &mut |_| ControlFlow::Continue(()))
+            .unwrap();
+        training.model().weights()
+    };
+    let first = run();
+    for _ in 0..3 {
+        assert_eq!(run(), first);
+    }
+}
