@@ -163,9 +163,14 @@ impl Layer {
         inputs: Columns,
         weight: &mut [<f32 as Element>::Register<S>],
     ) {
-        let at = |o: usize, i: usize| (output + o) * self.inputs + input + i;
-        let mut sums: [[Vector<S, f32>; I]; O] =
-            std::array::from_fn(|o| std::array::from_fn(|i| Vector::new(simd, weight[at(o, i)])));
+        let at = |o: usize| (output + o) * self.inputs + input;
+        let mut sums = [[Vector::<S, f32>::splat(simd, 0.0); I]; O];
+        for o in 0..O {
+            let weight = &weight[at(o)..][..I];
+            for i in 0..I {
+                sums[o][i].register = weight[i];
+            }
+        }
         for block in 0..blocks {
             let slopes = slopes.registers::<S, O>(block, output);
             let inputs = inputs.registers::<S, I>(block, input);
@@ -180,8 +185,9 @@ impl Layer {
             }
         }
         for o in 0..O {
+            let weight = &mut weight[at(o)..][..I];
             for i in 0..I {
-                weight[at(o, i)] = sums[o][i].register;
+                weight[i] = sums[o][i].register;
             }
         }
     }

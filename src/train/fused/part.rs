@@ -151,13 +151,16 @@ impl Part {
     fn add_up<S: Simd>(&mut self, simd: S) {
         self.by_networks.resize(self.network_sums.len(), Vec::new());
         for (to, sums) in self.by_networks.iter_mut().zip(&self.network_sums) {
-            to.clear();
-            let sums = f32::registers::<S>(sums).iter();
-            to.extend(sums.map(|sum| Vector::<S, f32>::new(simd, *sum).sum()));
+            let sums = f32::registers::<S>(sums);
+            to.resize(sums.len(), 0.0);
+            for (to, sum) in to.iter_mut().zip(sums) {
+                *to = Vector::<S, f32>::new(simd, *sum).sum();
+            }
         }
-        self.by_parameters.clear();
-        let sums = self.parameter_sums.iter();
-        self.by_parameters.extend(sums.map(|sum| total(simd, sum)));
+        self.by_parameters.resize(self.parameter_sums.len(), 0.0);
+        for (to, sum) in self.by_parameters.iter_mut().zip(&self.parameter_sums) {
+            *to = total(simd, sum);
+        }
     }
 }
 

@@ -67,10 +67,11 @@ pub(super) fn update<S: Simd, const N: usize>(
 /// The sum over all lanes.
 #[inline(always)]
 pub(super) fn total<S: Simd>(simd: S, rows: &Rows) -> f64 {
-    let registers = f32::registers::<S>(&rows.0).iter();
-    registers
-        .map(|register| f64::from(Vector::<S, f32>::new(simd, *register).sum()))
-        .sum()
+    let mut total = 0.0;
+    for register in f32::registers::<S>(&rows.0) {
+        total += f64::from(Vector::<S, f32>::new(simd, *register).sum());
+    }
+    total
 }
 
 impl<S: Simd> Worker<'_, S> {
@@ -116,7 +117,7 @@ impl<S: Simd> Worker<'_, S> {
                 }
             }
         }
-        sums.map(|sum| total(self.simd, &sum))
+        [total(self.simd, &sums[0]), total(self.simd, &sums[1])]
     }
 
     #[inline(always)]
