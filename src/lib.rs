@@ -47,6 +47,7 @@ pub mod expr;
 pub mod identify;
 pub mod lanes;
 pub mod model;
+pub mod plan;
 pub mod plant;
 pub mod recipe;
 pub mod report;

@@ -1,10 +1,16 @@
-//! Many rows side by side in f32, as wide as the processor's vectors: networks and their derivatives.
+//! Many rows side by side in f32, as wide as the processor's vectors: networks and their derivatives, and rollouts of a
+//! whole model.
 
 mod network;
 mod network_gradient;
 mod product;
+mod rollout;
+
+#[cfg(test)]
+mod tests;
 
 pub use network::Network;
+pub use rollout::{Block, Rollouts};
 
 use crate::lanes::Row;
 

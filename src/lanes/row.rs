@@ -12,6 +12,12 @@ impl<T: Copy, const W: usize> Row<T, W> {
     }
 }
 
+impl<T, const W: usize> From<[T; W]> for Row<T, W> {
+    fn from(values: [T; W]) -> Self {
+        Self(values)
+    }
+}
+
 impl<T, const W: usize> Deref for Row<T, W> {
     type Target = [T; W];
 

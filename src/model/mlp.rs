@@ -98,7 +98,7 @@ impl Mlp {
 }
 
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
-pub(super) fn to_f32(values: &[f64]) -> Vec<f32> {
+pub(crate) fn to_f32(values: &[f64]) -> Vec<f32> {
     values.iter().map(|value| *value as f32).collect()
 }
 

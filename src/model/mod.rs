@@ -11,7 +11,7 @@ mod frame;
 mod hybrid;
 mod integrator;
 mod library;
-mod mlp;
+pub(crate) mod mlp;
 mod network;
 mod reader;
 mod rollout;

@@ -262,7 +262,7 @@ impl MlpWeights {
     }
 
     /// Write the network's scaled inputs into a graph.
-    pub(super) fn features(
+    pub fn features(
         &self,
         graph: &mut Graph,
         q: &[Node],

@@ -1,0 +1,257 @@
+//! What the engines cost. `cargo bench` runs all of it; `benches/compare` sets it beside JAX and PyTorch.
+//!
+//! The work is that of `benches/peers.py`: the same models, the same numbers of transitions, candidates and steps.
+
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Duration;
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use residyn::batch::{Rollouts, Rows};
+use residyn::closeloop::{Request, Split, close_loop};
+use residyn::expr::SignForm;
+use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use residyn::model::{
+    Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+};
+use residyn::plan::{CrossEntropy, Objective, Settings, Start};
+use residyn::plant::Plant;
+use residyn::train::{Backend, FitSettings, Segments, Training};
+
+const STEP_S: f64 = 0.02;
+
+/// One of the two systems on which the published method was tried.
+struct Task {
+    name: &'static str,
+    parameters: &'static [(&'static str, f64)],
+    reward: &'static str,
+    start: &'static [f64],
+    horizon: usize,
+}
+
+const TASKS: [Task; 2] = [
+    Task {
+        name: "pendulum",
+        parameters: &[("C_g", 8.0), ("C_i", 2.0)],
+        reward: "cos(q1)",
+        start: &[std::f64::consts::PI, 0.0],
+        horizon: 80,
+    },
+    Task {
+        name: "acrobot",
+        parameters: &[("m1", 0.9), ("m2", 1.1)],
+        reward: "2 - 1.5 * cos(q1) - cos(q1 + q2)",
+        start: &[0.0; 4],
+        horizon: 30,
+    },
+];
+
+impl Task {
+    fn equations(&self) -> Dynamics {
+        let system = Library::built_in()
+            .system(Path::new(self.name))
+            .expect("a built-in system");
+        let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; system.joints]);
+        for (name, value) in self.parameters {
+            let found = dynamics.parameters.iter_mut().find(|p| p.name == *name);
+            found.expect("a parameter of the system").value = *value;
+        }
+        dynamics
+    }
+
+    fn network(&self) -> MlpWeights {
+        let joints = self.start.len() / 2;
+        network(joints, &MlpSettings::for_joints(joints))
+    }
+
+    fn rollouts(&self) -> Rollouts {
+        let equations = self.equations();
+        let objective = Objective::new(self.reward, equations.joints).expect("a formula");
+        let networks = [self.network()];
+        Rollouts::new(
+            &equations,
+            &networks,
+            objective.program(),
+            Integrator::default(),
+            STEP_S,
+        )
+    }
+}
+
+fn network(joints: usize, settings: &MlpSettings) -> MlpWeights {
+    let scaling = InputScaling::identity(settings.angles.features(joints));
+    MlpWeights::new(
+        joints,
+        settings,
+        scaling,
+        LastLayer::Random,
+        &mut ChaCha8Rng::seed_from_u64(1),
+    )
+}
+
+/// Transitions between random states, which is all that the cost depends on.
+fn transitions(joints: usize, count: usize) -> Segments {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut draw =
+        |count: usize| -> Vec<f64> { (0..count).map(|_| rng.random_range(-3.0..3.0)).collect() };
+    let mut segments = Segments::new(joints, 1);
+    for _ in 0..count {
+        let (states, inputs) = (draw(4 * joints), draw(2 * joints));
+        segments
+            .push_trajectory(&[0.0, STEP_S], &states, &inputs, 1)
+            .expect("two rows are a transition");
+    }
+    segments
+}
+
+/// Epochs that one measurement takes together.
+const EPOCHS: usize = 100;
+
+fn train(c: &mut Criterion) {
+    for task in &TASKS {
+        let mut group = c.benchmark_group(format!("train-{}", task.name));
+        group
+            .sample_size(10)
+            .measurement_time(Duration::from_secs(1));
+        for count in [500, 2000, 5000] {
+            let equations = task.equations();
+            let segments = transitions(equations.joints, count);
+            let model = HybridModel::physics(&equations, &Backend::Flex.device())
+                .and_then(|model| model.with_residual(&task.network()))
+                .expect("a model of this system");
+            let settings = FitSettings {
+                epochs: EPOCHS,
+                record_every: EPOCHS.try_into().expect("not zero"),
+                ..FitSettings::default()
+            };
+            let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(3));
+            let training = training.expect("settings in range");
+            group.bench_function(BenchmarkId::from_parameter(count), |b| {
+                b.iter(|| {
+                    let mut training = training.clone();
+                    let ended =
+                        training.run(
+                            &segments,
+                            None,
+                            &mut |_| std::ops::ControlFlow::Continue(()),
+                        );
+                    black_box(ended.expect("training does not diverge"));
+                });
+            });
+        }
+    }
+}
+
+fn plan(c: &mut Criterion) {
+    for task in &TASKS {
+        let rollouts = task.rollouts();
+        let settings = Settings {
+            population: 300,
+            elite: 20,
+            iterations: 10,
+            horizon: task.horizon,
+        };
+        let bounds = vec![[-3.0, 3.0]; rollouts.joints()];
+        let rng = ChaCha8Rng::seed_from_u64(4);
+        let mut planner = CrossEntropy::new(settings, &bounds, || rollouts.block(), &rng);
+        let start = Start::new(task.start, 0.0);
+        c.benchmark_group("plan")
+            .measurement_time(Duration::from_secs(2))
+            .bench_function(BenchmarkId::from_parameter(task.name), |b| {
+                b.iter(|| {
+                    planner.forget();
+                    black_box(planner.plan(&start));
+                });
+            });
+    }
+}
+
+/// One block on one core.
+fn rollout(c: &mut Criterion) {
+    for task in &TASKS {
+        let rollouts = task.rollouts();
+        let mut block = rollouts.block();
+        let start: Vec<f32> = task.start.iter().map(|x| *x as f32).collect();
+        let inputs = vec![Rows::splat(0.1); task.horizon * rollouts.joints()];
+        let mut returns = Rows::splat(0.0);
+        c.bench_function(&format!("rollout/{}", task.name), |b| {
+            b.iter(|| block.returns(&start, 0.0, black_box(&inputs), &mut returns));
+        });
+    }
+}
+
+/// Sums that do not wait for each other, as many as hide the latency of a multiply-add.
+const SUMS: usize = 12;
+/// Multiply-adds of each.
+const ROUNDS: usize = 10_000;
+
+/// The fastest that one core multiplies and adds: nothing but independent operations on registers.
+struct Peak;
+
+impl WithSimd for Peak {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f32 {
+        let [factor, term] = [0.999, 0.001].map(|x| Vector::<S, f32>::splat(simd, black_box(x)));
+        let mut sums = [Vector::splat(simd, 1.0); SUMS];
+        for _ in 0..ROUNDS {
+            for sum in &mut sums {
+                *sum = sum.mul_add(factor, term);
+            }
+        }
+        sums.into_iter().map(Vector::sum).sum()
+    }
+}
+
+fn peak(c: &mut Criterion) {
+    let arch = Arch::new();
+    c.bench_function(&format!("peak/{}", SUMS * ROUNDS * lanes(arch)), |b| {
+        b.iter(|| black_box(arch.dispatch(Peak)));
+    });
+}
+
+/// Numbers in a register.
+fn lanes(arch: Arch) -> usize {
+    struct Lanes;
+    impl WithSimd for Lanes {
+        type Output = usize;
+
+        fn with_simd<S: Simd>(self, _: S) -> usize {
+            f32::lanes::<S>()
+        }
+    }
+    arch.dispatch(Lanes)
+}
+
+/// The logs of `residyn closeloop` without arguments, from declared model to named effect.
+fn identify(c: &mut Criterion) {
+    let library = Library::built_in();
+    let demo = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml"));
+    let rig = Plant::read(demo, &library).expect("the demo's rig");
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));
+    let split = Split::of(logs.collect());
+    let system = library
+        .system(Path::new("pendulum"))
+        .expect("a built-in system");
+    let mut group = c.benchmark_group("identify");
+    group.sample_size(10).bench_function("demo", |b| {
+        b.iter(|| {
+            let request = Request {
+                system: &system,
+                library: &library,
+                split: split.clone(),
+                against: Vec::new(),
+                horizons_s: [0.1, 0.5, 1.0],
+                backend: None,
+            };
+            black_box(close_loop(request, &mut rng.clone(), &mut |_| {}).expect("a model"));
+        });
+    });
+}
+
+criterion_group!(engines, peak, rollout, train, plan, identify);
+criterion_main!(engines);

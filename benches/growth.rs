@@ -1,0 +1,284 @@
+//! How the engines' cost grows with the size of the work. `benches/growth` runs this and draws the result.
+//!
+//! Prints one JSON object a measurement: what was done, which size was changed, its value, the time and the memory
+//! that the process has needed so far.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use residyn::batch::Rollouts;
+use residyn::expr::SignForm;
+use residyn::identify::{Shooting, cut, fit};
+use residyn::model::{
+    Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+    System,
+};
+use residyn::plan::{CrossEntropy, Objective, Settings, Start};
+use residyn::plant::Plant;
+use residyn::train::{Backend, FitSettings, Segments, Training};
+
+const STEP_S: f64 = 0.02;
+/// Of each time the best of so many.
+const REPEATS: usize = 5;
+
+/// One piece of work, of which one size at a time is changed.
+#[derive(Clone, Copy)]
+struct Work {
+    joints: usize,
+    width: usize,
+    /// Of training.
+    transitions: usize,
+    steps: usize,
+    /// Of planning.
+    population: usize,
+    horizon: usize,
+}
+
+const WORK: Work = Work {
+    joints: 1,
+    width: 16,
+    transitions: 2000,
+    steps: 1,
+    population: 300,
+    horizon: 80,
+};
+
+impl Work {
+    fn network(&self) -> MlpWeights {
+        let settings = MlpSettings {
+            hidden: vec![self.width; 3],
+            ..MlpSettings::for_joints(self.joints)
+        };
+        let scaling = InputScaling::identity(settings.angles.features(self.joints));
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        MlpWeights::new(self.joints, &settings, scaling, LastLayer::Random, &mut rng)
+    }
+
+    /// Seconds of one epoch.
+    fn epoch(&self) -> f64 {
+        let segments = self.segments();
+        let model = HybridModel::physics(&chain(self.joints), &Backend::Flex.device())
+            .and_then(|model| model.with_residual(&self.network()))
+            .expect("a model of this chain");
+        let epochs = (200_000 / self.transitions).clamp(3, 100);
+        let settings = FitSettings {
+            epochs,
+            record_every: epochs.try_into().expect("not zero"),
+            ..FitSettings::default()
+        };
+        let begin = Training::new(model, settings, ChaCha8Rng::seed_from_u64(2));
+        let begin = begin.expect("settings in range");
+        best(|| {
+            let mut training = begin.clone();
+            // From one epoch to the next: neither the first nor what is recorded at the ends counts.
+            let (mut last, mut shortest) = (None::<Instant>, f64::INFINITY);
+            let mut observe = |_: &_| {
+                let now = Instant::now();
+                if let Some(last) = last.replace(now) {
+                    shortest = shortest.min(now.duration_since(last).as_secs_f64());
+                }
+                ControlFlow::Continue(())
+            };
+            training
+                .run(&segments, None, &mut observe)
+                .expect("training does not diverge");
+            shortest
+        })
+    }
+
+    fn segments(&self) -> Segments {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let time: Vec<f64> = (0..=self.steps).map(|k| STEP_S * k as f64).collect();
+        let mut segments = Segments::new(self.joints, self.steps);
+        for _ in 0..self.transitions / self.steps {
+            let mut draw = |count: usize| -> Vec<f64> {
+                (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
+            };
+            let (states, inputs) = (
+                draw(2 * self.joints * time.len()),
+                draw(self.joints * time.len()),
+            );
+            segments
+                .push_trajectory(&time, &states, &inputs, 1)
+                .expect("one segment");
+        }
+        segments
+    }
+
+    /// Seconds of one decision.
+    fn decision(&self) -> f64 {
+        let objective = Objective::new("cos(q1)", self.joints).expect("a formula");
+        let (equations, networks) = (chain(self.joints), [self.network()]);
+        let rollouts = Rollouts::new(
+            &equations,
+            &networks,
+            objective.program(),
+            Integrator::default(),
+            STEP_S,
+        );
+        let settings = Settings {
+            population: self.population,
+            elite: 20,
+            iterations: 10,
+            horizon: self.horizon,
+        };
+        let bounds = vec![[-3.0, 3.0]; self.joints];
+        let rng = ChaCha8Rng::seed_from_u64(4);
+        let mut planner = CrossEntropy::new(settings, &bounds, || rollouts.block(), &rng);
+        let start = Start::new(&vec![0.1; 2 * self.joints], 0.0);
+        best(|| {
+            planner.forget();
+            seconds(|| drop(planner.plan(&start)))
+        })
+    }
+}
+
+/// Links of equal length with a point mass each, angles from the vertical: M(q) qdd + b = tau.
+fn chain(joints: usize) -> Dynamics {
+    let row = |count: usize, entry: &dyn Fn(usize) -> String| {
+        (0..count).map(entry).collect::<Vec<_>>().join(", ")
+    };
+    let carried = |i: usize, j: usize| joints - i.max(j);
+    let mass = row(joints, &|i| {
+        let entry = |j: usize| format!("\"{} * m * cos(q{} - q{})\"", carried(i, j), i + 1, j + 1);
+        format!("[{}]", row(joints, &entry))
+    });
+    let bias = row(joints, &|i| {
+        let centrifugal = (0..joints).map(|j| {
+            let (k, i, j) = (carried(i, j), i + 1, j + 1);
+            format!("{k} * m * sin(q{i} - q{j}) * qd{j}^2 + ")
+        });
+        let sum: String = centrifugal.collect();
+        format!("\"{sum}{} * m * g * sin(q{})\"", joints - i, i + 1)
+    });
+    let text = format!(
+        "[system]\nname = \"chain\"\njoints = {joints}\n[parameters]\nm = {{ value = 1.0, unit = \"kg\" }}\n\
+         g = {{ value = 9.8, unit = \"m/s^2\" }}\n[dynamics]\nmass = [{mass}]\nbias = [{bias}]\n"
+    );
+    let system = System::from_text(Path::new("chain.toml"), &text, &[]).expect("a model file");
+    system.dynamics(&vec![SignForm::DEFAULT; joints])
+}
+
+/// Seconds of fitting the pendulum to logs of this length.
+fn identification(duration_s: f64) -> f64 {
+    let library = Library::built_in();
+    let mut rig = Plant::read(Path::new("pendulum"), &library).expect("a built-in system");
+    rig.recording.duration_s = duration_s;
+    let log = rig
+        .record(&mut ChaCha8Rng::seed_from_u64(5))
+        .expect("a log");
+    let dynamics = library
+        .system(Path::new("pendulum"))
+        .expect("a built-in system");
+    let dynamics = dynamics.dynamics(&[SignForm::DEFAULT]);
+    let logs = [log];
+    let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
+    let active = [0, 1];
+    best(|| {
+        seconds(|| {
+            let (begin, states) = (dynamics.values(), shooting.initial_locals(0));
+            let fitted = fit(&shooting, &dynamics, &active, begin, states, None);
+            drop(fitted.expect("a model that stays finite"));
+        })
+    })
+}
+
+fn seconds(work: impl FnOnce()) -> f64 {
+    let begin = Instant::now();
+    work();
+    begin.elapsed().as_secs_f64()
+}
+
+fn best(mut measure: impl FnMut() -> f64) -> f64 {
+    (0..REPEATS)
+        .map(|_| measure())
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// The most memory that this process has had so far, in MiB; none where the system does not tell.
+fn memory_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib / 1024.0)
+}
+
+fn tell(work: &str, size: &str, value: usize, seconds: f64) {
+    let line = serde_json::json!({
+        "work": work, "size": size, "value": value, "seconds": seconds, "memory_mib": memory_mib(),
+    });
+    println!("{line}");
+}
+
+const JOINTS: [usize; 5] = [1, 2, 3, 4, 6];
+const WIDTHS: [usize; 5] = [8, 16, 32, 64, 128];
+
+fn main() {
+    let w = WORK;
+    for transitions in [500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000] {
+        tell(
+            "epoch",
+            "transitions",
+            transitions,
+            Work { transitions, ..w }.epoch(),
+        );
+    }
+    for steps in [1, 2, 5, 10, 20] {
+        tell(
+            "epoch",
+            "steps of a segment",
+            steps,
+            Work { steps, ..w }.epoch(),
+        );
+    }
+    for joints in JOINTS {
+        tell("epoch", "joints", joints, Work { joints, ..w }.epoch());
+        tell(
+            "decision",
+            "joints",
+            joints,
+            Work { joints, ..w }.decision(),
+        );
+    }
+    for width in WIDTHS {
+        tell(
+            "epoch",
+            "neurons of a layer",
+            width,
+            Work { width, ..w }.epoch(),
+        );
+        tell(
+            "decision",
+            "neurons of a layer",
+            width,
+            Work { width, ..w }.decision(),
+        );
+    }
+    for horizon in [10, 20, 40, 80, 160, 320] {
+        tell(
+            "decision",
+            "horizon",
+            horizon,
+            Work { horizon, ..w }.decision(),
+        );
+    }
+    for population in [32, 100, 300, 1000, 3000, 10_000] {
+        tell(
+            "decision",
+            "population",
+            population,
+            Work { population, ..w }.decision(),
+        );
+    }
+    for duration_s in [10, 20, 40, 80, 160, 320] {
+        tell(
+            "identification",
+            "seconds of log",
+            duration_s,
+            identification(duration_s as f64),
+        );
+    }
+}

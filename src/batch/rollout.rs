@@ -1,0 +1,334 @@
+use super::{Network, Rows, W};
+use crate::expr::{Graph, Node, Program, Tape};
+use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use crate::model::mlp::to_f32;
+use crate::model::{Dynamics, Integrator, MlpWeights};
+
+/// Model, objective and integrator, ready to be rolled out from one state under many sequences of inputs.
+#[derive(Debug, Clone)]
+pub struct Rollouts {
+    joints: usize,
+    /// Inputs: `q`, `qd`, `tau` and `t`, then the torque that led to this state, then the parameters. Outputs: ds/dt
+    /// by the equations (2n), the reward, then the scaled features of each network.
+    program: Program,
+    parameters: Vec<f32>,
+    networks: Vec<Added>,
+    stages: &'static [Stage],
+    semi_implicit: bool,
+    substeps: usize,
+    step_s: f32,
+}
+
+/// A network whose outputs are added to the last of the rates.
+#[derive(Debug, Clone)]
+struct Added {
+    network: Network,
+    first_rate: usize,
+    first_feature: usize,
+}
+
+/// One evaluation within a step of an explicit Runge-Kutta method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stage {
+    /// When it is taken, as a share of the step.
+    time: f32,
+    /// How far the next stage lies along this one's slope, as a share of the step.
+    reach: f32,
+    /// Its weight in the step's slope.
+    weight: f32,
+}
+
+const fn stage(time: f32, reach: f32, weight: f32) -> Stage {
+    Stage {
+        time,
+        reach,
+        weight,
+    }
+}
+
+const EULER: &[Stage] = &[stage(0.0, 0.0, 1.0)];
+
+/// The classical method of order 4.
+const RK4: &[Stage] = &[
+    stage(0.0, 0.5, 1.0 / 6.0),
+    stage(0.5, 0.5, 1.0 / 3.0),
+    stage(0.5, 1.0, 1.0 / 3.0),
+    stage(1.0, 0.0, 1.0 / 6.0),
+];
+
+/// Working memory of [`W`] rollouts.
+#[derive(Debug, Clone)]
+pub struct Block<'r> {
+    rollouts: &'r Rollouts,
+    arch: Arch,
+    tape: Tape<'r, f32, W>,
+    /// Where the step began, and where its slope leads so far: positions, then velocities.
+    state: Vec<Rows>,
+    next: Vec<Rows>,
+    rates: Vec<Rows>,
+    /// Of each network: features, then activations.
+    values: Vec<[Vec<Rows>; 2]>,
+}
+
+impl Rollouts {
+    /// `equations` with the outputs of `networks` added to their derivative, in steps of `step_s` seconds, under an
+    /// objective whose one output is the reward of the state and torque that a step leads to. Its inputs are `q`,
+    /// `qd`, `tau` of every joint and `t`.
+    ///
+    /// # Panics
+    /// When the equations filter their torques or a network or the objective does not belong to their joints.
+    #[allow(clippy::cast_possible_truncation)] // planning runs in f32
+    pub fn new(
+        equations: &Dynamics,
+        networks: &[MlpWeights],
+        objective: &Program,
+        integrator: Integrator,
+        step_s: f64,
+    ) -> Self {
+        assert!(
+            equations.filters.is_empty(),
+            "a state has no memory of torques"
+        );
+        for network in networks {
+            network
+                .check(equations.joints)
+                .expect("networks of this system");
+        }
+        let (stages, substeps) = match integrator {
+            Integrator::SemiImplicitEuler => (EULER, 1),
+            Integrator::Rk4 => (RK4, 1),
+            Integrator::Fine { steps } => (RK4, steps.get() as usize),
+        };
+        Self {
+            joints: equations.joints,
+            program: whole(equations, networks, objective),
+            parameters: equations.values().iter().map(|x| *x as f32).collect(),
+            networks: added(equations.joints, networks),
+            stages,
+            semi_implicit: integrator == Integrator::SemiImplicitEuler,
+            substeps,
+            step_s: step_s as f32,
+        }
+    }
+
+    /// Number of joints n.
+    pub fn joints(&self) -> usize {
+        self.joints
+    }
+
+    /// Working memory for one block.
+    pub fn block(&self) -> Block<'_> {
+        let first = 4 * self.joints + 1;
+        let mut tape = self.program.tape_with_held(first);
+        for (slot, value) in tape.inputs()[first..].iter_mut().zip(&self.parameters) {
+            *slot = [*value; W].into();
+        }
+        let states = || vec![Rows::splat(0.0); 2 * self.joints];
+        let rows = |count: usize| vec![Rows::splat(0.0); count];
+        let values = |added: &Added| {
+            let network = &added.network;
+            [rows(network.features()), rows(network.activations())]
+        };
+        Block {
+            rollouts: self,
+            arch: Arch::new(),
+            tape,
+            state: states(),
+            next: states(),
+            rates: states(),
+            values: self.networks.iter().map(values).collect(),
+        }
+    }
+}
+
+fn added(joints: usize, networks: &[MlpWeights]) -> Vec<Added> {
+    let mut first_feature = 2 * joints + 1;
+    let mut add = |weights: &MlpWeights| {
+        let network = Network::new(&weights.widths(), &to_f32(&weights.flat()));
+        let first = first_feature;
+        first_feature += network.features();
+        Added {
+            first_rate: 2 * joints - network.outputs().len(),
+            first_feature: first,
+            network,
+        }
+    };
+    networks.iter().map(&mut add).collect()
+}
+
+/// One program for everything around the networks: sines and cosines serve all of it.
+fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> Program {
+    let n = equations.joints;
+    let mut graph = Graph::new();
+    let (moving, parameters) = equations.program.inputs().split_at(3 * n + 1);
+    let mut write =
+        |names: &[String]| -> Vec<Node> { names.iter().map(|name| graph.input(name)).collect() };
+    let moving = write(moving);
+    let until_now: Vec<String> = (1..=n).map(|j| format!("tau{j} until now")).collect();
+    let (until_now, parameters) = (write(&until_now), write(parameters));
+    let inputs = [moving.as_slice(), &parameters].concat();
+    let mut outputs = graph.append(&equations.program, &inputs);
+    let seen = [&moving[..2 * n], &until_now, &moving[3 * n..]].concat();
+    let reward = graph.append(objective, &seen);
+    assert_eq!(reward.len(), 1, "an objective is one number");
+    outputs.extend(reward);
+    for network in networks {
+        let (q, qd) = moving[..2 * n].split_at(n);
+        outputs.extend(network.features(&mut graph, q, qd, &moving[2 * n..3 * n]));
+    }
+    graph.finish(&outputs)
+}
+
+impl Block<'_> {
+    /// The sum of rewards of each rollout from `start` (positions, then velocities) at `time_s` under `inputs`
+    /// (`[step * n + joint]`), each held for a step. Not a number or infinite where a rollout diverges.
+    ///
+    /// # Panics
+    /// When `start` or `inputs` is not of the model's size.
+    pub fn returns(&mut self, start: &[f32], time_s: f32, inputs: &[Rows], returns: &mut Rows) {
+        let n = self.rollouts.joints;
+        assert_eq!(start.len(), 2 * n, "one value for each state");
+        assert!(
+            !inputs.is_empty() && inputs.len().is_multiple_of(n),
+            "whole steps"
+        );
+        self.arch.dispatch(Run {
+            block: self,
+            start,
+            time_s,
+            inputs,
+            returns,
+        });
+    }
+}
+
+struct Run<'a, 'r> {
+    block: &'a mut Block<'r>,
+    start: &'a [f32],
+    time_s: f32,
+    inputs: &'a [Rows],
+    returns: &'a mut Rows,
+}
+
+impl WithSimd for Run<'_, '_> {
+    type Output = ();
+
+    /// The loops meet in one place, so that what is evaluated there is compiled into them once.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            block,
+            start,
+            time_s,
+            inputs,
+            returns,
+        } = self;
+        let Rollouts {
+            joints: n,
+            stages,
+            substeps,
+            step_s,
+            ..
+        } = *block.rollouts;
+        let (steps, h) = (inputs.len() / n, step_s / substeps as f32);
+        for (row, value) in block.next.iter_mut().zip(start) {
+            *row = Rows::splat(*value);
+        }
+        *returns = Rows::splat(0.0);
+        for step in 0..=steps {
+            block.hold(inputs, step);
+            for substep in 0..substeps {
+                let begin_s = time_s + (step * substeps + substep) as f32 * h;
+                block.begin();
+                for (k, stage) in stages.iter().enumerate() {
+                    block.tape.moving()[3 * n] = Rows::splat(begin_s + stage.time * h);
+                    block.tape.run_on(simd);
+                    if k == 0 && substep == 0 && step > 0 {
+                        add(simd, returns, block.tape.output(2 * n), 1.0);
+                        if step == steps {
+                            return;
+                        }
+                    }
+                    block.rates(simd);
+                    block.advance(simd, stage.reach * h, stage.weight * h);
+                }
+                block.finish(simd, h);
+            }
+        }
+    }
+}
+
+impl Block<'_> {
+    /// Hold the input of `step`; the reward sees that of the step before.
+    #[inline(always)]
+    fn hold(&mut self, inputs: &[Rows], step: usize) {
+        let n = self.rollouts.joints;
+        let slots = self.tape.moving();
+        if let Some(now) = inputs[step * n..].get(..n) {
+            slots[2 * n..3 * n].copy_from_slice(now);
+        }
+        if step > 0 {
+            slots[3 * n + 1..].copy_from_slice(&inputs[(step - 1) * n..][..n]);
+        }
+    }
+
+    /// A substep begins where the last one led.
+    #[inline(always)]
+    fn begin(&mut self) {
+        self.state.copy_from_slice(&self.next);
+        self.tape.moving()[..self.next.len()].copy_from_slice(&self.next);
+    }
+
+    /// ds/dt where the tape stands: the equations' part and that of the networks.
+    #[inline(always)]
+    fn rates<S: Simd>(&mut self, simd: S) {
+        for (k, rate) in self.rates.iter_mut().enumerate() {
+            *rate = *self.tape.output(k);
+        }
+        for (added, [features, activations]) in self.rollouts.networks.iter().zip(&mut self.values)
+        {
+            for (k, feature) in features.iter_mut().enumerate() {
+                *feature = *self.tape.output(added.first_feature + k);
+            }
+            added.network.forward(simd, features, activations);
+            let parts = &activations[added.network.outputs()];
+            for (rate, part) in self.rates[added.first_rate..].iter_mut().zip(parts) {
+                add(simd, rate, part, 1.0);
+            }
+        }
+    }
+
+    /// Add the slope to the step, and set the inputs of the next stage.
+    #[inline(always)]
+    fn advance<S: Simd>(&mut self, simd: S, reach: f32, weight: f32) {
+        let inner = self.tape.moving();
+        for (k, rate) in self.rates.iter().enumerate() {
+            add(simd, &mut self.next[k], rate, weight);
+            inner[k] = self.state[k];
+            add(simd, &mut inner[k], rate, reach);
+        }
+    }
+
+    /// The end of a substep of length `h`.
+    #[inline(always)]
+    fn finish<S: Simd>(&mut self, simd: S, h: f32) {
+        if self.rollouts.semi_implicit {
+            let (positions, _) = self.next.split_at_mut(self.rollouts.joints);
+            let accelerations = &self.rates[positions.len()..];
+            for (position, acceleration) in positions.iter_mut().zip(accelerations) {
+                add(simd, position, acceleration, h * h);
+            }
+        }
+    }
+}
+
+/// sum += factor * term
+#[inline(always)]
+fn add<S: Simd>(simd: S, sum: &mut Rows, term: &Rows, factor: f32) {
+    let factor = Vector::splat(simd, factor);
+    let terms = f32::registers::<S>(&**term);
+    for (sum, term) in f32::registers_mut::<S>(&mut **sum).iter_mut().zip(terms) {
+        let term = Vector::new(simd, *term);
+        *sum = term.mul_add(factor, Vector::new(simd, *sum)).register;
+    }
+}

@@ -1,0 +1,35 @@
+use crate::expr::{FormulaError, Graph, Program, Scope, SignForm, parse};
+
+/// What is to be maximised, summed over the steps of a rollout: a formula of the state that a step leads to (`q1`,
+/// `qd1`, ...), of the torque that was held over it (`tau1`, ...) and of time (`t`).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Objective {
+    program: Program,
+}
+
+impl Objective {
+    /// The objective of `joints` joints that this formula gives, e.g. `cos(q1) - 0.01 * tau1^2`.
+    ///
+    /// # Errors
+    /// What is no formula, or a name that it does not know.
+    pub fn new(formula: &str, joints: usize) -> Result<Self, FormulaError> {
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(SignForm::Exact);
+        let names = ["q", "qd", "tau"].into_iter();
+        let numbered =
+            names.flat_map(|name| (1..=joints).map(move |joint| format!("{name}{joint}")));
+        for name in numbered.chain(["t".to_owned()]) {
+            let node = graph.input(&name);
+            scope.bind(&name, node);
+        }
+        let reward = scope.lower(&mut graph, &parse(formula)?)?;
+        Ok(Self {
+            program: graph.finish(&[reward]),
+        })
+    }
+
+    /// Inputs: `q`, `qd` and `tau` of every joint, then `t`. One output.
+    pub fn program(&self) -> &Program {
+        &self.program
+    }
+}
