@@ -1,7 +1,7 @@
 use super::Program;
 use super::op::Op;
 use super::steps::{Kind, Step};
-use crate::lanes::{Arch, Element, Row, Simd, Vector, WithSimd};
+use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
 
 /// The number types that programs run on: f64 to fit, f32 to train and plan.
 pub trait Real:
@@ -95,13 +95,13 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
 
     /// Carry out every operation on every lane.
     pub fn run(&mut self) {
-        Arch::new().dispatch(Run(self));
+        Row::<T, W>::dispatch(Run(self));
     }
 
     /// The same within a function that is on these instructions already.
     #[inline(always)]
     pub fn run_on<S: Simd>(&mut self, simd: S) {
-        if W.is_multiple_of(T::lanes::<S>()) {
+        if Row::<T, W>::fills::<S>() {
             self.carry_out(simd);
         } else {
             self.carry_out(pulp::Scalar);
@@ -138,106 +138,82 @@ struct Values<'v, S, T, const W: usize> {
     rows: &'v mut [Row<T, W>],
 }
 
+// The operations are written into the loop over registers as they are: a closure would be a function of its own that
+// does not know the processor's instructions.
+macro_rules! to_registers {
+    ($values:ident, $step:ident, |$a:ident| $value:expr) => {
+        for part in 0..Row::<T, W>::parts::<S>() {
+            let $a = $values.get($step.a, part);
+            $values.set($step.to, part, $value);
+        }
+    };
+    ($values:ident, $step:ident, |$a:ident, $b:ident| $value:expr) => {
+        for part in 0..Row::<T, W>::parts::<S>() {
+            let $a = $values.get($step.a, part);
+            let $b = $values.get($step.b, part);
+            $values.set($step.to, part, $value);
+        }
+    };
+    ($values:ident, $step:ident, |$a:ident, $b:ident, $c:ident| $value:expr) => {
+        for part in 0..Row::<T, W>::parts::<S>() {
+            let $a = $values.get($step.a, part);
+            let $b = $values.get($step.b, part);
+            let $c = $values.get($step.c, part);
+            $values.set($step.to, part, $value);
+        }
+    };
+}
+
 impl<S: Simd, T: Element, const W: usize> Values<'_, S, T, W> {
     #[inline(always)]
     fn carry_out(&mut self, step: &Step) {
-        type V<S, T> = Vector<S, T>;
         match step.kind {
-            Kind::Neg => self.unary(step, |a| -a),
-            Kind::Sin => self.unary(step, V::sin),
-            Kind::Cos => self.unary(step, V::cos),
-            Kind::SinCos => self.sin_cos(step),
-            Kind::Tan => self.unary(step, V::tan),
-            Kind::Exp => self.unary(step, V::exp),
-            Kind::Log => self.unary(step, V::ln),
-            Kind::Sqrt => self.unary(step, V::sqrt),
-            Kind::Abs => self.unary(step, V::abs),
-            Kind::Sign => self.unary(step, sign),
-            Kind::Tanh => self.unary(step, V::tanh),
-            Kind::Reciprocal => self.unary(step, |a| a.like(1.0) / a),
-            Kind::Add => self.binary(step, |a, b| a + b),
-            Kind::Sub => self.binary(step, |a, b| a - b),
-            Kind::Mul => self.binary(step, |a, b| a * b),
-            Kind::Div => self.binary(step, |a, b| a / b),
-            Kind::Pow => self.binary(step, V::pow),
-            Kind::Atan2 => self.binary(step, V::atan2),
+            Kind::Neg => to_registers!(self, step, |a| -a),
+            Kind::Sin => to_registers!(self, step, |a| a.sin()),
+            Kind::Cos => to_registers!(self, step, |a| a.cos()),
+            Kind::SinCos => {
+                for part in 0..Row::<T, W>::parts::<S>() {
+                    let (sine, cosine) = self.get(step.a, part).sin_cos();
+                    self.set(step.to, part, sine);
+                    self.set(step.b, part, cosine);
+                }
+            }
+            Kind::Tan => to_registers!(self, step, |a| a.tan()),
+            Kind::Exp => to_registers!(self, step, |a| a.exp()),
+            Kind::Log => to_registers!(self, step, |a| a.ln()),
+            Kind::Sqrt => to_registers!(self, step, |a| a.sqrt()),
+            Kind::Abs => to_registers!(self, step, |a| a.abs()),
+            Kind::Sign => to_registers!(self, step, |a| a.sign()),
+            Kind::Tanh => to_registers!(self, step, |a| a.tanh()),
+            Kind::Reciprocal => to_registers!(self, step, |a| a.like(1.0) / a),
+            Kind::Add => to_registers!(self, step, |a, b| a + b),
+            Kind::Sub => to_registers!(self, step, |a, b| a - b),
+            Kind::Mul => to_registers!(self, step, |a, b| a * b),
+            Kind::Div => to_registers!(self, step, |a, b| a / b),
+            Kind::Pow => to_registers!(self, step, |a, b| a.pow(b)),
+            Kind::Atan2 => to_registers!(self, step, |a, b| a.atan2(b)),
             // What is not a number spreads instead of vanishing.
-            Kind::Min => self.binary(step, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
-            Kind::Max => self.binary(step, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
-            Kind::Less => self.binary(step, |a, b| a.if_less(b, a.like(1.0), a.like(0.0))),
-            Kind::Where => self.ternary(step, |a, b, c| c.like(0.0).if_less(c, a, b)),
-            Kind::MulAdd => self.ternary(step, V::mul_add),
-            Kind::MulSub => self.ternary(step, |a, b, c| a.mul_add(b, -c)),
-            Kind::SubMul => self.ternary(step, |a, b, c| (-a).mul_add(b, c)),
+            Kind::Min => to_registers!(self, step, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
+            Kind::Max => to_registers!(self, step, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
+            Kind::Less => {
+                to_registers!(self, step, |a, b| a.if_less(b, a.like(1.0), a.like(0.0)));
+            }
+            Kind::Where => to_registers!(self, step, |a, b, c| c.like(0.0).if_less(c, a, b)),
+            Kind::MulAdd => to_registers!(self, step, |a, b, c| a.mul_add(b, c)),
+            Kind::MulSub => to_registers!(self, step, |a, b, c| a.mul_add(b, -c)),
+            Kind::SubMul => to_registers!(self, step, |a, b, c| (-a).mul_add(b, c)),
         }
-    }
-
-    #[inline(always)]
-    fn unary(&mut self, step: &Step, function: impl Fn(Vector<S, T>) -> Vector<S, T>) {
-        for part in 0..Self::parts() {
-            let value = function(self.get(step.a, part));
-            self.set(step.to, part, value);
-        }
-    }
-
-    #[inline(always)]
-    fn binary(
-        &mut self,
-        step: &Step,
-        function: impl Fn(Vector<S, T>, Vector<S, T>) -> Vector<S, T>,
-    ) {
-        for part in 0..Self::parts() {
-            let value = function(self.get(step.a, part), self.get(step.b, part));
-            self.set(step.to, part, value);
-        }
-    }
-
-    #[inline(always)]
-    fn ternary(
-        &mut self,
-        step: &Step,
-        function: impl Fn(Vector<S, T>, Vector<S, T>, Vector<S, T>) -> Vector<S, T>,
-    ) {
-        for part in 0..Self::parts() {
-            let [a, b, c] = [step.a, step.b, step.c].map(|place| self.get(place, part));
-            self.set(step.to, part, function(a, b, c));
-        }
-    }
-
-    #[inline(always)]
-    fn sin_cos(&mut self, step: &Step) {
-        for part in 0..Self::parts() {
-            let (sine, cosine) = self.get(step.a, part).sin_cos();
-            self.set(step.to, part, sine);
-            self.set(step.b, part, cosine);
-        }
-    }
-
-    /// Registers of one value.
-    #[inline(always)]
-    fn parts() -> usize {
-        W / T::lanes::<S>()
     }
 
     #[inline(always)]
     fn get(&self, place: u32, part: usize) -> Vector<S, T> {
-        let registers = T::registers::<S>(&self.rows[place as usize].0);
-        Vector::new(self.simd, registers[part])
+        self.rows[place as usize].get(self.simd, part)
     }
 
     #[inline(always)]
     fn set(&mut self, place: u32, part: usize, value: Vector<S, T>) {
-        let registers = T::registers_mut::<S>(&mut self.rows[place as usize].0);
-        registers[part] = value.register;
+        self.rows[place as usize].set(part, value);
     }
-}
-
-/// -1, 0 or 1.
-#[inline(always)]
-fn sign<S: Simd, T: Element>(a: Vector<S, T>) -> Vector<S, T> {
-    let zero = a.like(0.0);
-    let not_positive = a.if_less(zero, a.like(-1.0), a * zero);
-    zero.if_less(a, a.like(1.0), not_positive)
 }
 
 #[cfg(test)]

@@ -140,9 +140,10 @@ impl<S: Simd, T: Element> Vector<S, T> {
         let rounder = self.like(T::ROUNDER);
         let turns = self.mul_add(self.like(std::f64::consts::FRAC_2_PI), rounder);
         let count = -(turns - rounder);
-        let [first, second, third] = T::QUARTER_TURN.map(|part| self.like(part));
-        let most = count.mul_add(second, count.mul_add(first, self));
-        let angle = count.mul_add(third, most);
+        let [first, second, third] = T::QUARTER_TURN;
+        let most = count.mul_add(self.like(first), self);
+        let rest = count.mul_add(self.like(second), most);
+        let angle = count.mul_add(self.like(third), rest);
         let square = angle * angle;
         let odd = (angle * square).mul_add(square.polynomial(T::SINE), angle);
         // The halves of the cosine first: what is rounded off is small.
@@ -165,7 +166,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         if S::IS_SCALAR {
             return self.each(T::exp);
         }
-        let [low, high] = T::EXPONENTS.map(|limit| self.like(limit));
+        let (low, high) = (self.like(T::EXPONENTS[0]), self.like(T::EXPONENTS[1]));
         let inside = self.if_less(low, low, high.if_less(self, high, self));
         let (power, factor) = inside.split_exp();
         // In two parts, as the power alone may be no number where the result is one.
@@ -209,13 +210,22 @@ impl<S: Simd, T: Element> Vector<S, T> {
         self.each_with(x, T::atan2)
     }
 
+    /// -1, 0 or 1.
+    #[inline(always)]
+    pub fn sign(self) -> Self {
+        let zero = self.like(0.0);
+        let not_positive = self.if_less(zero, self.like(-1.0), self * zero);
+        zero.if_less(self, self.like(1.0), not_positive)
+    }
+
     /// Whole k and f so that exp(self) = 2^k f.
     #[inline(always)]
     fn split_exp(self) -> (Self, Self) {
         let rounder = self.like(T::ROUNDER);
         let power = self.mul_add(self.like(std::f64::consts::LOG2_E), rounder) - rounder;
-        let [most, rest] = T::LN_2.map(|part| -self.like(part));
-        let left = power.mul_add(rest, power.mul_add(most, self));
+        let [first, second] = T::LN_2;
+        let most = power.mul_add(self.like(-first), self);
+        let left = power.mul_add(self.like(-second), most);
         let curved = (left * left).mul_add(left.polynomial(T::EXPONENTIAL), left);
         (power, curved + self.like(1.0))
     }
