@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use residyn::data::Log;
 use residyn::expr::{Graph, Program, SignForm};
+use residyn::lanes::Row;
 use residyn::model::{
     Commands, Dynamics, Effect, Entry, FittedEffect, Library, Rollout, Sensors, StepTorque, System,
 };
@@ -138,7 +139,9 @@ pub fn in_f32(program: &Program, points: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut found = Vec::new();
     for points in points.chunks(16) {
         for (k, slot) in tape.inputs().iter_mut().enumerate() {
-            *slot = std::array::from_fn(|lane| points[lane.min(points.len() - 1)][k] as f32);
+            *slot = Row(std::array::from_fn(|lane| {
+                points[lane.min(points.len() - 1)][k] as f32
+            }));
         }
         tape.run();
         found.extend((0..points.len()).map(|lane| {
@@ -215,18 +218,18 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
     let commands = Commands::new(model, &model.values(), &time, &tau);
     let mut rollout = Rollout::<f64, 1>::new(model, &model.values());
     let mut sensors = Sensors::<1>::new(model, &model.values());
-    let mut state: Vec<[f64; 1]> = start.iter().map(|x| [*x]).collect();
+    let mut state: Vec<Row<f64, 1>> = start.iter().map(|x| Row([*x])).collect();
     for row in 0..=rows {
         let time = log.time[row];
         let before = || Commands::just_before([&commands], [row]);
-        let shown = sensors.show(&state, before, [time]);
+        let shown = sensors.show(&state, before, Row([time]));
         for j in 0..n {
             log.q[j].push(shown[j][0]);
             log.qd[j].push(state[n + j][0]);
         }
-        let held: Vec<[f64; 1]> = log.tau.iter().map(|tau| [tau[row]]).collect();
-        let torque = StepTorque::new([&commands], &held, [time], [time + 0.01], 20);
-        rollout.advance(&mut state, &torque.mean, [time], [0.01], 20);
+        let held: Vec<Row<f64, 1>> = log.tau.iter().map(|tau| Row([tau[row]])).collect();
+        let torque = StepTorque::new([&commands], &held, Row([time]), Row([time + 0.01]), 20);
+        rollout.advance(&mut state, &torque.mean, Row([time]), Row([0.01]), 20);
     }
     log
 }

@@ -3,6 +3,7 @@
 use residyn::data::Log;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit, uncertainty};
+use residyn::lanes::Row;
 use residyn::model::{
     Commands, Dynamics, FittedEffect, Library, Sensors, StepTorque, with_own_angles,
 };
@@ -41,8 +42,14 @@ fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f
     let (time, tau) = history();
     let tau = [tau];
     let commands = Commands::new(model, &model.values(), &time, &tau);
-    let torque = StepTorque::new([&commands], &[[f64::NAN]], [from], [to], parts);
-    let first = |lanes: Vec<[f64; 1]>| lanes.into_iter().map(|lane| lane[0]).collect();
+    let torque = StepTorque::new(
+        [&commands],
+        &[Row([f64::NAN])],
+        Row([from]),
+        Row([to]),
+        parts,
+    );
+    let first = |lanes: Vec<Row<f64, 1>>| lanes.into_iter().map(|lane| lane[0]).collect();
     (first(torque.mean), first(torque.slopes))
 }
 
@@ -342,11 +349,11 @@ fn play_parts_the_sensor_from_the_link() {
     ] {
         let model = pendulum(&[backlash(0.02, driven)]);
         let mut sensors = Sensors::<1>::new(&model, &model.values());
-        let mut state = [[0.7], [v]];
-        let shown = sensors.show(&state, || vec![[tau]], [0.0])[0][0];
+        let mut state = [Row([0.7]), Row([v])];
+        let shown = sensors.show(&state, || vec![Row([tau])], Row([0.0]))[0][0];
         assert_near(shown, 0.7 + ahead, 1e-12, "angle shown");
         state[0][0] = shown;
-        sensors.correct(&mut state, || vec![[tau]], [0.0]);
+        sensors.correct(&mut state, || vec![Row([tau])], Row([0.0]));
         assert_near(state[0][0], 0.7, 1e-12, "angle of the link");
         // The link itself moves as without play.
         let inputs = [&[0.7, v, tau, 0.0], model.values().as_slice()].concat();

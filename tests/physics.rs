@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use residyn::expr::{Program, SignForm};
+use residyn::lanes::Row;
 use residyn::model::{Dynamics, Rollout, System};
 
 use crate::common::{all_systems, dynamics, points, system};
@@ -22,7 +23,7 @@ impl Balanced {
         }
     }
 
-    fn energy(&self, state: &[[f64; 1]], tau: &[[f64; 1]]) -> [f64; 2] {
+    fn energy(&self, state: &[Row<f64, 1>], tau: &[Row<f64, 1>]) -> [f64; 2] {
         let moving = state.iter().chain(tau).map(|value| value[0]);
         let inputs: Vec<f64> = moving.chain([0.0]).chain(self.model.values()).collect();
         let found = self.energy.eval(&inputs);
@@ -68,27 +69,27 @@ fn imbalance(system: &System) -> f64 {
     let balanced = Balanced::new(system);
     let n = system.joints;
     let mut rollout = Rollout::<f64, 1>::new(&balanced.model, &balanced.model.values());
-    let mut state: Vec<[f64; 1]> = vec![[0.3]; n];
-    state.extend(vec![[0.0]; n]);
+    let mut state = vec![Row([0.3]); n];
+    state.extend(vec![Row([0.0]); n]);
     let h = HOLD_S / STEPS as f64;
-    let start = balanced.energy(&state, &vec![[0.0]; n])[0];
+    let start = balanced.energy(&state, &vec![Row([0.0]); n])[0];
     let mut work = 0.0;
     for hold in 0..250 {
         let time = HOLD_S * f64::from(hold);
-        let tau: Vec<[f64; 1]> = (0..n)
-            .map(|j| [3.0 * (2.0 * time + 1.5 * j as f64).sin()])
+        let tau: Vec<Row<f64, 1>> = (0..n)
+            .map(|j| Row([3.0 * (2.0 * time + 1.5 * j as f64).sin()]))
             .collect();
         for _ in 0..STEPS {
             // Simpson's rule on both ends and the middle: of order 4 like the motion.
             let before = balanced.energy(&state, &tau)[1];
-            rollout.advance(&mut state, &tau, [time], [h / 2.0], 1);
+            rollout.advance(&mut state, &tau, Row([time]), Row([h / 2.0]), 1);
             let middle = balanced.energy(&state, &tau)[1];
-            rollout.advance(&mut state, &tau, [time], [h / 2.0], 1);
+            rollout.advance(&mut state, &tau, Row([time]), Row([h / 2.0]), 1);
             let after = balanced.energy(&state, &tau)[1];
             work += h / 6.0 * (before + 4.0 * middle + after);
         }
     }
-    balanced.energy(&state, &vec![[0.0]; n])[0] - start - work
+    balanced.energy(&state, &vec![Row([0.0]); n])[0] - start - work
 }
 
 #[test]
@@ -114,8 +115,8 @@ fn the_acrobot_as_printed_makes_energy_from_nothing() {
 fn swung(steps: usize) -> [f64; 2] {
     let model = dynamics(&system("pendulum"), &[], SignForm::Exact);
     let mut rollout = Rollout::<f64, 1>::new(&model, &model.values());
-    let mut state = [[1.0], [0.5]];
-    rollout.advance(&mut state, &[[0.7]], [0.0], [1.0], steps);
+    let mut state = [Row([1.0]), Row([0.5])];
+    rollout.advance(&mut state, &[Row([0.7])], Row([0.0]), Row([1.0]), steps);
     state.map(|value| value[0])
 }
 
@@ -146,17 +147,31 @@ fn lanes_with_steps_of_their_own_do_not_disturb_each_other() {
         |l: usize| [1.0 - l as f64, 0.5 * l as f64],
         |l: usize| 0.01 * l as f64,
     );
-    let mut together: Vec<[f64; 4]> = (0..4)
-        .map(|k| std::array::from_fn(|l| lane(l)[k]))
+    let mut together: Vec<Row<f64, 4>> = (0..4)
+        .map(|k| Row(std::array::from_fn(|l| lane(l)[k])))
         .collect();
-    let taus: Vec<[f64; 4]> = (0..2).map(|j| std::array::from_fn(|l| tau(l)[j])).collect();
+    let taus: Vec<Row<f64, 4>> = (0..2)
+        .map(|j| Row(std::array::from_fn(|l| tau(l)[j])))
+        .collect();
     let mut rollout = Rollout::<f64, 4>::new(&model, &values);
-    rollout.advance(&mut together, &taus, [0.0; 4], std::array::from_fn(dt), 3);
+    rollout.advance(
+        &mut together,
+        &taus,
+        Row([0.0; 4]),
+        Row(std::array::from_fn(dt)),
+        3,
+    );
     for l in 0..4 {
-        let mut alone = lane(l).map(|x| [x]);
+        let mut alone = lane(l).map(|x| Row([x]));
         let mut rollout = Rollout::<f64, 1>::new(&model, &values);
-        rollout.advance(&mut alone, &tau(l).map(|x| [x]), [0.0], [dt(l)], 3);
-        let found: Vec<[f64; 1]> = together.iter().map(|lanes| [lanes[l]]).collect();
+        rollout.advance(
+            &mut alone,
+            &tau(l).map(|x| Row([x])),
+            Row([0.0]),
+            Row([dt(l)]),
+            3,
+        );
+        let found: Vec<Row<f64, 1>> = together.iter().map(|lanes| Row([lanes[l]])).collect();
         assert_eq!(found, alone);
     }
 }
@@ -167,10 +182,10 @@ fn the_rollout_tells_the_equations_the_time() {
     let text = "[system]\nname = \"clock\"\njoints = 1\n[dynamics]\nqdd1 = \"t\"\n";
     let clock = System::from_text(Path::new("clock.toml"), text, &[]).unwrap();
     let model = dynamics(&clock, &[], SignForm::Exact);
-    let mut state = [[0.0], [0.0]];
+    let mut state = [Row([0.0]), Row([0.0])];
     let mut rollout = Rollout::<f64, 1>::new(&model, &[]);
-    rollout.advance(&mut state, &[[0.0]], [0.0], [1.5], 3);
-    rollout.advance(&mut state, &[[0.0]], [1.5], [0.5], 1);
+    rollout.advance(&mut state, &[Row([0.0])], Row([0.0]), Row([1.5]), 3);
+    rollout.advance(&mut state, &[Row([0.0])], Row([1.5]), Row([0.5]), 1);
     assert!((state[0][0] - 8.0 / 6.0).abs() < 1e-14);
     assert!((state[1][0] - 2.0).abs() < 1e-14);
 }

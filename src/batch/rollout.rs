@@ -121,7 +121,7 @@ impl Rollouts {
         let first = 4 * self.joints + 1;
         let mut tape = self.program.tape_with_held(first);
         for (slot, value) in tape.inputs()[first..].iter_mut().zip(&self.parameters) {
-            *slot = [*value; W].into();
+            *slot = Rows::splat(*value);
         }
         let states = || vec![Rows::splat(0.0); 2 * self.joints];
         let rows = |count: usize| vec![Rows::splat(0.0); count];

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Rollouts, Rows, W};
 use crate::expr::SignForm;
+use crate::lanes::Row;
 use crate::model::{
     Angles, Dynamics, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
     ResidualOn, with_residual,
@@ -43,7 +44,7 @@ fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -
     let rollouts = Rollouts::new(equations, networks, objective.program(), integrator, STEP_S);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let inputs: Vec<Rows> = (0..STEPS * n)
-        .map(|_| Rows::from(std::array::from_fn(|_| rng.random_range(-3.0..3.0))))
+        .map(|_| Row(std::array::from_fn(|_| rng.random_range(-3.0..3.0))))
         .collect();
     let start: Vec<f32> = (0..2 * n).map(|k| 0.4 - 0.3 * k as f32).collect();
     let mut returns = Rows::splat(f32::NAN);

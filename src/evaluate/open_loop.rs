@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
-use crate::lanes::Row;
 use crate::identify::{Window, initial_state};
+use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
 
 /// Squared errors of one window.
@@ -214,8 +214,9 @@ fn roll(
         let time = Row(at.map(|row| log.time[row]));
         let end = Row(at.map(|row| log.time[row + 1]));
         let dt = Row(std::array::from_fn(|lane| end[lane] - time[lane]));
-        let tau: Vec<Row<f64, LANES>> =
-            (log.tau.iter()).map(|tau| Row(at.map(|row| tau[row]))).collect();
+        let tau: Vec<Row<f64, LANES>> = (log.tau.iter())
+            .map(|tau| Row(at.map(|row| tau[row])))
+            .collect();
         let longest = dt.iter().fold(0.0_f64, |a: f64, b: &f64| a.max(*b));
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // a small positive number

@@ -1,6 +1,6 @@
 use crate::data::{Log, half_width_s};
-use crate::lanes::Row;
 use crate::identify::{Window, initial_state};
+use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).

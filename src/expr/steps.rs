@@ -108,8 +108,12 @@ impl<'o> Writer<'o> {
             });
             match op {
                 Op::Binary(Binary::Div, _, by) => divides[by.index()] += 1,
-                Op::Unary(Unary::Sin, angle) => waves.entry(angle.0).or_insert([None; 2])[0] = Some(place),
-                Op::Unary(Unary::Cos, angle) => waves.entry(angle.0).or_insert([None; 2])[1] = Some(place),
+                Op::Unary(Unary::Sin, angle) => {
+                    waves.entry(angle.0).or_insert([None; 2])[0] = Some(place)
+                }
+                Op::Unary(Unary::Cos, angle) => {
+                    waves.entry(angle.0).or_insert([None; 2])[1] = Some(place)
+                }
                 _ => {}
             }
         }
@@ -164,7 +168,9 @@ impl<'o> Writer<'o> {
                 step.expect("it was pushed just now").to = number(sine);
             }
             [Some(_), Some(_)] => {}
-            _ if matches!(op, Op::Unary(Unary::Sin, _)) => self.push(place, Kind::Sin, [angle, 0, 0]),
+            _ if matches!(op, Op::Unary(Unary::Sin, _)) => {
+                self.push(place, Kind::Sin, [angle, 0, 0])
+            }
             _ => self.push(place, Kind::Cos, [angle, 0, 0]),
         }
     }

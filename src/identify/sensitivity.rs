@@ -1,5 +1,5 @@
-use crate::expr::{Graph, Program, Tape};
-use crate::lanes::Row;
+use crate::expr::{Graph, Node, Program, Tape};
+use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::{Dynamics, StepTorque};
 
 /// Lanes of the identification: one AVX-512 register, two AVX2 registers of f64.
@@ -17,15 +17,17 @@ pub enum Local {
 
 /// The program of a model's accelerations with their derivatives by states, shared parameters and forces.
 ///
-/// Outputs: accelerations (n), then for each joint a row of derivatives by `q`, `qd`, active
-/// parameters and, if they are free, forces. The identification is for physics: dq/dt = qd. Further inputs
-/// behind the model's own are the derivatives of the torques by the parameters of the model's filters.
+/// Outputs: accelerations (n), for each joint their derivatives by `q` and `qd`, then for each active parameter and,
+/// if they are free, each force their derivatives by it. The identification is for physics: dq/dt = qd. Inputs are the
+/// model's; before its parameters stand the derivatives of the torques by the parameters of its filters.
 pub(super) struct Tangent {
     pub program: Program,
     /// Where sensors show other angles than the rig's own: those (n), then for each joint their derivatives by `q`
     /// and `qd`, then for each joint those by active parameters. The inputs are the model's.
     pub reading: Option<Program>,
     pub joints: usize,
+    /// Number of the model's filters.
+    filters: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
     pub local: Local,
@@ -35,12 +37,12 @@ impl Tangent {
     pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
         let n = dynamics.joints;
         let mut graph = Graph::new();
-        let inputs: Vec<_> = dynamics
-            .program
-            .inputs()
-            .iter()
-            .map(|name| graph.input(name))
-            .collect();
+        let (moving, held) = dynamics.program.inputs().split_at(3 * n + 1);
+        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
+        let slopes = (dynamics.filters.iter())
+            .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
+            .collect::<Vec<_>>();
+        inputs.extend(held.iter().map(|name| graph.input(name)));
         let outputs = graph.append(&dynamics.program, &inputs);
         let accelerations = &outputs[n..];
         let mut wrt = inputs[..2 * n].to_vec();
@@ -49,8 +51,7 @@ impl Tangent {
             wrt.extend(&inputs[2 * n..3 * n]);
         }
         let mut jacobian = graph.jacobian(accelerations, &wrt);
-        for filter in &dynamics.filters {
-            let slope = graph.input(&format!("slope of {}", filter.parameter));
+        for (filter, slope) in dynamics.filters.iter().zip(slopes) {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
                 continue;
             };
@@ -59,15 +60,16 @@ impl Tangent {
                 row[2 * n + column] = graph.mul(by_torque[0], slope);
             }
         }
-        let all: Vec<_> = accelerations
-            .iter()
+        let by_states = jacobian.iter().flat_map(|row| &row[..2 * n]);
+        let others = (2 * n..wrt.len()).flat_map(|k| jacobian.iter().map(move |row| &row[k]));
+        let all: Vec<Node> = (accelerations.iter().chain(by_states).chain(others))
             .copied()
-            .chain(jacobian.into_iter().flatten())
             .collect();
         Self {
             program: graph.finish(&all),
             reading: reading(dynamics, active),
             joints: n,
+            filters: dynamics.filters.len(),
             active: active.to_vec(),
             local,
         }
@@ -76,6 +78,24 @@ impl Tangent {
     /// Columns of the sensitivities: shared parameters, then what is local to a window.
     pub fn columns(&self) -> usize {
         self.active.len() + self.locals()
+    }
+
+    /// The output that holds the direct derivatives by a column's value, where there are any; the first column is
+    /// the state itself, whose slopes are the accelerations.
+    #[inline(always)]
+    fn direct(&self, column: usize) -> Option<usize> {
+        let (n, shared) = (self.joints, self.active.len());
+        let others = n + 2 * n * n;
+        match column.checked_sub(1) {
+            None => Some(0),
+            Some(parameter) if parameter < shared => Some(others + n * parameter),
+            Some(state) if state < shared + 2 * n => None,
+            Some(force) => Some(others + n * (force - 2 * n)),
+        }
+    }
+
+    fn first_parameter(&self) -> usize {
+        3 * self.joints + 1 + self.filters
     }
 
     /// Free values of one window.
@@ -106,56 +126,60 @@ fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
 pub(super) struct Flow<'t> {
     tangent: &'t Tangent,
     tape: Tape<'t, f64, LANES>,
-    /// `[row]` of states, then `[row * columns + column]` of sensitivities.
-    pub now: Vec<Lane>,
+    /// States, then for each column their sensitivities: 2n rows each.
+    now: Vec<Lane>,
     inner: Vec<Lane>,
-    slope: Vec<Lane>,
+    next: Vec<Lane>,
     sum: Vec<Lane>,
+    /// Derivatives of the accelerations by states, `[joint * 2n + state]`.
+    by_state: Vec<Lane>,
     reading: Option<Tape<'t, f64, LANES>>,
-    /// Angles shown, then their sensitivities, laid out as in `now`.
+    /// Angles shown, then `[joint * columns + column]` their sensitivities.
     shown: Vec<Lane>,
 }
 
-/// The classical Runge-Kutta method: time of the stage, reach of the next stage, weight in the sum.
+/// The classical Runge-Kutta method: time of the stage, weight in the sum, reach of the next stage.
 const STAGES: [(f64, f64, f64); 4] = [
-    (0.0, 0.5, 1.0 / 6.0),
-    (0.5, 0.5, 1.0 / 3.0),
-    (0.5, 1.0, 1.0 / 3.0),
-    (1.0, 0.0, 1.0 / 6.0),
+    (0.0, 1.0 / 6.0, 0.5),
+    (0.5, 1.0 / 3.0, 0.5),
+    (0.5, 1.0 / 3.0, 1.0),
+    (1.0, 1.0 / 6.0, 0.0),
 ];
 
 impl<'t> Flow<'t> {
     pub fn new(tangent: &'t Tangent, values: &[f64]) -> Self {
         let n = tangent.joints;
-        let mut tape = tangent.program.tape();
-        for (slot, value) in tape.inputs()[3 * n + 1..].iter_mut().zip(values) {
+        let first = tangent.first_parameter();
+        let mut tape = tangent.program.tape_with_held(first);
+        for (slot, value) in tape.inputs()[first..].iter_mut().zip(values) {
             *slot = Row::splat(*value);
         }
-        let mut reading = tangent.reading.as_ref().map(Program::tape);
+        let mut reading = tangent.reading.as_ref().map(|reading| reading.tape_with_held(3 * n + 1));
         if let Some(reading) = &mut reading {
             for (slot, value) in reading.inputs()[3 * n + 1..].iter_mut().zip(values) {
                 *slot = Row::splat(*value);
             }
         }
+        let rows = |count: usize| vec![Row::splat(0.0); count];
         let size = 2 * n * (1 + tangent.columns());
         Self {
             tangent,
             tape,
-            now: vec![Row::splat(0.0); size],
-            inner: vec![Row::splat(0.0); size],
-            slope: vec![Row::splat(0.0); size],
-            sum: vec![Row::splat(0.0); size],
+            now: rows(size),
+            inner: rows(size),
+            next: rows(size),
+            sum: rows(size),
+            by_state: rows(2 * n * n),
             reading,
-            shown: vec![Row::splat(0.0); size / 2],
+            shown: rows(size / 2),
         }
     }
 
     /// Let a parameter have another value in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
-        let first = 3 * self.tangent.joints + 1;
-        self.tape.inputs()[first + parameter][lane] = value;
+        self.tape.inputs()[self.tangent.first_parameter() + parameter][lane] = value;
         if let Some(reading) = &mut self.reading {
-            reading.inputs()[first + parameter][lane] = value;
+            reading.inputs()[3 * self.tangent.joints + 1 + parameter][lane] = value;
         }
     }
 
@@ -163,127 +187,158 @@ impl<'t> Flow<'t> {
     /// until now was `tau`.
     pub fn shown(&mut self, tau: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
         let (n, columns) = (self.tangent.joints, self.tangent.columns());
+        let (state, sensitivities) = self.now.split_at(2 * n);
+        let (angles, slopes) = self.shown.split_at_mut(n);
         let Some(reading) = &mut self.reading else {
-            return (&self.now[..n], &self.now[2 * n..][..n * columns]);
+            angles.copy_from_slice(&state[..n]);
+            for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
+                for (slope, column) in slopes.iter_mut().zip(sensitivities.chunks_exact(2 * n)) {
+                    *slope = column[joint];
+                }
+            }
+            return (angles, slopes);
         };
-        let inputs = reading.inputs();
-        inputs[..2 * n].copy_from_slice(&self.now[..2 * n]);
+        let inputs = reading.moving();
+        inputs[..2 * n].copy_from_slice(state);
         inputs[2 * n..3 * n].copy_from_slice(&tau());
         inputs[3 * n] = time;
         reading.run();
         let shared = self.tangent.active.len();
-        for joint in 0..n {
-            self.shown[joint] = *reading.output(joint);
-            for column in 0..columns {
+        for (joint, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
+            angles[joint] = *reading.output(joint);
+            for (column, slope) in slopes.iter_mut().enumerate() {
                 let direct = n + 2 * n * n + joint * shared + column;
-                let mut sum = if column < shared {
+                *slope = if column < shared {
                     *reading.output(direct)
                 } else {
                     Row::splat(0.0)
                 };
-                for state in 0..2 * n {
-                    let slope = reading.output(n + joint * 2 * n + state);
-                    let own = &self.now[2 * n + state * columns + column];
+                for (state, own) in sensitivities[2 * n * column..][..2 * n].iter().enumerate() {
+                    let by_state = reading.output(n + joint * 2 * n + state);
                     for lane in 0..LANES {
-                        sum[lane] += slope[lane] * own[lane];
+                        slope[lane] += by_state[lane] * own[lane];
                     }
                 }
-                self.shown[n + joint * columns + column] = sum;
             }
         }
-        self.shown.split_at(n)
+        (angles, slopes)
     }
 
     /// Start at these states; only the columns of the initial state are sensitive to them.
     pub fn start(&mut self, states: &[Lane]) {
-        let (n, columns) = (self.tangent.joints, self.tangent.columns());
+        let (n, shared) = (self.tangent.joints, self.tangent.active.len());
         self.now.fill(Row::splat(0.0));
         self.now[..2 * n].copy_from_slice(&states[..2 * n]);
         for row in 0..2 * n {
-            self.now[2 * n + row * columns + self.tangent.active.len() + row] = Row::splat(1.0);
+            self.now[2 * n * (1 + shared + row) + row] = Row::splat(1.0);
         }
     }
 
     /// As [`Rollout::advance`](crate::model::Rollout::advance), with the torque's derivatives by the parameters
     /// of filters.
     pub fn advance(&mut self, torque: &StepTorque<LANES>, time: Lane, dt: Lane, substeps: usize) {
-        let n = self.tangent.joints;
-        #[allow(clippy::cast_precision_loss)] // few substeps
-        let h = Row(dt.map(|dt| dt / substeps as f64));
-        let mut now = time;
-        for part in 0..substeps {
-            let (tau, slopes) = torque.part(n, part);
-            let inputs = self.tape.inputs();
-            inputs[2 * n..3 * n].copy_from_slice(tau);
-            let own = inputs.len() - slopes.len();
-            inputs[own..].copy_from_slice(slopes);
-            self.step(now, h);
-            now = Row(std::array::from_fn(|lane| now[lane] + h[lane]));
-        }
+        Lane::dispatch(Advance {
+            flow: self,
+            torque,
+            time,
+            dt,
+            substeps,
+        });
     }
 
-    fn step(&mut self, time: Lane, h: Lane) {
-        self.inner.copy_from_slice(&self.now);
-        self.sum.copy_from_slice(&self.now);
-        for (part, reach, weight) in STAGES {
-            let stage_time = Row(std::array::from_fn(|lane| time[lane] + part * h[lane]));
-            self.derivative(stage_time);
-            for (((sum, inner), slope), now) in self
-                .sum
-                .iter_mut()
-                .zip(&mut self.inner)
-                .zip(&self.slope)
-                .zip(&self.now)
-            {
-                for lane in 0..LANES {
-                    sum[lane] += weight * h[lane] * slope[lane];
-                    inner[lane] = now[lane] + reach * h[lane] * slope[lane];
-                }
+    #[inline(always)]
+    fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
+        let n = self.tangent.joints;
+        for (k, stage) in STAGES.into_iter().enumerate() {
+            let inner = if k == 0 { &self.now } else { &self.inner };
+            let inputs = self.tape.moving();
+            inputs[..2 * n].copy_from_slice(&inner[..2 * n]);
+            for part in 0..Lane::parts::<S>() {
+                let h = h.get(simd, part);
+                inputs[3 * n].set(part, h.mul_add(h.like(stage.0), time.get(simd, part)));
             }
+            self.tape.run_on(simd);
+            for (k, slope) in self.by_state.iter_mut().enumerate() {
+                *slope = *self.tape.output(n + k);
+            }
+            for part in 0..Lane::parts::<S>() {
+                self.stage(simd, part, h, k == 0, stage);
+            }
+            std::mem::swap(&mut self.inner, &mut self.next);
         }
         std::mem::swap(&mut self.now, &mut self.sum);
     }
 
-    fn derivative(&mut self, time: Lane) {
+    /// Add a stage's slopes to the sums, and find where they lead to.
+    #[inline(always)]
+    fn stage<S: Simd>(
+        &mut self,
+        simd: S,
+        part: usize,
+        h: &Lane,
+        is_first: bool,
+        (_, weight, reach): (f64, f64, f64),
+    ) {
         let n = self.tangent.joints;
-        let inputs = self.tape.inputs();
-        inputs[..2 * n].copy_from_slice(&self.inner[..2 * n]);
-        inputs[3 * n] = time;
-        self.tape.run();
-        let (positions, velocities) = (0..n, n..2 * n);
-        for row in positions {
-            self.slope[row] = self.inner[n + row];
-        }
-        for row in velocities {
-            self.slope[row] = *self.tape.output(row - n);
-        }
-        self.sensitivity_slopes();
-    }
-
-    fn sensitivity_slopes(&mut self) {
-        let (n, columns) = (self.tangent.joints, self.tangent.columns());
-        let shared = self.tangent.active.len();
-        let inner = &self.inner[2 * n..];
-        let (angles, velocities) = self.slope[2 * n..].split_at_mut(n * columns);
-        angles.copy_from_slice(&inner[n * columns..]);
-        for joint in 0..n {
-            // A row of derivatives: 2n states, then parameters, then forces; as many as there are columns.
-            let row = n + joint * columns;
-            for column in 0..columns {
-                let direct = match column {
-                    parameter if parameter < shared => Some(2 * n + parameter),
-                    force if force >= shared + 2 * n => Some(force),
-                    _ => None,
-                };
-                let mut out = direct.map_or(Row::splat(0.0), |at| *self.tape.output(row + at));
-                for state in 0..2 * n {
-                    let slope = self.tape.output(row + state);
-                    let inner = &inner[state * columns + column];
-                    for lane in 0..LANES {
-                        out[lane] += slope[lane] * inner[lane];
+        let h = h.get(simd, part);
+        let (weighed, reached) = (h * h.like(weight), h * h.like(reach));
+        let inner = if is_first { &self.now } else { &self.inner };
+        for column in 0..=self.tangent.columns() {
+            let rows = 2 * n * column..2 * n * (column + 1);
+            let (now, inner) = (&self.now[rows.clone()], &inner[rows.clone()]);
+            let (next, sum) = (&mut self.next[rows.clone()], &mut self.sum[rows]);
+            let direct = self.tangent.direct(column);
+            for row in 0..2 * n {
+                let slope = match row.checked_sub(n) {
+                    None => inner[n + row].get(simd, part),
+                    Some(joint) => {
+                        let mut slope = match direct {
+                            Some(first) => self.tape.output(first + joint).get(simd, part),
+                            None => h.like(0.0),
+                        };
+                        if column > 0 {
+                            let by_state = &self.by_state[joint * 2 * n..][..2 * n];
+                            for (by_state, inner) in by_state.iter().zip(inner) {
+                                let by_state = by_state.get(simd, part);
+                                slope = by_state.mul_add(inner.get(simd, part), slope);
+                            }
+                        }
+                        slope
                     }
-                }
-                velocities[joint * columns + column] = out;
+                };
+                let now = now[row].get(simd, part);
+                let before = if is_first { now } else { sum[row].get(simd, part) };
+                sum[row].set(part, slope.mul_add(weighed, before));
+                next[row].set(part, slope.mul_add(reached, now));
+            }
+        }
+    }
+}
+
+struct Advance<'a, 't> {
+    flow: &'a mut Flow<'t>,
+    torque: &'a StepTorque<LANES>,
+    time: Lane,
+    dt: Lane,
+    substeps: usize,
+}
+
+impl WithSimd for Advance<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let n = self.flow.tangent.joints;
+        #[allow(clippy::cast_precision_loss)] // few substeps
+        let h = Row(self.dt.map(|dt| dt / self.substeps as f64));
+        for part in 0..self.substeps {
+            let (tau, slopes) = self.torque.part(n, part);
+            let inputs = self.flow.tape.moving();
+            inputs[2 * n..3 * n].copy_from_slice(tau);
+            inputs[3 * n + 1..].copy_from_slice(slopes);
+            self.flow.step(simd, &self.time, &h);
+            for lane in 0..LANES {
+                self.time[lane] += h[lane];
             }
         }
     }

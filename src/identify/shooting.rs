@@ -345,8 +345,9 @@ impl Pack {
             let (angles, slopes) = flow.shown(before, self.time[row]);
             for j in 0..n {
                 let weight = Row(self.weight[row][j].map(|w| w / scale));
-                let residual =
-                    Row(std::array::from_fn(|l| (angles[j][l] - self.q[row][j][l]) * weight[l]));
+                let residual = Row(std::array::from_fn(|l| {
+                    (angles[j][l] - self.q[row][j][l]) * weight[l]
+                }));
                 sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
             let torque = self.torque(commands, row, &states[2 * n..]);

@@ -140,9 +140,10 @@ impl<S: Simd, T: Element> Vector<S, T> {
         let rounder = self.like(T::ROUNDER);
         let turns = self.mul_add(self.like(std::f64::consts::FRAC_2_PI), rounder);
         let count = -(turns - rounder);
-        let [first, second, third] = T::QUARTER_TURN.map(|part| self.like(part));
-        let most = count.mul_add(second, count.mul_add(first, self));
-        let angle = count.mul_add(third, most);
+        let [first, second, third] = T::QUARTER_TURN;
+        let most = count.mul_add(self.like(first), self);
+        let rest = count.mul_add(self.like(second), most);
+        let angle = count.mul_add(self.like(third), rest);
         let square = angle * angle;
         let odd = (angle * square).mul_add(square.polynomial(T::SINE), angle);
         // The halves of the cosine first: what is rounded off is small.
@@ -165,7 +166,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         if S::IS_SCALAR {
             return self.each(T::exp);
         }
-        let [low, high] = T::EXPONENTS.map(|limit| self.like(limit));
+        let (low, high) = (self.like(T::EXPONENTS[0]), self.like(T::EXPONENTS[1]));
         let inside = self.if_less(low, low, high.if_less(self, high, self));
         let (power, factor) = inside.split_exp();
         // In two parts, as the power alone may be no number where the result is one.
@@ -209,13 +210,22 @@ impl<S: Simd, T: Element> Vector<S, T> {
         self.each_with(x, T::atan2)
     }
 
+    /// -1, 0 or 1.
+    #[inline(always)]
+    pub fn sign(self) -> Self {
+        let zero = self.like(0.0);
+        let not_positive = self.if_less(zero, self.like(-1.0), self * zero);
+        zero.if_less(self, self.like(1.0), not_positive)
+    }
+
     /// Whole k and f so that exp(self) = 2^k f.
     #[inline(always)]
     fn split_exp(self) -> (Self, Self) {
         let rounder = self.like(T::ROUNDER);
         let power = self.mul_add(self.like(std::f64::consts::LOG2_E), rounder) - rounder;
-        let [most, rest] = T::LN_2.map(|part| -self.like(part));
-        let left = power.mul_add(rest, power.mul_add(most, self));
+        let [first, second] = T::LN_2;
+        let most = power.mul_add(self.like(-first), self);
+        let left = power.mul_add(self.like(-second), most);
         let curved = (left * left).mul_add(left.polynomial(T::EXPONENTIAL), left);
         (power, curved + self.like(1.0))
     }
@@ -244,7 +254,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
 
 #[cfg(test)]
 mod tests {
-    use pulp::{Arch, Scalar, Simd, WithSimd};
+    use pulp::{Arch, Simd, WithSimd};
 
     use crate::lanes::{Element, Vector};
 
@@ -288,16 +298,20 @@ mod tests {
             let mut numbers = self.1.to_vec();
             numbers.resize(numbers.len().next_multiple_of(16), T::zero());
             for register in T::registers_mut::<S>(&mut numbers) {
-                *register = self.0.of_vector(Vector::<S, T>::new(simd, *register)).register;
+                *register = self
+                    .0
+                    .of_vector(Vector::<S, T>::new(simd, *register))
+                    .register;
             }
             numbers
         }
     }
 
-    /// The function on every set of instructions that this processor has.
+    /// The function on every set of instructions that this processor has; on plain numbers it is the standard
+    /// library's own.
     fn everywhere<T: Element>(function: Function, x: &[T]) -> Vec<Vec<T>> {
         let apply = || Apply(function, x);
-        let mut all = vec![Arch::new().dispatch(apply()), Scalar.vectorize(apply())];
+        let mut all = vec![Arch::new().dispatch(apply())];
         #[cfg(target_arch = "x86_64")]
         all.extend(pulp::x86::V3::try_new().map(|simd| Simd::vectorize(simd, apply())));
         all
@@ -332,7 +346,10 @@ mod tests {
                     let wanted = function.of_number(*x);
                     let unit = wanted.abs().next_up() - wanted.abs();
                     let off = (found - wanted).abs();
-                    assert!(found == wanted || off <= 2.0 * unit, "{x:e}: {found:e} {wanted:e}");
+                    assert!(
+                        found == wanted || off <= 2.0 * unit,
+                        "{x:e}: {found:e} {wanted:e}"
+                    );
                 }
             }
         }
@@ -341,14 +358,20 @@ mod tests {
     #[test]
     fn floats_are_within_two_units_of_the_truth() {
         for (function, largest) in CASES {
-            let x: Vec<f32> = arguments(largest.min(100.0)).iter().map(|x| *x as f32).collect();
+            let x: Vec<f32> = arguments(largest.min(100.0))
+                .iter()
+                .map(|x| *x as f32)
+                .collect();
             for found in everywhere(function, &x) {
                 for (x, found) in x.iter().zip(found) {
                     let wanted = function.of_number(f64::from(*x));
                     let nearest = wanted as f32;
                     let unit = f64::from(nearest.abs().next_up() - nearest.abs());
                     let off = (f64::from(found) - wanted).abs();
-                    assert!(found == nearest || off <= 2.0 * unit, "{x:e}: {found:e} {wanted:e}");
+                    assert!(
+                        found == nearest || off <= 2.0 * unit,
+                        "{x:e}: {found:e} {wanted:e}"
+                    );
                 }
             }
         }
@@ -356,15 +379,32 @@ mod tests {
 
     #[test]
     fn what_is_no_number_or_beyond_all_is_as_in_the_standard_library() {
-        let x = [f64::NAN, f64::INFINITY, -f64::INFINITY, -0.0, 0.0, 1e300, -1e6, 3e5, 5e-324, 709.7, -745.0];
+        let x = [
+            f64::NAN,
+            f64::INFINITY,
+            -f64::INFINITY,
+            -0.0,
+            0.0,
+            1e300,
+            -1e6,
+            3e5,
+            5e-324,
+            709.7,
+            -745.0,
+        ];
         for function in [Sin, Cos, Exp, Tanh] {
             // Apart, as one large angle sends all lanes the long way.
             for x in x {
                 for found in everywhere(function, &[x; 3]) {
                     let wanted = function.of_number(x);
                     let close = (found[0] - wanted).abs() <= 4e-16 * wanted.abs();
-                    let same = found[0] == wanted && found[0].is_sign_negative() == wanted.is_sign_negative();
-                    assert!(same || close && wanted != 0.0 || found[0].is_nan() && wanted.is_nan(), "{x} {} {wanted}", found[0]);
+                    let same = found[0] == wanted
+                        && found[0].is_sign_negative() == wanted.is_sign_negative();
+                    assert!(
+                        same || close && wanted != 0.0 || found[0].is_nan() && wanted.is_nan(),
+                        "{x} {} {wanted}",
+                        found[0]
+                    );
                 }
             }
         }

@@ -1,5 +1,7 @@
 use std::ops::{Deref, DerefMut};
 
+use super::{Arch, Element, Simd, Vector, WithSimd};
+
 /// `W` numbers side by side, at an address from which a processor reads whole registers at full speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
@@ -12,9 +14,49 @@ impl<T: Copy, const W: usize> Row<T, W> {
     }
 }
 
-impl<T, const W: usize> From<[T; W]> for Row<T, W> {
-    fn from(values: [T; W]) -> Self {
-        Self(values)
+impl<T: Element, const W: usize> Row<T, W> {
+    /// Carry out work on rows in the widest registers that they fill; on plain numbers where they fill none.
+    pub fn dispatch<F: WithSimd>(work: F) -> F::Output {
+        Arch::new().dispatch(Fitting::<T, F, W>(work, std::marker::PhantomData))
+    }
+
+    /// Whether rows fill registers.
+    #[inline(always)]
+    pub fn fills<S: Simd>() -> bool {
+        W.is_multiple_of(T::lanes::<S>())
+    }
+
+    /// Registers of a row.
+    #[inline(always)]
+    pub fn parts<S: Simd>() -> usize {
+        W / T::lanes::<S>()
+    }
+
+    /// One register's part of the row.
+    #[inline(always)]
+    pub fn get<S: Simd>(&self, simd: S, part: usize) -> Vector<S, T> {
+        Vector::new(simd, T::registers::<S>(&self.0)[part])
+    }
+
+    /// Replace one register's part of the row.
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, part: usize, value: Vector<S, T>) {
+        T::registers_mut::<S>(&mut self.0)[part] = value.register;
+    }
+}
+
+struct Fitting<T, F, const W: usize>(F, std::marker::PhantomData<T>);
+
+impl<T: Element, F: WithSimd, const W: usize> WithSimd for Fitting<T, F, W> {
+    type Output = F::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> F::Output {
+        if Row::<T, W>::fills::<S>() {
+            self.0.with_simd(simd)
+        } else {
+            self.0.with_simd(pulp::Scalar)
+        }
     }
 }
 

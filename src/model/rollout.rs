@@ -1,15 +1,23 @@
 use super::Dynamics;
 use crate::expr::Tape;
-use crate::lanes::{Element, Row};
+use crate::lanes::{Element, Row, Simd, WithSimd};
 
 /// Open-loop integration of `W` independent trajectories of one model, by the classical Runge-Kutta
 /// method of order 4 with the torque held over each step or substep.
 pub struct Rollout<'d, T, const W: usize> {
     tape: Tape<'d, T, W>,
     joints: usize,
-    slopes: [Vec<Row<T, W>>; 4],
-    inner: Vec<Row<T, W>>,
+    slope: Vec<Row<T, W>>,
+    sum: Vec<Row<T, W>>,
 }
+
+/// The classical Runge-Kutta method: weight of a stage's slope in the sum, and time and reach of the next stage.
+const STAGES: [(f64, f64); 4] = [
+    (1.0 / 6.0, 0.5),
+    (1.0 / 3.0, 0.5),
+    (1.0 / 3.0, 1.0),
+    (1.0 / 6.0, 0.0),
+];
 
 impl<'d, T: Element, const W: usize> Rollout<'d, T, W> {
     /// Working memory for `dynamics` with parameters `values`, in its order.
@@ -22,8 +30,8 @@ impl<'d, T: Element, const W: usize> Rollout<'d, T, W> {
             dynamics.parameters.len(),
             "one value for each parameter"
         );
-        let mut tape = dynamics.program.tape();
         let joints = dynamics.joints;
+        let mut tape = dynamics.program.tape_with_held(3 * joints + 1);
         for (slot, value) in tape.inputs()[3 * joints + 1..].iter_mut().zip(values) {
             *slot = Row::splat(T::from_f64(*value).expect("every f64 has a nearest float"));
         }
@@ -31,8 +39,8 @@ impl<'d, T: Element, const W: usize> Rollout<'d, T, W> {
         Self {
             tape,
             joints,
-            slopes: std::array::from_fn(|_| states()),
-            inner: states(),
+            slope: states(),
+            sum: states(),
         }
     }
 
@@ -54,53 +62,73 @@ impl<'d, T: Element, const W: usize> Rollout<'d, T, W> {
         dt: Row<T, W>,
         substeps: usize,
     ) {
-        let n = self.joints;
-        let parts = T::from_usize(substeps).expect("few substeps");
-        let h = Row(dt.map(|dt| dt / parts));
-        let mut now = time;
-        for tau in tau.chunks(n).cycle().take(substeps) {
-            self.tape.inputs()[2 * n..3 * n].copy_from_slice(tau);
-            self.step(state, now, h);
-            now = Row(std::array::from_fn(|lane| now[lane] + h[lane]));
-        }
+        Row::<T, W>::dispatch(Advance {
+            rollout: self,
+            state,
+            tau,
+            time,
+            dt,
+            substeps,
+        });
     }
 
-    fn step(&mut self, state: &mut [Row<T, W>], time: Row<T, W>, h: Row<T, W>) {
-        let number = |value: f64| T::from_f64(value).expect("a small constant");
-        let stages = [(0.0, None), (0.5, Some(0)), (0.5, Some(1)), (1.0, Some(2))];
-        for (k, (part, previous)) in stages.into_iter().enumerate() {
-            let part = number(part);
-            for (i, inner) in self.inner.iter_mut().enumerate() {
-                *inner = state[i];
-                if let Some(previous) = previous {
-                    let slope = &self.slopes[previous][i];
-                    for lane in 0..W {
-                        inner[lane] = inner[lane] + part * h[lane] * slope[lane];
-                    }
+    #[inline(always)]
+    fn step<S: Simd>(
+        &mut self,
+        simd: S,
+        state: &mut [Row<T, W>],
+        time: &mut Row<T, W>,
+        h: &Row<T, W>,
+    ) {
+        let n = self.joints;
+        self.tape.moving()[..2 * n].copy_from_slice(state);
+        self.sum.copy_from_slice(state);
+        self.tape.moving()[3 * n] = *time;
+        for (weight, reach) in STAGES {
+            self.tape.run_on(simd);
+            for (k, slope) in self.slope.iter_mut().enumerate() {
+                *slope = *self.tape.output(k);
+            }
+            let inputs = self.tape.moving();
+            for part in 0..Row::<T, W>::parts::<S>() {
+                let h = h.get(simd, part);
+                let (weighed, reached) = (h * h.like(weight), h * h.like(reach));
+                let rows = self.sum.iter_mut().zip(&mut inputs[..2 * n]);
+                for (((sum, inner), now), slope) in rows.zip(&*state).zip(&self.slope) {
+                    let slope = slope.get(simd, part);
+                    sum.set(part, slope.mul_add(weighed, sum.get(simd, part)));
+                    inner.set(part, slope.mul_add(reached, now.get(simd, part)));
                 }
+                inputs[3 * n].set(part, time.get(simd, part) + reached);
             }
-            let stage_time = Row(std::array::from_fn(|lane| time[lane] + part * h[lane]));
-            self.derivative(stage_time, k);
         }
-        let (sixth, two) = (number(1.0 / 6.0), number(2.0));
-        for (i, value) in state.iter_mut().enumerate() {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|k| &self.slopes[k][i]);
-            for lane in 0..W {
-                let mean = a[lane] + two * (b[lane] + c[lane]) + d[lane];
-                value[lane] = value[lane] + sixth * h[lane] * mean;
-            }
+        state.copy_from_slice(&self.sum);
+        for part in 0..Row::<T, W>::parts::<S>() {
+            time.set(part, time.get(simd, part) + h.get(simd, part));
         }
     }
+}
 
-    /// Slope number `k` at the inner state.
-    fn derivative(&mut self, time: Row<T, W>, k: usize) {
-        let n = self.joints;
-        let inputs = self.tape.inputs();
-        inputs[..2 * n].copy_from_slice(&self.inner);
-        inputs[3 * n] = time;
-        self.tape.run();
-        for (i, slope) in self.slopes[k].iter_mut().enumerate() {
-            *slope = *self.tape.output(i);
+struct Advance<'a, 'd, T, const W: usize> {
+    rollout: &'a mut Rollout<'d, T, W>,
+    state: &'a mut [Row<T, W>],
+    tau: &'a [Row<T, W>],
+    time: Row<T, W>,
+    dt: Row<T, W>,
+    substeps: usize,
+}
+
+impl<T: Element, const W: usize> WithSimd for Advance<'_, '_, T, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let n = self.rollout.joints;
+        let parts = T::from_usize(self.substeps).expect("few substeps");
+        let h = Row(self.dt.map(|dt| dt / parts));
+        for tau in self.tau.chunks(n).cycle().take(self.substeps) {
+            self.rollout.tape.moving()[2 * n..3 * n].copy_from_slice(tau);
+            self.rollout.step(simd, self.state, &mut self.time, &h);
         }
     }
 }

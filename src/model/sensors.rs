@@ -95,8 +95,7 @@ pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) ->
         let speeds = speeds(&own);
         for row in 0..log.rows() {
             let columns = log.q.iter().chain(&speeds);
-            let mut state: Vec<Row<f64, 1>> =
-                columns.map(|column| Row([column[row]])).collect();
+            let mut state: Vec<Row<f64, 1>> = columns.map(|column| Row([column[row]])).collect();
             let before = || Commands::just_before([&commands], [row]);
             sensors.correct(&mut state, before, Row([log.time[row]]));
             for (column, angle) in own.q.iter_mut().zip(&state) {

@@ -37,6 +37,8 @@ pub struct CrossEntropy<E> {
     settings: Settings,
     /// Of each input: lowest and highest value.
     bounds: Vec<[f32; 2]>,
+    /// The middle of the bounds at every step.
+    middle: Vec<f32>,
     mean: Vec<f32>,
     deviation: Vec<f32>,
     blocks: Vec<Candidates<E>>,
@@ -112,23 +114,23 @@ impl<E: Evaluate> CrossEntropy<E> {
             }
         };
         #[allow(clippy::cast_possible_truncation)] // planning runs in f32
-        let mut search = Self {
+        let bounds: Vec<[f32; 2]> = bounds.iter().map(|range| range.map(|x| x as f32)).collect();
+        let centres = bounds.iter().map(|[low, high]| 0.5 * (low + high));
+        let middle: Vec<f32> = centres.cycle().take(numbers).collect();
+        Self {
             settings,
-            bounds: bounds.iter().map(|range| range.map(|x| x as f32)).collect(),
-            mean: vec![0.0; numbers],
+            mean: middle.clone(),
+            middle,
             deviation: vec![0.0; numbers],
             blocks: (0..population.div_ceil(W)).map(block).collect(),
             ranking: Vec::with_capacity(population),
-        };
-        search.forget();
-        search
+            bounds,
+        }
     }
 
     /// Begin again in the middle of the bounds.
     pub fn forget(&mut self) {
-        for (mean, [low, high]) in self.mean.iter_mut().zip(self.bounds.iter().cycle()) {
-            *mean = 0.5 * (low + high);
-        }
+        self.mean.copy_from_slice(&self.middle);
     }
 
     /// Search for the best inputs from `start`.
@@ -139,8 +141,8 @@ impl<E: Evaluate> CrossEntropy<E> {
         let mut diverged = 0;
         // Within the pool the iterations hand their blocks over without waking it each time.
         rayon::scope(|_| {
-            for _ in 0..self.settings.iterations {
-                self.evaluate(start);
+            for iteration in 0..self.settings.iterations {
+                self.evaluate(start, iteration == 0);
                 diverged += self.rank();
                 self.refit();
             }
@@ -164,33 +166,31 @@ impl<E: Evaluate> CrossEntropy<E> {
         let done = (steps * self.bounds.len()).min(self.mean.len());
         self.mean.rotate_left(done);
         let left = self.mean.len() - done;
-        for (mean, [low, high]) in self.mean[left..].iter_mut().zip(self.bounds.iter().cycle()) {
-            *mean = 0.5 * (low + high);
-        }
+        self.mean[left..].copy_from_slice(&self.middle[left..]);
     }
 
-    /// Draw all candidates and ask what they bring.
-    fn evaluate(&mut self, start: &E::Start) {
+    /// Draw all candidates and ask what they bring. At first every other block starts from the middle of the bounds:
+    /// what is left of a plan can lead into a worse optimum than a search that knows nothing.
+    fn evaluate(&mut self, start: &E::Start, first: bool) {
         let Self {
             bounds,
+            middle,
             mean,
             deviation,
             ..
         } = self;
-        self.blocks.par_iter_mut().for_each(|block| {
-            block
-                .gaussian
-                .fill(block.arch, &mut block.rng, &mut block.inputs);
-            let inputs = &mut block.inputs;
-            block.arch.dispatch(Place {
-                bounds,
-                mean,
-                deviation,
+        let blocks = self.blocks.par_iter_mut().enumerate();
+        blocks.for_each(|(index, block)| {
+            let fresh = first && index % 2 == 1;
+            let mean: &[f32] = if fresh { middle } else { mean };
+            block.draw(bounds, mean, deviation);
+            let Candidates {
+                evaluate,
                 inputs,
-            });
-            block
-                .evaluate
-                .returns(start, &block.inputs, &mut block.returns);
+                returns,
+                ..
+            } = block;
+            evaluate.returns(start, inputs, returns);
         });
     }
 
@@ -238,6 +238,19 @@ impl<E: Evaluate> CrossEntropy<E> {
             let variance = elite.map(|x| (x - *mean).powi(2)).sum::<f32>() / count;
             *deviation = variance.sqrt().max(LEAST_DEVIATION * 0.5 * (high - low));
         }
+    }
+}
+
+impl<E> Candidates<E> {
+    fn draw(&mut self, bounds: &[[f32; 2]], mean: &[f32], deviation: &[f32]) {
+        self.gaussian
+            .fill(self.arch, &mut self.rng, &mut self.inputs);
+        self.arch.dispatch(Place {
+            bounds,
+            mean,
+            deviation,
+            inputs: &mut self.inputs,
+        });
     }
 }
 

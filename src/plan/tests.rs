@@ -80,22 +80,21 @@ fn candidates_that_diverge_are_the_worst() {
 fn what_is_left_of_a_plan_starts_the_next_search() {
     let settings = Settings {
         iterations: 1,
-        population: 40,
         ..SETTINGS
     };
     let errors = |warm: bool| {
         let mut search = CrossEntropy::new(settings, &[[-3.0, 3.0]], || Near, &rng(4));
         for _ in 0..8 {
-            search.plan(&1.5);
+            search.plan(&-1.5);
         }
         search.shift(2);
         if !warm {
             search.forget();
         }
-        let plan = search.plan(&1.5);
+        let plan = search.plan(&-1.5);
         plan.inputs[..4]
             .iter()
-            .map(|step| (step[0] - 1.5).abs())
+            .map(|step| (step[0] + 1.5).abs())
             .sum::<f64>()
     };
     assert!(
@@ -157,26 +156,21 @@ fn normal_numbers_are_normal() {
     assert!(product.sum::<f32>().abs() < 5.0 * (2.0 * W as f32).sqrt());
 }
 
-/// The published task, hanging pendulum to upright: 500 steps, of each plan the first 50.
-#[test]
-fn a_pendulum_is_swung_up_and_held() {
+/// The published task, from hanging to upright: 500 steps, of each plan the first 50.
+fn swung_up(seed: u64) -> f64 {
     let system = Library::built_in().system(Path::new("pendulum")).unwrap();
     let equations = system.dynamics(&[SignForm::DEFAULT]);
     let objective = Objective::new("cos(q1)", 1).unwrap();
-    let rollouts = Rollouts::new(
-        &equations,
-        &[],
-        objective.program(),
-        Integrator::default(),
-        0.02,
-    );
+    let integrator = Integrator::default();
+    let rollouts = Rollouts::new(&equations, &[], objective.program(), integrator, 0.02);
     let settings = Settings {
         horizon: 80,
         ..SETTINGS
     };
-    let mut search = CrossEntropy::new(settings, &[[-3.0, 3.0]], || rollouts.block(), &rng(8));
+    let evaluate = || rollouts.block();
+    let mut search = CrossEntropy::new(settings, &[[-3.0, 3.0]], evaluate, &rng(seed));
     let values = equations.values();
-    let mut rig = Environment::new(&equations, &values, Integrator::default(), 0.02);
+    let mut rig = Environment::new(&equations, &values, integrator, 0.02);
     let (mut state, mut sum) = ([std::f64::consts::PI, 0.0], 0.0);
     for begin in (0..500).step_by(50) {
         let plan = search.plan(&Start::new(&state, 0.02 * f64::from(begin)));
@@ -186,5 +180,13 @@ fn a_pendulum_is_swung_up_and_held() {
             sum += state[0].cos();
         }
     }
-    assert!(sum > 300.0, "{sum}");
+    sum
+}
+
+#[test]
+fn a_pendulum_is_swung_up_and_held() {
+    let mut returns: Vec<f64> = (0..9).map(swung_up).collect();
+    returns.sort_by(f64::total_cmp);
+    // Another implementation reached 304 to 315; a pendulum that is not held ends far below.
+    assert!(returns[0] > 290.0 && returns[4] > 315.0, "{returns:?}");
 }

@@ -55,7 +55,8 @@ impl Plant {
                 rng,
             );
             let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();
-            let torque = StepTorque::new([&commands], &held, Row([time]), Row([time + dt]), substeps);
+            let torque =
+                StepTorque::new([&commands], &held, Row([time]), Row([time + dt]), substeps);
             rollout.advance(&mut state, &torque.mean, Row([time]), Row([dt]), substeps);
             if state.iter().any(|value| !value[0].is_finite()) {
                 return Err(PlantError::Diverged { time_s: time });

@@ -176,7 +176,13 @@ fn simulate(
         // a small positive number
         let substeps = (((to - from) / LONGEST_STEP_S - 1e-6).ceil() as usize).max(1);
         let torque = StepTorque::new([&commands], &held, Row([from]), Row([to]), substeps);
-        rollout.advance(&mut state, &torque.mean, Row([from]), Row([to - from]), substeps);
+        rollout.advance(
+            &mut state,
+            &torque.mean,
+            Row([from]),
+            Row([to - from]),
+            substeps,
+        );
     }
     Some(())
 }

@@ -215,13 +215,13 @@ impl<S: Simd> Worker<'_, S> {
             program.run();
             let rates = &mut rates[b * states..][..states];
             for (k, rate) in rates.iter_mut().enumerate() {
-                rate.0 = *program.output(k);
+                *rate = *program.output(k);
             }
             let mut output = states;
             for (network, part) in self.numbers.networks.iter().zip(&mut record.networks) {
                 let features = &mut part.features[b * network.features()..][..network.features()];
                 for feature in &mut *features {
-                    feature.0 = *program.output(output);
+                    *feature = *program.output(output);
                     output += 1;
                 }
                 let values = &mut part.values[b * network.activations()..][..network.activations()];
@@ -416,17 +416,17 @@ impl<S: Simd> Worker<'_, S> {
             let features = (self.numbers.networks.iter().zip(&part.by_features))
                 .flat_map(|(network, by)| &by[b * network.features()..][..network.features()]);
             for (to, seed) in seeds.iter_mut().zip(rates.iter().chain(features)) {
-                *to = seed.0;
+                *to = *seed;
             }
             adjoint.run();
             for (k, by) in part.scratch.other[b * states..][..by_states]
                 .iter_mut()
                 .enumerate()
             {
-                by.0 = *adjoint.output(k);
+                *by = *adjoint.output(k);
             }
             for (k, sum) in part.parameter_sums.iter_mut().enumerate() {
-                let slope = &crate::lanes::Row(*adjoint.output(by_states + k));
+                let slope = adjoint.output(by_states + k);
                 update(self.simd, sum, [slope], |sum, [slope]| sum + slope);
             }
         }
@@ -438,7 +438,7 @@ impl<S: Simd> Worker<'_, S> {
         let given = self.plan.blocks.given(block, place.step);
         let inputs = program.inputs();
         for (to, from) in inputs.iter_mut().zip(state.iter().chain(given.input)) {
-            *to = from.0;
+            *to = *from;
         }
         let (part, _) = self.plan.scheme.stages[place.stage];
         #[allow(clippy::cast_precision_loss)] // few substeps
@@ -447,7 +447,7 @@ impl<S: Simd> Worker<'_, S> {
         update(self.simd, &mut time, [&elapsed], |time, [elapsed]| {
             time + elapsed
         });
-        inputs[state.len() + given.input.len()] = time.0;
+        inputs[state.len() + given.input.len()] = time;
     }
 
     /// So much of a substep's length, s.

@@ -6,6 +6,7 @@ use rand::RngExt;
 
 use super::{pendulum, rng, transitions};
 use crate::expr::{Program, SignForm};
+use crate::lanes::Row;
 use crate::model::{
     Angles, Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
     ResidualOn, network_dynamics, with_residual,
@@ -51,7 +52,7 @@ fn lanes(program: &Program, parameters: &[f64]) -> Vec<f64> {
     let row = |point: &[f64; 4]| {
         let inputs = point.iter().chain(parameters);
         for (slot, value) in tape.inputs().iter_mut().zip(inputs) {
-            *slot = [*value as f32];
+            *slot = Row([*value as f32]);
         }
         tape.run();
         [f64::from(tape.output(0)[0]), f64::from(tape.output(1)[0])]
