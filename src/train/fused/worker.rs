@@ -215,13 +215,13 @@ impl<S: Simd> Worker<'_, S> {
             program.run();
             let rates = &mut rates[b * states..][..states];
             for (k, rate) in rates.iter_mut().enumerate() {
-                rate.0 = *program.output(k);
+                *rate = *program.output(k);
             }
             let mut output = states;
             for (network, part) in self.numbers.networks.iter().zip(&mut record.networks) {
                 let features = &mut part.features[b * network.features()..][..network.features()];
                 for feature in &mut *features {
-                    feature.0 = *program.output(output);
+                    *feature = *program.output(output);
                     output += 1;
                 }
                 let values = &mut part.values[b * network.activations()..][..network.activations()];
@@ -403,7 +403,7 @@ impl<S: Simd> Worker<'_, S> {
         if by_states + part.parameter_sums.len() == 0 {
             return;
         }
-        let first = 3 * self.plan.frame.joints + 1 + self.numbers.parameters.len();
+        let first = 3 * self.plan.frame.joints + 1;
         for (b, block) in self.chunk.clone().enumerate() {
             self.set_inputs(
                 adjoint,
@@ -411,22 +411,22 @@ impl<S: Simd> Worker<'_, S> {
                 block,
                 &record.states[b * states..][..states],
             );
-            let seeds = &mut adjoint.inputs()[first..];
+            let seeds = &mut adjoint.moving()[first..];
             let rates = &part.scratch.rates[b * states..][..states];
             let features = (self.numbers.networks.iter().zip(&part.by_features))
                 .flat_map(|(network, by)| &by[b * network.features()..][..network.features()]);
             for (to, seed) in seeds.iter_mut().zip(rates.iter().chain(features)) {
-                *to = seed.0;
+                *to = *seed;
             }
             adjoint.run();
             for (k, by) in part.scratch.other[b * states..][..by_states]
                 .iter_mut()
                 .enumerate()
             {
-                by.0 = *adjoint.output(k);
+                *by = *adjoint.output(k);
             }
             for (k, sum) in part.parameter_sums.iter_mut().enumerate() {
-                let slope = &crate::lanes::Row(*adjoint.output(by_states + k));
+                let slope = adjoint.output(by_states + k);
                 update(self.simd, sum, [slope], |sum, [slope]| sum + slope);
             }
         }
@@ -436,9 +436,9 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     fn set_inputs(&self, program: &mut Tape<f32, W>, place: Place, block: usize, state: &[Rows]) {
         let given = self.plan.blocks.given(block, place.step);
-        let inputs = program.inputs();
+        let inputs = program.moving();
         for (to, from) in inputs.iter_mut().zip(state.iter().chain(given.input)) {
-            *to = from.0;
+            *to = *from;
         }
         let (part, _) = self.plan.scheme.stages[place.stage];
         #[allow(clippy::cast_precision_loss)] // few substeps
@@ -447,7 +447,7 @@ impl<S: Simd> Worker<'_, S> {
         update(self.simd, &mut time, [&elapsed], |time, [elapsed]| {
             time + elapsed
         });
-        inputs[state.len() + given.input.len()] = time.0;
+        inputs[state.len() + given.input.len()] = time;
     }
 
     /// So much of a substep's length, s.

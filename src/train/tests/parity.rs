@@ -51,7 +51,7 @@ fn lanes(program: &Program, parameters: &[f64]) -> Vec<f64> {
     let row = |point: &[f64; 4]| {
         let inputs = point.iter().chain(parameters);
         for (slot, value) in tape.inputs().iter_mut().zip(inputs) {
-            *slot = [*value as f32];
+            slot.0 = [*value as f32];
         }
         tape.run();
         [f64::from(tape.output(0)[0]), f64::from(tape.output(1)[0])]
