@@ -18,7 +18,7 @@ use residyn::model::{
 };
 use residyn::plan::{CrossEntropy, Objective, Settings, Start};
 use residyn::plant::Plant;
-use residyn::train::{Backend, FitSettings, Segments, Training};
+use residyn::train::{Backend, FitSettings, Progress, Segments, Training};
 
 const STEP_S: f64 = 0.02;
 /// Of each time the best of so many.
@@ -75,7 +75,7 @@ impl Work {
             let mut training = begin.clone();
             // From one epoch to the next: neither the first nor what is recorded at the ends counts.
             let (mut last, mut shortest) = (None::<Instant>, f64::INFINITY);
-            let mut observe = |_: &_| {
+            let mut observe = |_: &Progress| {
                 let now = Instant::now();
                 if let Some(last) = last.replace(now) {
                     shortest = shortest.min(now.duration_since(last).as_secs_f64());
@@ -180,7 +180,7 @@ fn identification(duration_s: f64) -> f64 {
     best(|| {
         seconds(|| {
             let (begin, states) = (dynamics.values(), shooting.initial_locals(0));
-            let fitted = fit(&shooting, &dynamics, &active, begin, states, None);
+            let fitted = fit(&shooting, &dynamics, &active, &begin, states, None);
             drop(fitted.expect("a model that stays finite"));
         })
     })

@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use super::network::{MlpWeights, ResidualOn};
 use super::{Dynamics, Parameter};
 use crate::expr::{Graph, Node, Program};
@@ -8,51 +6,89 @@ use crate::expr::{Graph, Node, Program};
 /// everything around them, and its derivative.
 #[derive(Debug)]
 pub(crate) struct Frame {
+    /// Name of the system.
+    pub system: String,
     pub joints: usize,
+    /// The prior as declared, where it is equations.
+    pub equations: Option<Dynamics>,
     /// The networks whose outputs are added to the last of the rates: the prior, where it is one, and the residual.
-    pub networks: Vec<Arc<MlpWeights>>,
-    /// Whether the first of them is the prior.
-    pub has_prior: bool,
+    pub networks: Vec<MlpWeights>,
     /// Whether the last of them is a residual.
     pub has_residual: bool,
-    /// The physical parameters; none where the prior is a network.
-    pub parameters: Vec<Parameter>,
     /// Inputs as in [`Dynamics`]. Outputs: `2n` rates without the networks, then the scaled features of each network.
     pub program: Program,
-    /// Inputs: those of `program`, then the derivative of a number by each of its outputs. Outputs: that number's
-    /// derivatives by the `2n` states, then by each parameter that is not fixed.
+    /// Inputs: those of `program`, but before the parameters the derivative of a number by each of its outputs. Outputs:
+    /// that number's derivatives by the `2n` states, then by each parameter that is not fixed.
     pub adjoint: Program,
     /// As `adjoint`, by the parameters alone.
     pub parameter_adjoint: Program,
 }
 
 impl Frame {
-    pub(super) fn new(
+    /// Equations alone.
+    pub(super) fn of_equations(dynamics: &Dynamics) -> Self {
+        let (system, joints) = (dynamics.name.clone(), dynamics.joints);
+        Self::new(system, joints, Some(dynamics.clone()), Vec::new(), false)
+    }
+
+    /// A network alone.
+    pub(super) fn of_network(system: &str, joints: usize, prior: &MlpWeights) -> Self {
+        Self::new(system.to_owned(), joints, None, vec![prior.clone()], false)
+    }
+
+    /// The same with this residual in place of any other.
+    pub(super) fn with_residual(&self, residual: &MlpWeights) -> Self {
+        let mut networks = self.networks.clone();
+        networks.truncate(usize::from(self.equations.is_none()));
+        networks.push(residual.clone());
+        let (system, equations) = (self.system.clone(), self.equations.clone());
+        Self::new(system, self.joints, equations, networks, true)
+    }
+
+    /// The physical parameters as declared; none where the prior is a network.
+    pub(crate) fn parameters(&self) -> &[Parameter] {
+        let equations = self.equations.as_ref();
+        equations.map_or(&[], |dynamics| &dynamics.parameters)
+    }
+
+    /// The prior as it was made, where it is a network.
+    pub(super) fn prior(&self) -> Option<&MlpWeights> {
+        match self.equations {
+            Some(_) => None,
+            None => self.networks.first(),
+        }
+    }
+
+    /// The residual as it was made.
+    pub(super) fn residual(&self) -> Option<&MlpWeights> {
+        self.networks.last().filter(|_| self.has_residual)
+    }
+
+    fn new(
+        system: String,
         joints: usize,
-        equations: Option<&Dynamics>,
-        prior: Option<&Arc<MlpWeights>>,
-        residual: Option<&Arc<MlpWeights>>,
+        equations: Option<Dynamics>,
+        networks: Vec<MlpWeights>,
+        has_residual: bool,
     ) -> Self {
-        let networks: Vec<_> = prior.into_iter().chain(residual).cloned().collect();
-        let parameters = equations.map_or_else(Vec::new, |d| d.parameters.clone());
-        let mut outline = Outline::new(joints, &parameters);
-        let mut outputs = match (equations, prior) {
-            (Some(dynamics), _) => outline
-                .graph
-                .append(&dynamics.program, &outline.inputs.clone()),
-            (None, prior) => outline.rates_around(prior.map(|prior| prior.on)),
+        let parameters = equations.as_ref().map_or(&[][..], |d| &d.parameters);
+        let mut outline = Outline::new(joints, parameters);
+        let mut outputs = match &equations {
+            Some(dynamics) => outline.append(&dynamics.program),
+            None => outline.rates_around(networks[0].on),
         };
         for network in &networks {
             outputs.extend(outline.features(network));
         }
-        let (adjoint, parameter_adjoint) = outline.adjoints(&outputs, &parameters);
+        let program = outline.graph.finish(&outputs);
+        let (adjoint, parameter_adjoint) = adjoints(&program, joints, parameters);
         Self {
+            system,
             joints,
-            has_prior: prior.is_some(),
-            has_residual: residual.is_some(),
+            equations,
             networks,
-            parameters,
-            program: outline.graph.finish(&outputs),
+            has_residual,
+            program,
             adjoint,
             parameter_adjoint,
         }
@@ -82,11 +118,15 @@ impl Outline {
         }
     }
 
+    fn append(&mut self, program: &Program) -> Vec<Node> {
+        self.graph.append(program, &self.inputs)
+    }
+
     /// The rates that a network is added to where there are no equations.
-    fn rates_around(&mut self, on: Option<ResidualOn>) -> Vec<Node> {
+    fn rates_around(&mut self, on: ResidualOn) -> Vec<Node> {
         let n = self.joints;
         let mut rates = vec![self.graph.constant(0.0); 2 * n];
-        if on != Some(ResidualOn::Derivative) {
+        if on == ResidualOn::Accelerations {
             rates[..n].copy_from_slice(&self.inputs[n..2 * n]);
         }
         rates
@@ -101,23 +141,22 @@ impl Outline {
         );
         network.features(&mut self.graph, q, qd, tau)
     }
+}
 
-    /// The derivatives by states and free parameters, and by the latter alone.
-    fn adjoints(&self, outputs: &[Node], parameters: &[Parameter]) -> (Program, Program) {
-        let mut graph = self.graph.clone();
-        let seeds: Vec<Node> = (0..outputs.len())
-            .map(|k| graph.input(&format!("by output {k}")))
-            .collect();
-        let (states, own) = (2 * self.joints, 3 * self.joints + 1);
-        let mut by = self.inputs[..states].to_vec();
-        let of_parameters = self.inputs[own..].iter().zip(parameters);
-        by.extend(
-            of_parameters
-                .filter(|(_, p)| !p.fixed)
-                .map(|(node, _)| *node),
-        );
-        let slopes = graph.gradient(outputs, &seeds, &by);
-        let of_parameters = graph.clone().finish(&slopes[states..]);
-        (graph.finish(&slopes), of_parameters)
-    }
+/// The derivatives of a program by states and free parameters, and by the latter alone.
+fn adjoints(program: &Program, joints: usize, parameters: &[Parameter]) -> (Program, Program) {
+    let mut graph = Graph::new();
+    let (of_point, of_parameters) = program.inputs().split_at(3 * joints + 1);
+    let mut inputs: Vec<Node> = of_point.iter().map(|name| graph.input(name)).collect();
+    let seeds: Vec<Node> = (0..program.output_count())
+        .map(|k| graph.input(&format!("by output {k}")))
+        .collect();
+    inputs.extend(of_parameters.iter().map(|name| graph.input(name)));
+    let outputs = graph.append(program, &inputs);
+    let mut by = inputs[..2 * joints].to_vec();
+    let free = inputs[of_point.len()..].iter().zip(parameters);
+    by.extend(free.filter(|(_, p)| !p.fixed).map(|(node, _)| *node));
+    let slopes = graph.gradient(&outputs, &seeds, &by);
+    let by_parameters = graph.clone().finish(&slopes[2 * joints..]);
+    (graph.finish(&slopes), by_parameters)
 }

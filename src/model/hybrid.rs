@@ -1,11 +1,11 @@
 use std::sync::Arc;
 
-use burn::module::{Module, ParamId};
+use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor};
 
-use super::equations::Equations;
+use super::equations;
 use super::frame::Frame;
-use super::mlp::Mlp;
+use super::mlp::{Mlp, flat, to_f64};
 use super::network::{MlpWeights, ResidualOn, network_dynamics, with_residual};
 use super::{Dynamics, Parameter};
 
@@ -44,9 +44,9 @@ pub enum HybridError {
     },
 }
 
-// The names of the networks' tensors, by which an optimiser's saved state finds them.
-const PRIOR_ID: u64 = 1_000;
-const RESIDUAL_ID: u64 = 2_000;
+// The names by which Burn knows the tensors.
+pub(crate) const PRIOR_ID: u64 = 1;
+pub(crate) const RESIDUAL_ID: u64 = 2;
 
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
@@ -54,22 +54,13 @@ const RESIDUAL_ID: u64 = 2_000;
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
 #[derive(Module, Debug)]
 pub struct HybridModel {
-    prior: Prior,
-    residual: Option<Mlp>,
-    #[module(skip)]
-    system: String,
-    #[module(skip)]
-    joints: usize,
+    // One tensor for each part: an optimiser's step costs by the tensor.
+    /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`].
+    prior: Param<Tensor<1>>,
+    /// The residual network's numbers.
+    residual: Option<Param<Tensor<1>>>,
     #[module(skip)]
     frame: Arc<Frame>,
-}
-
-// A box would make it smaller, but Burn knows no boxed modules, and there are few models at a time.
-#[allow(clippy::large_enum_variant)]
-#[derive(Module, Debug)]
-enum Prior {
-    Equations(Equations),
-    Network(Mlp),
 }
 
 /// All learnable numbers of a model, in plain form.
@@ -95,6 +86,8 @@ pub struct Flow {
 pub struct Prepared<'m> {
     model: &'m HybridModel,
     parameters: Vec<Tensor<1>>,
+    prior: Option<Mlp<'m>>,
+    residual: Option<Mlp<'m>>,
 }
 
 impl HybridModel {
@@ -106,13 +99,10 @@ impl HybridModel {
     /// # Errors
     /// A parameter that is not finite, outside of its bounds, or without a scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
-        let equations = Equations::new(dynamics, device)?;
         Ok(Self {
-            prior: Prior::Equations(equations),
+            prior: learnable(PRIOR_ID, equations::scaled(dynamics, device)?),
             residual: None,
-            system: dynamics.name.clone(),
-            joints: dynamics.joints,
-            frame: Arc::new(Frame::new(dynamics.joints, Some(dynamics), None, None)),
+            frame: Arc::new(Frame::of_equations(dynamics)),
         })
     }
 
@@ -128,14 +118,10 @@ impl HybridModel {
         device: &Device,
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
-        let prior = Mlp::new(weights, PRIOR_ID, device);
-        let frame = Frame::new(joints, None, Some(prior.made()), None);
         Ok(Self {
-            prior: Prior::Network(prior),
+            prior: learnable(PRIOR_ID, flat(weights, device)),
             residual: None,
-            system: system.to_owned(),
-            joints,
-            frame: Arc::new(frame),
+            frame: Arc::new(Frame::of_network(system, joints, weights)),
         })
     }
 
@@ -144,36 +130,28 @@ impl HybridModel {
     /// # Errors
     /// A network that is not one for the model's joints.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
-        weights.check(self.joints)?;
-        let residual = Mlp::new(weights, RESIDUAL_ID, &self.device());
-        let (equations, prior) = match &self.prior {
-            Prior::Equations(equations) => (Some(equations.declared()), None),
-            Prior::Network(mlp) => (None, Some(mlp.made())),
-        };
-        let frame = Frame::new(self.joints, equations, prior, Some(residual.made()));
+        weights.check(self.joints())?;
         Ok(Self {
-            residual: Some(residual),
-            frame: Arc::new(frame),
+            residual: Some(learnable(RESIDUAL_ID, flat(weights, &self.device()))),
+            frame: Arc::new(self.frame.with_residual(weights)),
             ..self
         })
     }
 
     /// Name of the system.
     pub fn system(&self) -> &str {
-        &self.system
+        &self.frame.system
     }
 
     /// Number of joints n.
     pub fn joints(&self) -> usize {
-        self.joints
+        self.frame.joints
     }
 
     /// The physical parameters as declared, with their current values; none where the prior is a network.
     pub fn declared(&self) -> Vec<Parameter> {
-        match &self.prior {
-            Prior::Equations(equations) => equations.current().parameters,
-            Prior::Network(_) => Vec::new(),
-        }
+        let equations = self.equations();
+        equations.map_or_else(Vec::new, |dynamics| dynamics.parameters)
     }
 
     /// Name and current value of every physical parameter, in its unit.
@@ -192,12 +170,17 @@ impl HybridModel {
     pub fn weights(&self) -> ModelWeights {
         ModelWeights {
             parameters: self.parameters().into_iter().map(|(_, v)| v).collect(),
-            prior: match &self.prior {
-                Prior::Equations(_) => None,
-                Prior::Network(mlp) => Some(mlp.weights()),
-            },
-            residual: self.residual.as_ref().map(Mlp::weights),
+            prior: self.network_of(self.frame.prior(), Some(&self.prior)),
+            residual: self.network_of(self.frame.residual(), self.residual.as_ref()),
         }
+    }
+
+    fn network_of(
+        &self,
+        made: Option<&MlpWeights>,
+        numbers: Option<&Param<Tensor<1>>>,
+    ) -> Option<MlpWeights> {
+        Some(made?.with_flat(&to_f64(numbers?.val())))
     }
 
     /// The same model with other numbers.
@@ -206,35 +189,28 @@ impl HybridModel {
     /// When the numbers belong to a model of another shape.
     pub fn with_weights(&self, weights: &ModelWeights) -> Result<Self, HybridError> {
         let device = self.device();
-        let prior = match (&self.prior, &weights.prior) {
-            (Prior::Equations(equations), None)
-                if equations.declared().parameters.len() == weights.parameters.len() =>
-            {
-                let mut dynamics = equations.declared().clone();
+        let prior = match (&self.frame.equations, &weights.prior) {
+            (Some(equations), None) if equations.parameters.len() == weights.parameters.len() => {
+                let mut dynamics = equations.clone();
                 for (parameter, value) in dynamics.parameters.iter_mut().zip(&weights.parameters) {
                     parameter.value = *value;
                 }
                 Self::physics(&dynamics, &device)?
             }
-            (Prior::Network(_), Some(mlp)) if weights.parameters.is_empty() => {
-                Self::network(&self.system, self.joints, mlp, &device)?
+            (None, Some(mlp)) if weights.parameters.is_empty() => {
+                Self::network(self.system(), self.joints(), mlp, &device)?
             }
-            (prior, _) => return Err(self.foreign(prior, weights)),
+            _ => {
+                return Err(HybridError::Weights {
+                    system: self.system().to_owned(),
+                    expected: self.frame.parameters().len(),
+                    found: weights.parameters.len(),
+                });
+            }
         };
         match &weights.residual {
             Some(mlp) => prior.with_residual(mlp),
             None => Ok(prior),
-        }
-    }
-
-    fn foreign(&self, prior: &Prior, weights: &ModelWeights) -> HybridError {
-        HybridError::Weights {
-            system: self.system.clone(),
-            expected: match prior {
-                Prior::Equations(equations) => equations.declared().parameters.len(),
-                Prior::Network(_) => 0,
-            },
-            found: weights.parameters.len(),
         }
     }
 
@@ -244,24 +220,35 @@ impl HybridModel {
     /// # Errors
     /// None for a model made by this module's constructors.
     pub fn to_dynamics(&self) -> Result<Dynamics, HybridError> {
-        let prior = match &self.prior {
-            Prior::Equations(equations) => equations.current(),
-            Prior::Network(mlp) => network_dynamics(&self.system, self.joints, &mlp.weights())?,
+        let weights = self.weights();
+        let prior = match (self.equations(), &weights.prior) {
+            (Some(dynamics), _) => dynamics,
+            (None, prior) => {
+                let prior = prior.as_ref().expect("a prior is equations or a network");
+                network_dynamics(self.system(), self.joints(), prior)?
+            }
         };
-        match &self.residual {
-            Some(mlp) => with_residual(&prior, &mlp.weights()),
+        match &weights.residual {
+            Some(mlp) => with_residual(&prior, mlp),
             None => Ok(prior),
         }
     }
 
+    /// The declared equations with the current values.
+    fn equations(&self) -> Option<Dynamics> {
+        let declared = self.frame.equations.as_ref()?;
+        Some(equations::current(declared, self.prior.val()))
+    }
+
     /// Unpack the parameters, once for all evaluations that one gradient runs through.
     pub fn prepare(&self) -> Prepared<'_> {
+        let (frame, prior) = (&self.frame, self.prior.val());
+        let residual = self.residual.as_ref().map(Param::val);
         Prepared {
             model: self,
-            parameters: match &self.prior {
-                Prior::Equations(equations) => equations.columns(),
-                Prior::Network(_) => Vec::new(),
-            },
+            prior: frame.prior().map(|made| Mlp::new(made, &prior)),
+            residual: (frame.residual().zip(residual)).map(|(made, flat)| Mlp::new(made, &flat)),
+            parameters: equations::columns(frame.parameters(), prior),
         }
     }
 
@@ -285,19 +272,19 @@ impl HybridModel {
     /// (projected gradient descent): a parameter may rest on a bound and leave it again.
     #[must_use]
     pub fn project(self) -> Self {
-        let prior = match self.prior {
-            Prior::Equations(equations) => Prior::Equations(equations.project()),
-            network @ Prior::Network(_) => network,
-        };
-        Self { prior, ..self }
+        let prior = self.prior.val().inner();
+        match equations::projected(self.frame.parameters(), &prior) {
+            Some(inside) => Self {
+                prior: learnable(PRIOR_ID, Tensor::from_inner(inside)),
+                ..self
+            },
+            None => self,
+        }
     }
 
     /// The device that the model was made on.
     pub fn device(&self) -> Device {
-        match &self.prior {
-            Prior::Equations(equations) => equations.device(),
-            Prior::Network(mlp) => mlp.device(),
-        }
+        self.prior.val().device()
     }
 
     /// What the model is without its learnable numbers.
@@ -305,40 +292,41 @@ impl HybridModel {
         &self.frame
     }
 
-    /// The learnable numbers: the prior's (its parameters divided by their scales, or its network), and the
-    /// residual's.
-    pub(crate) fn tensors(&self) -> (Tensor<1>, Option<Tensor<1>>) {
-        let prior = match &self.prior {
-            Prior::Equations(equations) => equations.scaled(),
-            Prior::Network(mlp) => mlp.flat(),
-        };
-        (prior, self.residual.as_ref().map(Mlp::flat))
+    /// The learnable numbers of the prior and of the residual.
+    pub(crate) fn tensors(&self) -> [Option<Tensor<1>>; 2] {
+        [
+            Some(self.prior.val()),
+            self.residual.as_ref().map(Param::val),
+        ]
     }
 
-    /// The optimiser's names of the parameters of: the equations, the prior network, the residual.
-    pub(crate) fn ids(&self) -> [Vec<ParamId>; 3] {
-        let (equations, network) = match &self.prior {
-            Prior::Equations(equations) => (vec![equations.id()], Vec::new()),
-            Prior::Network(mlp) => (Vec::new(), vec![mlp.id()]),
-        };
-        let residual = self.residual.iter().map(Mlp::id).collect();
-        [equations, network, residual]
+    /// The same model with other learnable numbers where some are given.
+    pub(crate) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
+        let [prior, residual] = tensors;
+        let prior = prior.map(|tensor| learnable(PRIOR_ID, tensor));
+        let residual = residual.map(|tensor| learnable(RESIDUAL_ID, tensor));
+        Self {
+            prior: prior.unwrap_or_else(|| self.prior.clone()),
+            residual: residual.or_else(|| self.residual.clone()),
+            frame: self.frame.clone(),
+        }
     }
 }
 
 impl Prepared<'_> {
     /// ds/dt for columns of shape `[batch]`: `2n` states, `n` inputs held, time in seconds.
     pub fn flow(&self, state: &[Tensor<1>], input: &[Tensor<1>], time: &Tensor<1>) -> Flow {
-        let (q, qd) = state.split_at(self.model.joints);
-        let mut rates = match &self.model.prior {
-            Prior::Equations(equations) => {
+        let (q, qd) = state.split_at(self.model.joints());
+        let mut rates = match (&self.model.frame.equations, &self.prior) {
+            (Some(equations), _) => {
                 let mut inputs = state.to_vec();
                 inputs.extend_from_slice(input);
                 inputs.push(time.clone());
                 inputs.extend_from_slice(&self.parameters);
-                equations.declared().program.replay(&inputs)
+                equations.program.replay(&inputs)
             }
-            Prior::Network(mlp) => {
+            (None, prior) => {
+                let mlp = prior.as_ref().expect("a prior is equations or a network");
                 let outputs = columns(mlp.forward(q, qd, input));
                 match mlp.on() {
                     ResidualOn::Accelerations => qd.iter().cloned().chain(outputs).collect(),
@@ -346,7 +334,7 @@ impl Prepared<'_> {
                 }
             }
         };
-        let mlp = self.model.residual.as_ref();
+        let mlp = self.residual.as_ref();
         let residual = mlp.map(|mlp| mlp.forward(q, qd, input));
         if let Some(residual) = residual.clone() {
             let parts = columns(residual);
@@ -357,6 +345,10 @@ impl Prepared<'_> {
         }
         Flow { rates, residual }
     }
+}
+
+fn learnable(id: u64, tensor: Tensor<1>) -> Param<Tensor<1>> {
+    Param::initialized(ParamId::from(id), tensor.require_grad())
 }
 
 /// The columns of a matrix `[batch, width]`.

@@ -25,9 +25,10 @@ pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub(crate) use frame::Frame;
 pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};
+#[cfg(test)]
+pub(crate) use hybrid::{PRIOR_ID, RESIDUAL_ID};
 pub use integrator::{Integrator, Step};
 pub use library::Library;
-pub use mlp::Mlp;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, ResidualOn,
     network_dynamics, with_residual,

@@ -2,11 +2,11 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use burn::optim::OptimizerRecord;
-use burn::tensor::{Bytes, Device};
+use burn::tensor::Device;
 
 use super::manifest::{FORMAT, Manifest};
-use super::{Best, CheckpointError, Training, weights};
+use super::optimizer::Moments;
+use super::{Best, CheckpointError, Training, moments, weights};
 use crate::model::{Dynamics, HybridModel, ModelWeights};
 
 const MANIFEST: &str = "checkpoint.json";
@@ -15,7 +15,7 @@ const MODEL: &str = "model.toml";
 const WEIGHTS: &str = "weights.safetensors";
 /// The model to go on from, which differs where an earlier one was the best.
 const LAST: &str = "last.safetensors";
-const OPTIMIZER: &str = "optimizer.bpk";
+const OPTIMIZER: &str = "optimizer.safetensors";
 
 /// Where a run came from: kept in its checkpoints, so that they explain themselves.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +36,7 @@ pub struct Checkpoint {
     /// The model to use.
     pub weights: ModelWeights,
     last: ModelWeights,
-    optimizer: Vec<u8>,
+    optimizer: [Option<Moments>; 2],
     dir: PathBuf,
 }
 
@@ -50,20 +50,17 @@ pub struct Checkpoint {
 /// A directory that cannot be written, or that holds something else than a checkpoint.
 pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
     refuse_other_contents(dir)?;
-    let record = training.optimizer.to_record();
-    let manifest = Manifest::of(training, &origin.config, origin.seed, record.len());
+    let moments = training.optimizer.moments();
+    let steps = [0, 1].map(|k| moments[k].as_ref().map_or(0, |moments| moments.steps));
+    let manifest = Manifest::of(training, &origin.config, origin.seed, steps);
     let last = training.model.weights();
     let used = training.best.as_ref().map_or(&last, |best| &best.weights);
-    let optimizer = record.into_bytes().map_err(|error| {
-        let source = std::io::Error::other(error.to_string());
-        io("encode the optimiser's state for", dir)(source)
-    })?;
     let json = serde_json::to_vec_pretty(&manifest)
         .map_err(|error| io("encode the description of", dir)(std::io::Error::other(error)))?;
     let files: [(&str, &[u8]); 5] = [
         (WEIGHTS, &weights::to_bytes(&manifest, used)),
         (LAST, &weights::to_bytes(&manifest, &last)),
-        (OPTIMIZER, &optimizer),
+        (OPTIMIZER, &moments::to_bytes(&manifest, &moments)),
         (MODEL, origin.model_toml.as_bytes()),
         (MANIFEST, &json),
     ];
@@ -169,10 +166,12 @@ impl Checkpoint {
         let numbers = |file: &str| weights::from_bytes(&manifest, &read(&dir, file)?, file, &dir);
         let model_toml = String::from_utf8(read(&dir, MODEL)?)
             .map_err(|error| corrupt(MODEL, error.to_string(), &dir))?;
+        let (weights, last) = (numbers(WEIGHTS)?, numbers(LAST)?);
+        let bytes = read(&dir, OPTIMIZER)?;
         Ok(Self {
-            weights: numbers(WEIGHTS)?,
-            last: numbers(LAST)?,
-            optimizer: read(&dir, OPTIMIZER)?,
+            optimizer: moments::from_bytes(&manifest, &last, &bytes, OPTIMIZER, &dir)?,
+            weights,
+            last,
             model_toml,
             manifest,
             dir,
@@ -206,7 +205,7 @@ impl Checkpoint {
     /// The run, ready to go on.
     ///
     /// # Errors
-    /// When `dynamics` is another model, or the optimiser's state is damaged.
+    /// When `dynamics` is another model.
     pub fn training(
         &self,
         dynamics: &Dynamics,
@@ -215,16 +214,7 @@ impl Checkpoint {
         let model = self.build(&self.last, dynamics, device)?;
         let manifest = &self.manifest;
         let mut training = Training::new(model, manifest.settings.clone(), manifest.rng.clone())?;
-        let damaged = |reason: String| corrupt(OPTIMIZER, reason, &self.dir);
-        let record = OptimizerRecord::from_bytes(Bytes::from_bytes_vec(self.optimizer.clone()))
-            .map_err(|error| damaged(error.to_string()))?;
-        training.optimizer = training.optimizer.load_record(record);
-        // Burn leaves out what it cannot restore, which would silently change the run.
-        let found = training.optimizer.to_record().len();
-        if found != manifest.optimizer_tensors {
-            let expected = manifest.optimizer_tensors;
-            return Err(damaged(format!("{found} of {expected} tensors")));
-        }
+        training.optimizer.resume(self.optimizer.clone(), device);
         training.epoch = manifest.epoch;
         training.penalty_weight = manifest.penalty_weight;
         training.history.clone_from(&manifest.history);

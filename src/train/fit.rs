@@ -1,17 +1,12 @@
 use std::ops::ControlFlow;
 
-use burn::lr_scheduler::module_lr_scheduler::{ModuleLearningRate, ModuleLrScheduler};
-use burn::module::{Module, ParamGroup};
-use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
+use burn::module::Module;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+use super::optimizer::Stepper;
 use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
 use crate::model::HybridModel;
-
-// PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
-// and would stop them short of it.
-const ADAM_EPSILON: f32 = 1e-8;
 
 /// A training run: a value that can be held, saved ([`save`](super::save)), loaded and continued. Where
 /// it was interrupted does not change its result by a bit on the same backend and machine.
@@ -19,14 +14,13 @@ const ADAM_EPSILON: f32 = 1e-8;
 pub struct Training {
     pub(super) model: HybridModel,
     pub(super) settings: FitSettings,
-    pub(super) optimizer: ModuleOptimizer,
+    pub(super) optimizer: Stepper,
     pub(super) rng: ChaCha8Rng,
     pub(super) epoch: usize,
     pub(super) penalty_weight: f64,
     pub(super) history: Vec<Record>,
     pub(super) best: Option<Best>,
     objective: Objective,
-    rates: ModuleLearningRate,
 }
 
 /// What an observer sees after each epoch.
@@ -77,8 +71,7 @@ impl Training {
                 settings.error_scale.as_deref(),
                 model.joints(),
             )?,
-            rates: learning_rates(&model, &settings),
-            optimizer: AdamConfig::new().with_epsilon(ADAM_EPSILON).init(),
+            optimizer: Stepper::new(&model, &settings.learning_rates),
             epoch: 0,
             penalty_weight: settings.penalty.initial(),
             history: Vec::new(),
@@ -207,11 +200,7 @@ impl Training {
         let weights = self.weights();
         let (total, [error, _]) = self.total(&loss, weights)?;
         let gradients = loss.weighted(weights).backward();
-        let gradients = GradientsParams::from_grads(gradients, &self.model);
-        let stepped = self
-            .optimizer
-            .step(self.rates.clone(), self.model.clone(), gradients);
-        self.model = stepped.project();
+        self.model = self.optimizer.step(&self.model, gradients).project();
         Ok(Epoch { loss: total, error })
     }
 
@@ -273,14 +262,4 @@ impl Training {
             },
         })
     }
-}
-
-fn learning_rates(model: &HybridModel, settings: &FitSettings) -> ModuleLearningRate {
-    let rates = settings.learning_rates;
-    let [equations, prior, residual] = model.ids();
-    ModuleLrScheduler::new(rates.residual)
-        .with_group(ParamGroup::from_ids(equations), rates.physics)
-        .with_group(ParamGroup::from_ids(prior), rates.prior)
-        .with_group(ParamGroup::from_ids(residual), rates.residual)
-        .step()
 }

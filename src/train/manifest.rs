@@ -30,8 +30,8 @@ pub struct Manifest {
     /// alpha or lambda.
     pub penalty_weight: f64,
     pub rng: rand_chacha::ChaCha8Rng,
-    /// Tensors in `optimizer.bpk`, to notice a file that lost some.
-    pub optimizer_tensors: usize,
+    /// Steps that Adam has taken with the prior and with the residual.
+    pub optimizer_steps: [usize; 2],
     pub best: Option<SavedBest>,
     pub history: Vec<Record>,
 }
@@ -70,7 +70,7 @@ impl Manifest {
         training: &Training,
         config: &serde_json::Value,
         seed: u64,
-        optimizer_tensors: usize,
+        optimizer_steps: [usize; 2],
     ) -> Self {
         let weights = training.model.weights();
         Self {
@@ -89,7 +89,7 @@ impl Manifest {
             epoch: training.epoch,
             penalty_weight: training.penalty_weight,
             rng: training.rng.clone(),
-            optimizer_tensors,
+            optimizer_steps,
             best: training.best.as_ref().map(|best| SavedBest {
                 epoch: best.epoch,
                 validation: Some(best.validation),

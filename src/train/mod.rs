@@ -10,6 +10,8 @@ mod fused;
 mod history;
 mod loss;
 mod manifest;
+mod moments;
+mod optimizer;
 mod penalty;
 mod segments;
 mod settings;

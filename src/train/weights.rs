@@ -13,11 +13,23 @@ use super::manifest::{Manifest, SavedNetwork};
 use crate::model::{LayerWeights, MlpWeights, ModelWeights};
 
 /// A tensor on its way into a file.
-struct Entry {
+pub(super) struct Entry {
     name: String,
     dtype: Dtype,
     shape: Vec<usize>,
     bytes: Vec<u8>,
+}
+
+impl Entry {
+    /// A vector of f32.
+    pub(super) fn of_f32(name: String, values: &[f32]) -> Self {
+        Self {
+            name,
+            dtype: Dtype::F32,
+            shape: vec![values.len()],
+            bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        }
+    }
 }
 
 /// The bytes of the file.
@@ -35,6 +47,11 @@ pub(super) fn to_bytes(manifest: &Manifest, weights: &ModelWeights) -> Vec<u8> {
             entries.extend(layer_entries(prefix, k, layer));
         }
     }
+    serialize(manifest, &entries)
+}
+
+/// The bytes of a file with these tensors.
+pub(super) fn serialize(manifest: &Manifest, entries: &[Entry]) -> Vec<u8> {
     let views = entries.iter().map(|entry| {
         let view = TensorView::new(entry.dtype, entry.shape.clone(), &entry.bytes)
             .expect("bytes are written for the shape");
@@ -76,13 +93,7 @@ pub(super) fn from_bytes(
     file: &str,
     dir: &Path,
 ) -> Result<ModelWeights, CheckpointError> {
-    let corrupt = |reason: String| CheckpointError::Corrupt {
-        file: file.to_owned(),
-        reason,
-        dir: dir.to_owned(),
-    };
-    let tensors = SafeTensors::deserialize(bytes).map_err(|error| corrupt(error.to_string()))?;
-    let reader = Reader { tensors, file, dir };
+    let reader = Reader::new(bytes, file, dir)?;
     let parameters = (manifest.parameters.iter())
         .map(|p| Ok(reader.read(&format!("parameters.{}", p.name), Dtype::F64, &[1])?[0]))
         .collect::<Result<_, CheckpointError>>()?;
@@ -97,13 +108,28 @@ pub(super) fn from_bytes(
     })
 }
 
-struct Reader<'a> {
+/// A file of tensors, and its name for messages.
+pub(super) struct Reader<'a> {
     tensors: SafeTensors<'a>,
     file: &'a str,
     dir: &'a Path,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
+    pub(super) fn new(
+        bytes: &'a [u8],
+        file: &'a str,
+        dir: &'a Path,
+    ) -> Result<Self, CheckpointError> {
+        let tensors =
+            SafeTensors::deserialize(bytes).map_err(|error| CheckpointError::Corrupt {
+                file: file.to_owned(),
+                reason: error.to_string(),
+                dir: dir.to_owned(),
+            })?;
+        Ok(Self { tensors, file, dir })
+    }
+
     fn network(&self, prefix: &str, saved: &SavedNetwork) -> Result<MlpWeights, CheckpointError> {
         let pairs = saved.widths.windows(2).enumerate();
         let layers = pairs.map(|(k, pair)| {
@@ -124,7 +150,12 @@ impl Reader<'_> {
         })
     }
 
-    fn read(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<Vec<f64>, CheckpointError> {
+    pub(super) fn read(
+        &self,
+        name: &str,
+        dtype: Dtype,
+        shape: &[usize],
+    ) -> Result<Vec<f64>, CheckpointError> {
         let corrupt = |reason| CheckpointError::Corrupt {
             file: self.file.to_owned(),
             reason,

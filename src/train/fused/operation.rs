@@ -21,8 +21,8 @@ pub(in crate::train) fn loss(
     scale: &[f64],
     memory: &Arc<Memory>,
 ) -> Tensor<1> {
-    let (prior, residual) = model.tensors();
-    let residual = residual.unwrap_or_else(|| Tensor::zeros([0], &prior.device()));
+    let none = || Tensor::zeros([0], &model.device());
+    let [prior, residual] = model.tensors().map(|numbers| numbers.unwrap_or_else(none));
     let plan = Plan::new(model.frame(), blocks, integrator, scale);
     Tensor::from_dispatch(<Dispatch as LossOperation>::fused_loss(
         prior.into_dispatch(),

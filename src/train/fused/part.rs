@@ -93,7 +93,7 @@ impl WithSimd for Forward<'_> {
             numbers,
             part,
         } = self;
-        let mut program = tape(&plan.frame.program, plan, numbers);
+        let mut program = tape(&plan.frame.program, numbers);
         part.sums = [0.0; 2];
         for (chunk, first) in part.chunks(block_rows(plan, numbers)) {
             let worker = worker(simd, plan, numbers, chunk);
@@ -119,7 +119,7 @@ impl WithSimd for Backward<'_> {
             seeds,
         } = self;
         let frame = &plan.frame;
-        let free = frame.parameters.iter().filter(|p| !p.fixed).count();
+        let free = frame.parameters().iter().filter(|p| !p.fixed).count();
         part.parameter_sums.clear();
         part.parameter_sums.resize(free, Rows::splat(0.0));
         part.network_sums.resize(numbers.networks.len(), Vec::new());
@@ -127,9 +127,9 @@ impl WithSimd for Backward<'_> {
             sums.clear();
             sums.resize(network.numbers() * f32::lanes::<S>(), 0.0);
         }
-        let mut program = tape(&frame.program, plan, numbers);
+        let mut program = tape(&frame.program, numbers);
         let mut adjoints =
-            [&frame.adjoint, &frame.parameter_adjoint].map(|program| tape(program, plan, numbers));
+            [&frame.adjoint, &frame.parameter_adjoint].map(|program| tape(program, numbers));
         let mut records = std::mem::take(&mut part.records);
         for (chunk, first) in part.chunks(block_rows(plan, numbers)) {
             let worker = worker(simd, plan, numbers, chunk);
@@ -190,10 +190,11 @@ fn block_rows(plan: &Plan, numbers: &Numbers) -> usize {
     Layout::new(plan.frame.joints, &numbers.networks, plan.stages(), 1).rows(plan.blocks.steps)
 }
 
-/// A program with the parameters in place.
-fn tape<'p>(program: &'p Program, plan: &Plan, numbers: &Numbers) -> Tape<'p, f32, W> {
-    let mut tape = program.tape();
-    let slots = &mut tape.inputs()[3 * plan.frame.joints + 1..];
+/// A program with the parameters, its last inputs, in place.
+fn tape<'p>(program: &'p Program, numbers: &Numbers) -> Tape<'p, f32, W> {
+    let first = program.inputs().len() - numbers.parameters.len();
+    let mut tape = program.tape_with_held(first);
+    let slots = &mut tape.inputs()[first..];
     for (slot, value) in slots.iter_mut().zip(&numbers.parameters) {
         slot.fill(*value);
     }

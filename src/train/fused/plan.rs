@@ -47,12 +47,12 @@ impl Plan {
     /// The numbers of both tensors.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
     pub(super) fn numbers(&self, prior: &[f32], residual: &[f32]) -> Numbers {
-        let flat = match self.frame.has_prior {
-            true => [prior, residual],
-            false => [residual, &[]],
+        let flat = match self.frame.equations {
+            None => [prior, residual],
+            Some(_) => [residual, &[]],
         };
         let networks = self.frame.networks.iter().zip(flat);
-        let parameters = self.frame.parameters.iter().zip(prior);
+        let parameters = self.frame.parameters().iter().zip(prior);
         Numbers {
             parameters: parameters
                 .map(|(p, scaled)| match p.fixed {

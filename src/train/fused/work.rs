@@ -117,14 +117,14 @@ impl Work {
             }
         }
         let mut free = first.by_parameters.iter();
-        let parameters = self.plan.frame.parameters.iter().map(|p| match p.fixed {
+        let parameters = self.plan.frame.parameters().iter().map(|p| match p.fixed {
             true => 0.0,
             false => (free.next().expect("one number for each free parameter") * p.scale) as f32,
         });
         let mut networks = std::mem::take(&mut first.by_networks).into_iter();
-        let prior = match self.plan.frame.has_prior {
-            true => networks.next().unwrap_or_default(),
-            false => parameters.collect(),
+        let prior = match self.plan.frame.equations {
+            None => networks.next().unwrap_or_default(),
+            Some(_) => parameters.collect(),
         };
         [prior, networks.next().unwrap_or_default()]
     }

@@ -403,7 +403,7 @@ impl<S: Simd> Worker<'_, S> {
         if by_states + part.parameter_sums.len() == 0 {
             return;
         }
-        let first = 3 * self.plan.frame.joints + 1 + self.numbers.parameters.len();
+        let first = 3 * self.plan.frame.joints + 1;
         for (b, block) in self.chunk.clone().enumerate() {
             self.set_inputs(
                 adjoint,
@@ -411,7 +411,7 @@ impl<S: Simd> Worker<'_, S> {
                 block,
                 &record.states[b * states..][..states],
             );
-            let seeds = &mut adjoint.inputs()[first..];
+            let seeds = &mut adjoint.moving()[first..];
             let rates = &part.scratch.rates[b * states..][..states];
             let features = (self.numbers.networks.iter().zip(&part.by_features))
                 .flat_map(|(network, by)| &by[b * network.features()..][..network.features()]);
@@ -436,7 +436,7 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     fn set_inputs(&self, program: &mut Tape<f32, W>, place: Place, block: usize, state: &[Rows]) {
         let given = self.plan.blocks.given(block, place.step);
-        let inputs = program.inputs();
+        let inputs = program.moving();
         for (to, from) in inputs.iter_mut().zip(state.iter().chain(given.input)) {
             *to = *from;
         }

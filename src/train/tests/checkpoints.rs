@@ -131,22 +131,18 @@ fn what_is_no_checkpoint_is_named() {
 #[test]
 fn a_damaged_optimiser_state_is_noticed() {
     let (_parent, dir) = saved();
-    let load = || {
-        let checkpoint = Checkpoint::load(&dir).unwrap();
-        let run = checkpoint.training(&pendulum(8.0, 2.0), &Backend::Flex.device());
-        run.err().unwrap().to_string()
-    };
-    let path = dir.join("optimizer.bpk");
+    let load = || message(&dir);
+    let path = dir.join("optimizer.safetensors");
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     assert!(
-        load().starts_with("the checkpoint's file \"optimizer.bpk\" is damaged ("),
+        load().starts_with("the checkpoint's file \"optimizer.safetensors\" is damaged ("),
         "{}",
         load()
     );
     fs::write(&path, b"").unwrap();
     assert!(
-        load().starts_with("the checkpoint's file \"optimizer.bpk\" is damaged ("),
+        load().starts_with("the checkpoint's file \"optimizer.safetensors\" is damaged ("),
         "{}",
         load()
     );

@@ -1,5 +1,4 @@
 use burn::module::Module;
-use burn::optim::GradientsParams;
 
 use super::{hybrid, rng, transitions};
 use crate::model::{HybridModel, Integrator, LastLayer, MlpWeights, ModelWeights};
@@ -57,10 +56,10 @@ fn gradients_match_central_differences() {
         let segments = segments();
         let model = hybrid((8.0, 2.0), &segments, backend, LastLayer::Random);
         let gradients = total(&model, &segments, integrator).backward();
-        let gradients = GradientsParams::from_grads(gradients, &model);
-        let [equations, _, residual] = model.ids();
-        let physics = gradients.get::<1>(equations[0]).unwrap().into_data();
-        let residual = gradients.get::<1>(residual[0]).unwrap().into_data();
+        let of = |numbers: Option<burn::Tensor<1>>| {
+            numbers.unwrap().grad(&gradients).unwrap().into_data()
+        };
+        let [physics, residual] = model.tensors().map(of);
         let (physics, residual): (Vec<f32>, Vec<f32>) =
             (physics.iter().collect(), residual.iter().collect());
         // After the weights and biases of the first layer.
@@ -95,9 +94,8 @@ fn a_residual_of_zero_has_a_finite_gradient() {
     let segments = transitions(20, -0.5, 1);
     let model = hybrid((15.0, 3.0), &segments, Backend::Flex, LastLayer::Zero);
     let gradients = total(&model, &segments, Integrator::default()).backward();
-    let gradients = GradientsParams::from_grads(gradients, &model);
-    let [.., residual] = model.ids();
-    let all = gradients.get::<1>(residual[0]).unwrap().into_data();
+    let [_, residual] = model.tensors();
+    let all = residual.unwrap().grad(&gradients).unwrap().into_data();
     let last: Vec<f32> = all.iter().skip(16 * (4 + 17 + 17)).collect();
     assert!(last.iter().all(|g| g.is_finite()) && last.iter().any(|g| *g != 0.0));
 }

@@ -1,0 +1,61 @@
+//! What Adam remembers as a safetensors file: `prior.first`, `prior.second`, `residual.first` and `residual.second`,
+//! f32 each.
+
+use std::path::Path;
+
+use safetensors::Dtype;
+
+use super::CheckpointError;
+use super::manifest::Manifest;
+use super::optimizer::Moments;
+use super::weights::{Entry, Reader, serialize};
+use crate::model::ModelWeights;
+
+const PARTS: [&str; 2] = ["prior", "residual"];
+
+/// The bytes of the file.
+pub(super) fn to_bytes(manifest: &Manifest, moments: &[Option<Moments>; 2]) -> Vec<u8> {
+    let known = PARTS.iter().zip(moments);
+    let entries = known.filter_map(|(part, moments)| {
+        let moments = moments.as_ref()?;
+        Some([
+            Entry::of_f32(format!("{part}.first"), &moments.first),
+            Entry::of_f32(format!("{part}.second"), &moments.second),
+        ])
+    });
+    serialize(manifest, &entries.flatten().collect::<Vec<_>>())
+}
+
+/// Read the file back; `manifest` says what must be in it, and `weights` how much of it.
+pub(super) fn from_bytes(
+    manifest: &Manifest,
+    weights: &ModelWeights,
+    bytes: &[u8],
+    file: &str,
+    dir: &Path,
+) -> Result<[Option<Moments>; 2], CheckpointError> {
+    let reader = Reader::new(bytes, file, dir)?;
+    let of_prior = weights.prior.as_ref();
+    let lengths = [
+        of_prior.map_or(weights.parameters.len(), |prior| prior.flat().len()),
+        weights.residual.as_ref().map_or(0, |r| r.flat().len()),
+    ];
+    let read = |k: usize| -> Result<Option<Moments>, CheckpointError> {
+        let steps = manifest.optimizer_steps[k];
+        #[allow(clippy::cast_possible_truncation)] // f32 in the file, widened by the reader
+        let moment = |which: &str| -> Result<Vec<f32>, CheckpointError> {
+            let name = format!("{}.{which}", PARTS[k]);
+            let values = reader.read(&name, Dtype::F32, &[lengths[k]])?;
+            Ok(values.into_iter().map(|value| value as f32).collect())
+        };
+        if steps == 0 {
+            return Ok(None);
+        }
+        Ok(Some(Moments {
+            steps,
+            first: moment("first")?,
+            second: moment("second")?,
+        }))
+    };
+    Ok([read(0)?, read(1)?])
+}
