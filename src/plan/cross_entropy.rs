@@ -1,9 +1,11 @@
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::gaussian::Gaussian;
 use crate::batch::{Rows, W};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use crate::rounds::Rounds;
 
 /// Who knows what sequences of inputs bring. One of them serves one block of candidates.
 pub trait Evaluate: Send {
@@ -35,14 +37,24 @@ pub struct Settings {
 /// number of processor cores: each block of candidates has a random stream of its own.
 pub struct CrossEntropy<E> {
     settings: Settings,
+    // Locks, since those who help with a round borrow all of it for as long as the search lasts. Nobody waits at them.
+    distribution: RwLock<Distribution>,
+    blocks: Vec<Mutex<Candidates<E>>>,
+    ranking: Vec<(f32, usize)>,
+    rounds: Rounds,
+}
+
+/// From what candidates are drawn: a normal distribution for each number of a sequence, `[step * n + input]`.
+#[derive(Debug, Clone)]
+struct Distribution {
     /// Of each input: lowest and highest value.
     bounds: Vec<[f32; 2]>,
     /// The middle of the bounds at every step.
     middle: Vec<f32>,
     mean: Vec<f32>,
     deviation: Vec<f32>,
-    blocks: Vec<Candidates<E>>,
-    ranking: Vec<(f32, usize)>,
+    /// Whether no candidates have been drawn in this search.
+    first: bool,
 }
 
 /// One block of candidates.
@@ -113,144 +125,190 @@ impl<E: Evaluate> CrossEntropy<E> {
                 returns: Rows::splat(0.0),
             }
         };
-        #[allow(clippy::cast_possible_truncation)] // planning runs in f32
-        let bounds: Vec<[f32; 2]> = bounds.iter().map(|range| range.map(|x| x as f32)).collect();
-        let centres = bounds.iter().map(|[low, high]| 0.5 * (low + high));
-        let middle: Vec<f32> = centres.cycle().take(numbers).collect();
         Self {
             settings,
-            mean: middle.clone(),
-            middle,
-            deviation: vec![0.0; numbers],
-            blocks: (0..population.div_ceil(W)).map(block).collect(),
+            distribution: RwLock::new(Distribution::new(bounds, horizon)),
+            blocks: (0..population.div_ceil(W))
+                .map(|index| Mutex::new(block(index)))
+                .collect(),
             ranking: Vec::with_capacity(population),
-            bounds,
+            rounds: Rounds::new(),
         }
     }
 
     /// Begin again in the middle of the bounds.
     pub fn forget(&mut self) {
-        self.mean.copy_from_slice(&self.middle);
-    }
-
-    /// Search for the best inputs from `start`.
-    pub fn plan(&mut self, start: &E::Start) -> Plan {
-        for (deviation, [low, high]) in self.deviation.iter_mut().zip(self.bounds.iter().cycle()) {
-            *deviation = 0.25 * (high - low);
-        }
-        let mut diverged = 0;
-        // Within the pool the iterations hand their blocks over without waking it each time.
-        rayon::scope(|_| {
-            for iteration in 0..self.settings.iterations {
-                self.evaluate(start, iteration == 0);
-                diverged += self.rank();
-                self.refit();
-            }
-        });
-        let inputs = self.mean.chunks(self.bounds.len());
-        Plan {
-            inputs: inputs
-                .map(|step| step.iter().copied().map(f64::from).collect())
-                .collect(),
-            best: self
-                .ranking
-                .first()
-                .map_or(f64::NEG_INFINITY, |(best, _)| f64::from(*best)),
-            diverged,
-        }
+        let Distribution { middle, mean, .. } = own(&mut self.distribution);
+        mean.copy_from_slice(middle);
     }
 
     /// The first `steps` of the plan have been carried out: the next search starts from the rest, and from the
     /// middle of the bounds behind it.
     pub fn shift(&mut self, steps: usize) {
+        own(&mut self.distribution).shift(steps);
+    }
+
+    /// Search for the best inputs from `start`.
+    pub fn plan(&mut self, start: &E::Start) -> Plan {
+        let Self {
+            settings,
+            distribution,
+            blocks,
+            ranking,
+            rounds,
+        } = self;
+        let (distribution, blocks) = (&*distribution, blocks.as_slice());
+        write(distribution).begin();
+        let draw_and_evaluate = |index: usize| {
+            let mut block = lock(&blocks[index]);
+            block.draw(&read(distribution), index);
+            block.evaluate(start);
+        };
+        let mut diverged = 0;
+        rounds.helped(&draw_and_evaluate, || {
+            for _ in 0..settings.iterations {
+                rounds.run(blocks.len(), &draw_and_evaluate);
+                diverged += rank(settings, blocks, ranking);
+                write(distribution).refit(blocks, ranking);
+            }
+        });
+        let best = ranking
+            .first()
+            .map_or(f64::NEG_INFINITY, |(best, _)| f64::from(*best));
+        Plan {
+            inputs: read(distribution).steps(),
+            best,
+            diverged,
+        }
+    }
+}
+
+impl Distribution {
+    #[allow(clippy::cast_possible_truncation)] // planning runs in f32
+    fn new(bounds: &[[f64; 2]], horizon: usize) -> Self {
+        let bounds: Vec<[f32; 2]> = bounds.iter().map(|range| range.map(|x| x as f32)).collect();
+        let centres = bounds.iter().map(|[low, high]| 0.5 * (low + high));
+        let middle: Vec<f32> = centres.cycle().take(horizon * bounds.len()).collect();
+        Self {
+            mean: middle.clone(),
+            deviation: vec![0.0; middle.len()],
+            first: true,
+            middle,
+            bounds,
+        }
+    }
+
+    /// As wide as at first, around the mean.
+    fn begin(&mut self) {
+        self.first = true;
+        for (deviation, [low, high]) in self.deviation.iter_mut().zip(self.bounds.iter().cycle()) {
+            *deviation = 0.25 * (high - low);
+        }
+    }
+
+    fn shift(&mut self, steps: usize) {
         let done = (steps * self.bounds.len()).min(self.mean.len());
         self.mean.rotate_left(done);
         let left = self.mean.len() - done;
         self.mean[left..].copy_from_slice(&self.middle[left..]);
     }
 
-    /// Draw all candidates and ask what they bring. At first every other block starts from the middle of the bounds:
-    /// what is left of a plan can lead into a worse optimum than a search that knows nothing.
-    fn evaluate(&mut self, start: &E::Start, first: bool) {
-        let Self {
-            bounds,
-            middle,
-            mean,
-            deviation,
-            ..
-        } = self;
-        let blocks = self.blocks.par_iter_mut().enumerate();
-        blocks.for_each(|(index, block)| {
-            let fresh = first && index % 2 == 1;
-            let mean: &[f32] = if fresh { middle } else { mean };
-            block.draw(bounds, mean, deviation);
-            let Candidates {
-                evaluate,
-                inputs,
-                returns,
-                ..
-            } = block;
-            evaluate.returns(start, inputs, returns);
-        });
-    }
-
-    /// Order the elite first. Returns how many candidates diverged.
-    fn rank(&mut self) -> usize {
-        let Settings {
-            population, elite, ..
-        } = self.settings;
-        let returns = self
-            .blocks
-            .iter()
-            .flat_map(|block| block.returns.iter().copied());
-        self.ranking.clear();
-        self.ranking.extend(
-            returns
-                .take(population)
-                .zip(0..)
-                .filter(|(r, _)| r.is_finite()),
-        );
-        let best_first =
-            |a: &(f32, usize), b: &(f32, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-        let finite = self.ranking.len();
-        if finite > elite {
-            self.ranking.select_nth_unstable_by(elite, best_first);
-            self.ranking.truncate(elite);
+    /// The means that candidates of a block are drawn around. At first every other block starts from the middle of
+    /// the bounds: what is left of a plan can lead into a worse optimum than a search that knows nothing.
+    fn mean_of(&self, block: usize) -> &[f32] {
+        if self.first && block % 2 == 1 {
+            &self.middle
+        } else {
+            &self.mean
         }
-        self.ranking.sort_unstable_by(best_first);
-        population - finite
     }
 
     /// Mean and standard deviation of the elite; where all candidates diverged the distribution stays.
-    fn refit(&mut self) {
-        if self.ranking.is_empty() {
+    fn refit<E>(&mut self, blocks: &[Mutex<Candidates<E>>], elite: &[(f32, usize)]) {
+        self.first = false;
+        if elite.is_empty() {
             return;
         }
-        let count = self.ranking.len() as f32;
-        let ranges = self.bounds.iter().cycle();
-        let numbers = self.mean.iter_mut().zip(&mut self.deviation).zip(ranges);
+        let count = elite.len() as f32;
+        let blocks: Vec<_> = blocks.iter().map(lock).collect();
+        let numbers = self
+            .mean
+            .iter_mut()
+            .zip(&mut self.deviation)
+            .zip(self.bounds.iter().cycle());
         for (k, ((mean, deviation), [low, high])) in numbers.enumerate() {
-            let elite = self
-                .ranking
-                .iter()
-                .map(|(_, i)| self.blocks[i / W].inputs[k][i % W]);
-            *mean = elite.clone().sum::<f32>() / count;
-            let variance = elite.map(|x| (x - *mean).powi(2)).sum::<f32>() / count;
+            let values = elite.iter().map(|(_, i)| blocks[i / W].inputs[k][i % W]);
+            *mean = values.clone().sum::<f32>() / count;
+            let variance = values.map(|x| (x - *mean).powi(2)).sum::<f32>() / count;
             *deviation = variance.sqrt().max(LEAST_DEVIATION * 0.5 * (high - low));
         }
     }
+
+    /// The means as `[step][input]`.
+    fn steps(&self) -> Vec<Vec<f64>> {
+        let steps = self.mean.chunks(self.bounds.len());
+        steps
+            .map(|step| step.iter().copied().map(f64::from).collect())
+            .collect()
+    }
 }
 
-impl<E> Candidates<E> {
-    fn draw(&mut self, bounds: &[[f32; 2]], mean: &[f32], deviation: &[f32]) {
+/// Rank the elite, best first. Returns how many candidates diverged.
+fn rank<E>(
+    settings: &Settings,
+    blocks: &[Mutex<Candidates<E>>],
+    ranking: &mut Vec<(f32, usize)>,
+) -> usize {
+    ranking.clear();
+    for (index, block) in blocks.iter().enumerate() {
+        let returns = lock(block).returns;
+        let numbered = returns.iter().copied().zip(index * W..settings.population);
+        ranking.extend(numbered.filter(|(value, _)| value.is_finite()));
+    }
+    let finite = ranking.len();
+    let best_first = |a: &(f32, usize), b: &(f32, usize)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    if finite > settings.elite {
+        ranking.select_nth_unstable_by(settings.elite, best_first);
+        ranking.truncate(settings.elite);
+    }
+    ranking.sort_unstable_by(best_first);
+    settings.population - finite
+}
+
+// A lock is poisoned only where a thread panicked, which ends the search.
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn own<T>(lock: &mut RwLock<T>) -> &mut T {
+    lock.get_mut().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl<E: Evaluate> Candidates<E> {
+    /// Draw the candidates of the block with this index.
+    fn draw(&mut self, from: &Distribution, index: usize) {
         self.gaussian
             .fill(self.arch, &mut self.rng, &mut self.inputs);
         self.arch.dispatch(Place {
-            bounds,
-            mean,
-            deviation,
+            bounds: &from.bounds,
+            mean: from.mean_of(index),
+            deviation: &from.deviation,
             inputs: &mut self.inputs,
         });
+    }
+
+    fn evaluate(&mut self, start: &E::Start) {
+        self.evaluate
+            .returns(start, &self.inputs, &mut self.returns);
     }
 }
 
