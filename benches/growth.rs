@@ -127,11 +127,13 @@ impl Work {
         };
         let bounds = vec![[-3.0, 3.0]; self.joints];
         let rng = ChaCha8Rng::seed_from_u64(4);
-        let mut planner = CrossEntropy::new(settings, &bounds, || rollouts.block(), &rng);
+        let planner = CrossEntropy::new(settings, &bounds, || rollouts.block(), &rng);
         let start = Start::new(&vec![0.1; 2 * self.joints], 0.0);
-        best(|| {
-            planner.forget();
-            seconds(|| drop(planner.plan(&start)))
+        planner.helped(|| {
+            best(|| {
+                planner.forget();
+                seconds(|| drop(planner.plan(start.clone())))
+            })
         })
     }
 }

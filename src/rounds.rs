@@ -26,18 +26,19 @@ impl Rounds {
         Self::default()
     }
 
-    /// Call `lead`, while the other threads of the pool carry out `work` on their share of the tasks of every
-    /// [`Rounds::run`] in it. They must be given the same work.
-    pub fn helped<R: Send>(
-        &self,
-        work: &(impl Fn(usize) + Sync),
-        lead: impl FnOnce() -> R + Send,
-    ) -> R {
+    /// Call `lead`, while other threads carry out `work` on their share of the tasks of every [`Rounds::run`] in it,
+    /// which must be given the same work. They are as many as rayon's pool has cores to use besides this one, and none
+    /// on a thread of that pool: its cores have other work then.
+    pub fn helped<R>(&self, work: &(impl Fn(usize) + Sync), lead: impl FnOnce() -> R) -> R {
+        let helpers = match rayon::current_thread_index() {
+            Some(_) => 0,
+            None => rayon::current_num_threads() - 1,
+        };
         self.over.store(false, Ordering::Release);
-        rayon::scope(|scope| {
+        std::thread::scope(|scope| {
             let _over = Over(self);
-            for _ in 1..rayon::current_num_threads() {
-                scope.spawn(|_| self.help(work));
+            for _ in 0..helpers {
+                scope.spawn(|| self.help(work));
             }
             lead()
         })

@@ -10,7 +10,7 @@ use crate::rounds::Rounds;
 /// Who knows what sequences of inputs bring. One of them serves one block of candidates.
 pub trait Evaluate: Send {
     /// Where a plan starts.
-    type Start: Sync;
+    type Start: Send + Sync;
 
     /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); not a number or
     /// infinite where it cannot be told.
@@ -33,14 +33,16 @@ pub struct Settings {
 /// distributions, take mean and standard deviation of the elite, and again. The mean is the plan; what is left of it
 /// after some steps starts the next search.
 ///
+/// One who plans again and again does so within [`CrossEntropy::helped`].
+///
 /// Candidates outside of the bounds are drawn back to them before they are evaluated. The result is the same on any
 /// number of processor cores: each block of candidates has a random stream of its own.
-pub struct CrossEntropy<E> {
+pub struct CrossEntropy<E: Evaluate> {
     settings: Settings,
-    // Locks, since those who help with a round borrow all of it for as long as the search lasts. Nobody waits at them.
+    // Locks, since those who help share all of it with the one who leads. Nobody waits at them.
+    start: RwLock<Option<E::Start>>,
     distribution: RwLock<Distribution>,
     blocks: Vec<Mutex<Candidates<E>>>,
-    ranking: Vec<(f32, usize)>,
     rounds: Rounds,
 }
 
@@ -131,55 +133,53 @@ impl<E: Evaluate> CrossEntropy<E> {
             blocks: (0..population.div_ceil(W))
                 .map(|index| Mutex::new(block(index)))
                 .collect(),
-            ranking: Vec::with_capacity(population),
+            start: RwLock::new(None),
             rounds: Rounds::new(),
         }
     }
 
+    /// Call `lead`, while all cores stay ready for the searches in it. Outside of it a search runs on one core.
+    pub fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
+        self.rounds
+            .helped(&|index| self.draw_and_evaluate(index), lead)
+    }
+
     /// Begin again in the middle of the bounds.
-    pub fn forget(&mut self) {
-        let Distribution { middle, mean, .. } = own(&mut self.distribution);
+    pub fn forget(&self) {
+        let Distribution { middle, mean, .. } = &mut *write(&self.distribution);
         mean.copy_from_slice(middle);
     }
 
     /// The first `steps` of the plan have been carried out: the next search starts from the rest, and from the
     /// middle of the bounds behind it.
-    pub fn shift(&mut self, steps: usize) {
-        own(&mut self.distribution).shift(steps);
+    pub fn shift(&self, steps: usize) {
+        write(&self.distribution).shift(steps);
     }
 
     /// Search for the best inputs from `start`.
-    pub fn plan(&mut self, start: &E::Start) -> Plan {
-        let Self {
-            settings,
-            distribution,
-            blocks,
-            ranking,
-            rounds,
-        } = self;
-        let (distribution, blocks) = (&*distribution, blocks.as_slice());
-        write(distribution).begin();
-        let draw_and_evaluate = |index: usize| {
-            let mut block = lock(&blocks[index]);
-            block.draw(&read(distribution), index);
-            block.evaluate(start);
-        };
-        let mut diverged = 0;
-        rounds.helped(&draw_and_evaluate, || {
-            for _ in 0..settings.iterations {
-                rounds.run(blocks.len(), &draw_and_evaluate);
-                diverged += rank(settings, blocks, ranking);
-                write(distribution).refit(blocks, ranking);
-            }
-        });
-        let best = ranking
-            .first()
-            .map_or(f64::NEG_INFINITY, |(best, _)| f64::from(*best));
+    pub fn plan(&self, start: E::Start) -> Plan {
+        *write(&self.start) = Some(start);
+        write(&self.distribution).begin();
+        let (mut ranking, mut diverged) = (Vec::with_capacity(self.settings.population), 0);
+        for _ in 0..self.settings.iterations {
+            let tasks = self.blocks.len();
+            self.rounds
+                .run(tasks, &|index| self.draw_and_evaluate(index));
+            diverged += rank(&self.settings, &self.blocks, &mut ranking);
+            write(&self.distribution).refit(&self.blocks, &ranking);
+        }
+        let best = ranking.first();
         Plan {
-            inputs: read(distribution).steps(),
-            best,
+            inputs: read(&self.distribution).steps(),
+            best: best.map_or(f64::NEG_INFINITY, |(best, _)| f64::from(*best)),
             diverged,
         }
+    }
+
+    fn draw_and_evaluate(&self, index: usize) {
+        let mut block = lock(&self.blocks[index]);
+        block.draw(&read(&self.distribution), index);
+        block.evaluate(read(&self.start).as_ref().expect("a search has a start"));
     }
 }
 
@@ -287,10 +287,6 @@ fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
 
 fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
     lock.write().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn own<T>(lock: &mut RwLock<T>) -> &mut T {
-    lock.get_mut().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<E: Evaluate> Candidates<E> {
