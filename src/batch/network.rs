@@ -53,18 +53,30 @@ impl Network {
             turned += weights;
             value += outputs;
         }
-        assert_eq!(number, numbers.len(), "numbers of a network of {widths:?}");
-        let mut transposed = Vec::with_capacity(turned);
-        for layer in &layers {
-            let weight = &numbers[layer.weight.clone()];
-            for input in 0..layer.inputs {
-                transposed.extend(weight.iter().skip(input).step_by(layer.inputs));
-            }
-        }
-        Self {
+        let mut network = Self {
             layers,
-            numbers: numbers.to_vec(),
-            transposed,
+            numbers: vec![0.0; number],
+            transposed: vec![0.0; turned],
+        };
+        network.set_numbers(numbers);
+        network
+    }
+
+    /// The same network with other numbers.
+    ///
+    /// # Panics
+    /// When they are not as many.
+    pub fn set_numbers(&mut self, numbers: &[f32]) {
+        self.numbers.copy_from_slice(numbers);
+        for layer in &self.layers {
+            let weight = &numbers[layer.weight.clone()];
+            let transposed = &mut self.transposed[layer.transposed.clone()];
+            for (output, weights) in weight.chunks_exact(layer.inputs).enumerate() {
+                let column = transposed[output..].iter_mut().step_by(layer.outputs);
+                for (to, weight) in column.zip(weights) {
+                    *to = *weight;
+                }
+            }
         }
     }
 

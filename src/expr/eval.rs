@@ -1,6 +1,8 @@
-use super::Program;
+use std::borrow::Cow;
+
 use super::op::Op;
 use super::steps::{Kind, Step};
+use super::{Node, Program};
 use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
 
 /// The number types that programs run on: f64 to fit, f32 to train and plan.
@@ -16,7 +18,8 @@ impl Real for f64 {}
 /// processor at hand where `W` is a multiple of theirs and one after the other elsewhere.
 #[derive(Debug, Clone)]
 pub struct Tape<'p, T, const W: usize> {
-    program: &'p Program,
+    inputs: usize,
+    outputs: Cow<'p, [Node]>,
     /// Those that depend on held inputs alone, then the others.
     steps: Vec<Step>,
     first_moving: usize,
@@ -49,7 +52,8 @@ impl Program {
         let first_moving = steps.len();
         steps.extend(moving);
         Tape {
-            program: self,
+            inputs: self.inputs.len(),
+            outputs: Cow::Borrowed(&self.outputs),
             steps,
             first_moving,
             held_from,
@@ -74,11 +78,24 @@ impl Program {
 }
 
 impl<T: Element, const W: usize> Tape<'_, T, W> {
+    /// The same memory, to be kept for longer than the program.
+    pub fn into_owned(self) -> Tape<'static, T, W> {
+        Tape {
+            inputs: self.inputs,
+            outputs: Cow::Owned(self.outputs.into_owned()),
+            steps: self.steps,
+            first_moving: self.first_moving,
+            held_from: self.held_from,
+            settled: self.settled,
+            values: self.values,
+        }
+    }
+
     /// The inputs, to be set before [`Tape::run`]: `[input][lane]`.
     #[inline(always)]
     pub fn inputs(&mut self) -> &mut [Row<T, W>] {
         self.settled = false;
-        &mut self.values[..self.program.inputs.len()]
+        &mut self.values[..self.inputs]
     }
 
     /// The inputs that are not held.
@@ -90,7 +107,7 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
     /// The k-th output of the last run.
     #[inline(always)]
     pub fn output(&self, k: usize) -> &Row<T, W> {
-        &self.values[self.program.outputs[k].index()]
+        &self.values[self.outputs[k].index()]
     }
 
     /// Carry out every operation on every lane.

@@ -15,6 +15,8 @@ pub struct Objective {
     integrator: Integrator,
     /// What an error of 1 is in each state.
     scale: Vec<f64>,
+    /// 1 / scale.
+    precision: Arc<[f32]>,
     memory: Arc<fused::Memory>,
 }
 
@@ -47,8 +49,11 @@ impl Objective {
                 scale,
             });
         }
+        #[allow(clippy::cast_possible_truncation)] // training runs in f32
+        let precision = scale.iter().map(|scale| (1.0 / scale) as f32);
         Ok(Self {
             integrator,
+            precision: precision.collect(),
             scale,
             memory: Arc::default(),
         })
@@ -58,9 +63,13 @@ impl Objective {
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
         Loss(match batch {
             Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
-            Batch::Blocks(blocks) => {
-                fused::loss(model, blocks, self.integrator, &self.scale, &self.memory)
-            }
+            Batch::Blocks(blocks) => fused::loss(
+                model,
+                blocks,
+                self.integrator,
+                &self.precision,
+                &self.memory,
+            ),
         })
     }
 }

@@ -7,6 +7,7 @@ mod part;
 mod plan;
 mod record;
 mod scheme;
+mod tapes;
 mod work;
 mod worker;
 

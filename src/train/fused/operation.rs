@@ -9,6 +9,7 @@ use burn::backend::{Autodiff, Backend, Dispatch, Flex, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 
 use super::plan::Plan;
+use super::scheme::Scheme;
 use super::work::Work;
 use super::{Blocks, Memory};
 use crate::model::{HybridModel, Integrator};
@@ -18,12 +19,17 @@ pub(in crate::train) fn loss(
     model: &HybridModel,
     blocks: &Arc<Blocks>,
     integrator: Integrator,
-    scale: &[f64],
+    precision: &Arc<[f32]>,
     memory: &Arc<Memory>,
 ) -> Tensor<1> {
     let none = || Tensor::zeros([0], &model.device());
     let [prior, residual] = model.tensors().map(|numbers| numbers.unwrap_or_else(none));
-    let plan = Plan::new(model.frame(), blocks, integrator, scale);
+    let plan = Plan {
+        frame: model.frame().clone(),
+        blocks: blocks.clone(),
+        scheme: Scheme::of(integrator),
+        precision: precision.clone(),
+    };
     Tensor::from_dispatch(<Dispatch as LossOperation>::fused_loss(
         prior.into_dispatch(),
         residual.into_dispatch(),
@@ -50,7 +56,7 @@ impl LossOperation for Flex {
         plan: Arc<Plan>,
         memory: Arc<Memory>,
     ) -> FlexTensor {
-        vector(taken(&prior, &residual, &plan, &memory).loss.to_vec())
+        vector(taken(&prior, &residual, plan, memory).loss.to_vec())
     }
 }
 
@@ -61,7 +67,7 @@ impl<C: CheckpointStrategy> LossOperation for Autodiff<Flex, C> {
         plan: Arc<Plan>,
         memory: Arc<Memory>,
     ) -> FloatTensor<Self> {
-        let work = taken(prior.primitive(), residual.primitive(), &plan, &memory);
+        let work = taken(prior.primitive(), residual.primitive(), plan, memory);
         let loss = vector(work.loss.to_vec());
         let preparation = LossBackward.prepare::<C>([prior.node(), residual.node()]);
         match preparation.compute_bound().stateful() {
@@ -97,21 +103,13 @@ impl Backward<Flex, 2> for LossBackward {
     }
 }
 
-fn taken(
-    prior: &FlexTensor,
-    residual: &FlexTensor,
-    plan: &Arc<Plan>,
-    memory: &Arc<Memory>,
-) -> Work {
+fn taken(prior: &FlexTensor, residual: &FlexTensor, plan: Arc<Plan>, memory: Arc<Memory>) -> Work {
     let (prior, residual) = (prior.to_contiguous(), residual.to_contiguous());
-    Work::new(plan, memory, &numbers(&prior), &numbers(&residual))
+    Work::new(plan, memory, numbers(&prior), numbers(&residual))
 }
 
-fn numbers(tensor: &FlexTensor) -> Vec<f32> {
-    let slice = tensor
-        .as_slice()
-        .expect("parameters are f32 and in one piece");
-    slice.to_vec()
+fn numbers(tensor: &FlexTensor) -> &[f32] {
+    tensor.as_slice().expect("numbers are f32 and in one piece")
 }
 
 fn vector(numbers: Vec<f32>) -> FlexTensor {

@@ -3,12 +3,18 @@ use std::sync::Arc;
 
 use super::Blocks;
 use super::scheme::Scheme;
-use crate::batch::Network;
-use crate::model::{Frame, Integrator};
+use crate::batch::{Network, Rows};
+use crate::model::Frame;
 
-/// Rows that the derivatives by a network's numbers are taken for at once, in blocks: few enough that what they need
-/// stays near the processor.
+/// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
+/// enough that all that is made of them stays near the processor.
 pub(super) const CHUNK: usize = 4;
+
+/// Blocks of which a thread is worth its waking.
+const LEAST: usize = 2;
+
+/// Records of more rows than these together, 1 GiB, are not kept: the way back then begins with the way there again.
+const KEPT: usize = (1 << 30) / size_of::<Rows>();
 
 /// What stays the same while a loss and its derivative are taken.
 #[derive(Debug)]
@@ -17,7 +23,7 @@ pub(super) struct Plan {
     pub blocks: Arc<Blocks>,
     pub scheme: Scheme,
     /// 1 / scale of each state's error.
-    pub precision: Vec<f32>,
+    pub precision: Arc<[f32]>,
 }
 
 /// The learnable numbers as the kernels read them.
@@ -29,43 +35,6 @@ pub(super) struct Numbers {
 }
 
 impl Plan {
-    #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn new(
-        frame: &Arc<Frame>,
-        blocks: &Arc<Blocks>,
-        integrator: Integrator,
-        scale: &[f64],
-    ) -> Self {
-        Self {
-            frame: frame.clone(),
-            blocks: blocks.clone(),
-            scheme: Scheme::of(integrator),
-            precision: scale.iter().map(|scale| (1.0 / scale) as f32).collect(),
-        }
-    }
-
-    /// The numbers of both tensors.
-    #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn numbers(&self, prior: &[f32], residual: &[f32]) -> Numbers {
-        let flat = match self.frame.equations {
-            None => [prior, residual],
-            Some(_) => [residual, &[]],
-        };
-        let networks = self.frame.networks.iter().zip(flat);
-        let parameters = self.frame.parameters().iter().zip(prior);
-        Numbers {
-            parameters: parameters
-                .map(|(p, scaled)| match p.fixed {
-                    true => p.value as f32,
-                    false => scaled * p.scale as f32,
-                })
-                .collect(),
-            networks: networks
-                .map(|(made, flat)| Network::new(&made.widths(), flat))
-                .collect(),
-        }
-    }
-
     /// Derivatives of the dynamics that a segment's rollout takes.
     pub(super) fn stages(&self) -> usize {
         self.blocks.steps * self.scheme.substeps * self.scheme.stages.len()
@@ -76,10 +45,57 @@ impl Plan {
         (self.blocks.size * self.blocks.steps) as f64
     }
 
+    /// Rows of the record of one block.
+    pub(super) fn recorded(&self, networks: &[Network]) -> usize {
+        let of_networks: usize = (networks.iter())
+            .map(|network| network.features() + network.activations())
+            .sum();
+        let states = 2 * self.frame.joints;
+        self.stages() * (states + of_networks) + self.blocks.steps * states
+    }
+
+    /// Whether the records of all blocks are kept.
+    pub(super) fn keeps(&self, networks: &[Network]) -> bool {
+        self.blocks.count() * self.recorded(networks) <= KEPT
+    }
+
     /// The blocks in as many parts of nearly equal size as there are threads that have enough to do.
     pub(super) fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         let count = self.blocks.count();
-        let parts = rayon::current_num_threads().min(count.div_ceil(2));
+        let parts = rayon::current_num_threads().min(count.div_ceil(LEAST));
         (0..parts).map(move |part| part * count / parts..(part + 1) * count / parts)
+    }
+}
+
+impl Numbers {
+    /// All zero.
+    pub(super) fn new(frame: &Frame) -> Self {
+        let networks = frame.networks.iter().map(|made| {
+            let count = made.layers.iter().map(|layer| layer.numbers()).sum();
+            Network::new(&made.widths(), &vec![0.0; count])
+        });
+        Self {
+            parameters: vec![0.0; frame.parameters().len()],
+            networks: networks.collect(),
+        }
+    }
+
+    /// The numbers of the prior and of the residual.
+    #[allow(clippy::cast_possible_truncation)] // training runs in f32
+    pub(super) fn set(&mut self, frame: &Frame, prior: &[f32], residual: &[f32]) {
+        let parameters = frame.parameters().iter().zip(prior);
+        for (to, (parameter, scaled)) in self.parameters.iter_mut().zip(parameters) {
+            *to = match parameter.fixed {
+                true => parameter.value as f32,
+                false => scaled * parameter.scale as f32,
+            };
+        }
+        let flat = match frame.equations {
+            None => [prior, residual],
+            Some(_) => [residual, &[]],
+        };
+        for (network, flat) in self.networks.iter_mut().zip(flat) {
+            network.set_numbers(flat);
+        }
     }
 }

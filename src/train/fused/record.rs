@@ -36,11 +36,6 @@ impl Layout {
         }
     }
 
-    /// Rows of a whole record with so many steps.
-    pub(super) fn rows(&self, steps: usize) -> usize {
-        self.blocks * (self.stages * self.stage + steps * self.states)
-    }
-
     pub(super) fn stage<'a>(
         &self,
         record: &'a mut [Rows],

@@ -2,12 +2,13 @@ use std::ops::Range;
 
 use pulp::Simd;
 
-use super::part::Part;
-use super::plan::{Numbers, Plan};
+use super::plan::{CHUNK, Numbers, Plan};
 use super::record::{Layout, Stage};
-use crate::batch::{Rows, W};
+use super::tapes::Tapes;
+use crate::batch::{Network, Rows, W};
 use crate::expr::Tape;
 use crate::lanes::{Element, Vector};
+use crate::model::Frame;
 
 /// One thread at work on a chunk of blocks.
 pub(super) struct Worker<'a, S> {
@@ -26,24 +27,53 @@ pub(super) struct Place {
     pub stage: usize,
 }
 
-/// Working memory, each part `[block][state]`.
+/// Working memory of the way back.
 #[derive(Debug, Default)]
-pub(super) struct Scratch {
-    pub state: Vec<Rows>,
-    pub rates: Vec<Rows>,
-    pub mean: Vec<Rows>,
-    pub other: Vec<Rows>,
+pub(super) struct Desk {
+    pub scratch: Scratch,
+    /// For each network the derivatives by its features, `[block][feature]`.
+    by_features: Vec<Vec<Rows>>,
+    /// For each network the derivatives by its numbers, a register each.
+    pub network_sums: Vec<Vec<f32>>,
+    /// The derivative by each parameter that is not fixed.
+    pub parameter_sums: Vec<Rows>,
 }
 
-impl Scratch {
-    pub(super) fn resize(&mut self, rows: usize) {
-        for part in [
-            &mut self.state,
-            &mut self.rates,
-            &mut self.mean,
-            &mut self.other,
-        ] {
-            part.resize(rows, Rows::splat(0.0));
+/// Working memory of both ways, each part `[block][state]`.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    state: Vec<Rows>,
+    rates: Vec<Rows>,
+    mean: Vec<Rows>,
+    other: Vec<Rows>,
+}
+
+impl Desk {
+    /// Room for a chunk.
+    pub(super) fn begin(&mut self, frame: &Frame, networks: &[Network]) {
+        let Scratch {
+            state,
+            rates,
+            mean,
+            other,
+        } = &mut self.scratch;
+        for part in [state, rates, mean, other] {
+            part.resize(CHUNK * 2 * frame.joints, Rows::splat(0.0));
+        }
+        self.by_features.resize(networks.len(), Vec::new());
+        for (by, network) in self.by_features.iter_mut().zip(networks) {
+            by.resize(CHUNK * network.features(), Rows::splat(0.0));
+        }
+    }
+
+    pub(super) fn clear_sums<S: Simd>(&mut self, frame: &Frame, networks: &[Network]) {
+        let free = frame.parameters().iter().filter(|p| !p.fixed).count();
+        self.parameter_sums.clear();
+        self.parameter_sums.resize(free, Rows::splat(0.0));
+        self.network_sums.resize(networks.len(), Vec::new());
+        for (sums, network) in self.network_sums.iter_mut().zip(networks) {
+            sums.clear();
+            sums.resize(network.numbers() * f32::lanes::<S>(), 0.0);
         }
     }
 }
@@ -80,7 +110,7 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     pub(super) fn forward(
         &self,
-        program: &mut Tape<f32, W>,
+        tapes: &mut Tapes,
         scratch: &mut Scratch,
         record: &mut [Rows],
     ) -> [f64; 2] {
@@ -95,13 +125,14 @@ impl<S: Simd> Worker<'_, S> {
         }
         for step in 0..blocks.steps {
             for substep in 0..self.plan.scheme.substeps {
-                self.substep(program, scratch, record, (step, substep), &mut sums[1]);
+                self.substep(tapes, scratch, record, (step, substep), &mut sums[1]);
             }
             let end = self.layout.end(record, step);
             end.copy_from_slice(&scratch.state[..end.len()]);
             for (block, end) in self.chunk.clone().zip(end.chunks_exact(states)) {
                 let (next, counted) = (blocks.given(block, step).next, blocks.counted(block));
-                for ((found, wanted), precision) in end.iter().zip(next).zip(&self.plan.precision) {
+                for ((found, wanted), precision) in end.iter().zip(next).zip(&*self.plan.precision)
+                {
                     update(
                         self.simd,
                         &mut sums[0],
@@ -123,7 +154,7 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     fn substep(
         &self,
-        program: &mut Tape<f32, W>,
+        tapes: &mut Tapes,
         scratch: &mut Scratch,
         record: &mut [Rows],
         (step, substep): (usize, usize),
@@ -158,7 +189,7 @@ impl<S: Simd> Worker<'_, S> {
                     );
                 }
             }
-            self.rates(program, place, &mut record, rates);
+            self.rates(&mut tapes.program, place, &mut record, rates);
             if self.is_penalised(place) {
                 self.add_residual(&record, residual);
             }
@@ -257,22 +288,22 @@ impl<S: Simd> Worker<'_, S> {
     }
 
     /// The way back through the rollout that [`Worker::forward`] recorded. `seeds` are the derivatives of a number by
-    /// the sums that it returned; the number's derivatives by the learnable ones are added to those of `part`.
+    /// the sums that it returned; the number's derivatives by the learnable ones are added to those of `desk`.
     #[inline(always)]
     pub(super) fn backward(
         &self,
-        adjoints: &mut [Tape<f32, W>; 2],
-        part: &mut Part,
+        tapes: &mut Tapes,
+        desk: &mut Desk,
         record: &mut [Rows],
         seeds: [f32; 2],
     ) {
         let (blocks, states) = (&self.plan.blocks, self.states());
-        part.scratch.state.fill(Rows::splat(0.0));
+        desk.scratch.state.fill(Rows::splat(0.0));
         for step in (0..blocks.steps).rev() {
             let ends = self.layout.end(record, step).chunks_exact(states);
             for ((b, block), end) in self.chunk.clone().enumerate().zip(ends) {
                 let (next, counted) = (blocks.given(block, step).next, blocks.counted(block));
-                let adjoint = &mut part.scratch.state[b * states..][..states];
+                let adjoint = &mut desk.scratch.state[b * states..][..states];
                 for k in 0..states {
                     let precision = self.plan.precision[k];
                     let seed = Vector::splat(self.simd, 2.0 * seeds[0] * precision * precision);
@@ -288,7 +319,7 @@ impl<S: Simd> Worker<'_, S> {
                 }
             }
             for substep in (0..self.plan.scheme.substeps).rev() {
-                self.substep_back(adjoints, part, record, (step, substep), seeds[1]);
+                self.substep_back(tapes, desk, record, (step, substep), seeds[1]);
             }
         }
     }
@@ -297,8 +328,8 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     fn substep_back(
         &self,
-        adjoints: &mut [Tape<f32, W>; 2],
-        part: &mut Part,
+        tapes: &mut Tapes,
+        desk: &mut Desk,
         record: &mut [Rows],
         (step, substep): (usize, usize),
         seed: f32,
@@ -306,8 +337,8 @@ impl<S: Simd> Worker<'_, S> {
         let (scheme, states) = (self.plan.scheme, self.states());
         for (b, block) in self.chunk.clone().enumerate() {
             let h = self.part_of_step(block, step, 1.0);
-            let adjoint = &part.scratch.state[b * states..][..states];
-            let mean = &mut part.scratch.mean[b * states..][..states];
+            let adjoint = &desk.scratch.state[b * states..][..states];
+            let mean = &mut desk.scratch.mean[b * states..][..states];
             for (mean, adjoint) in mean.iter_mut().zip(adjoint) {
                 update(self.simd, mean, [adjoint, &h], |_, [adjoint, h]| {
                     adjoint * h
@@ -329,7 +360,7 @@ impl<S: Simd> Worker<'_, S> {
             let last = stage + 1 == scheme.stages.len();
             let Scratch {
                 rates, mean, other, ..
-            } = &mut part.scratch;
+            } = &mut desk.scratch;
             for (b, block) in self.chunk.clone().enumerate() {
                 let after = scheme.stages.get(stage + 1).map_or(0.0, |(part, _)| *part);
                 let h = self.part_of_step(block, step, after);
@@ -346,9 +377,9 @@ impl<S: Simd> Worker<'_, S> {
                 }
             }
             let mut record = self.stage(record, place);
-            self.rates_back(adjoints, place, &mut record, part, seed);
+            self.rates_back(tapes, place, &mut record, desk, seed);
             if !place.is_start() {
-                let Scratch { state, other, .. } = &mut part.scratch;
+                let Scratch { state, other, .. } = &mut desk.scratch;
                 for (state, other) in state.iter_mut().zip(&*other) {
                     update(self.simd, state, [other], |state, [other]| state + other);
                 }
@@ -360,10 +391,10 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     fn rates_back(
         &self,
-        adjoints: &mut [Tape<f32, W>; 2],
+        tapes: &mut Tapes,
         place: Place,
         record: &mut Stage,
-        part: &mut Part,
+        desk: &mut Desk,
         seed: f32,
     ) {
         let states = self.states();
@@ -372,7 +403,7 @@ impl<S: Simd> Worker<'_, S> {
             let penalised = self.is_penalised(place) && k + 1 == self.numbers.networks.len();
             let seed = Vector::splat(self.simd, if penalised { 2.0 * seed } else { 0.0 });
             let values = activations.values.chunks_exact_mut(network.activations());
-            let slopes = part.scratch.rates.chunks_exact(states);
+            let slopes = desk.scratch.rates.chunks_exact(states);
             for ((block, values), slopes) in self.chunk.clone().zip(values).zip(slopes) {
                 let counted = self.plan.blocks.counted(block);
                 let outputs = &mut values[network.outputs()];
@@ -388,19 +419,22 @@ impl<S: Simd> Worker<'_, S> {
             }
             let by_features: &mut [Rows] = match place.is_start() {
                 true => &mut [],
-                false => &mut part.by_features[k][..activations.features.len()],
+                false => &mut desk.by_features[k][..activations.features.len()],
             };
             network.backward(
                 self.simd,
                 activations.features,
                 activations.values,
                 by_features,
-                &mut part.network_sums[k],
+                &mut desk.network_sums[k],
             );
         }
         let by_states = if place.is_start() { 0 } else { states };
-        let adjoint = &mut adjoints[usize::from(place.is_start())];
-        if by_states + part.parameter_sums.len() == 0 {
+        let adjoint = match place.is_start() {
+            true => &mut tapes.parameter_adjoint,
+            false => &mut tapes.adjoint,
+        };
+        if by_states + desk.parameter_sums.len() == 0 {
             return;
         }
         let first = 3 * self.plan.frame.joints + 1;
@@ -412,20 +446,20 @@ impl<S: Simd> Worker<'_, S> {
                 &record.states[b * states..][..states],
             );
             let seeds = &mut adjoint.moving()[first..];
-            let rates = &part.scratch.rates[b * states..][..states];
-            let features = (self.numbers.networks.iter().zip(&part.by_features))
+            let rates = &desk.scratch.rates[b * states..][..states];
+            let features = (self.numbers.networks.iter().zip(&desk.by_features))
                 .flat_map(|(network, by)| &by[b * network.features()..][..network.features()]);
             for (to, seed) in seeds.iter_mut().zip(rates.iter().chain(features)) {
                 *to = *seed;
             }
             adjoint.run();
-            for (k, by) in part.scratch.other[b * states..][..by_states]
+            for (k, by) in desk.scratch.other[b * states..][..by_states]
                 .iter_mut()
                 .enumerate()
             {
                 *by = *adjoint.output(k);
             }
-            for (k, sum) in part.parameter_sums.iter_mut().enumerate() {
+            for (k, sum) in desk.parameter_sums.iter_mut().enumerate() {
                 let slope = adjoint.output(by_states + k);
                 update(self.simd, sum, [slope], |sum, [slope]| sum + slope);
             }
