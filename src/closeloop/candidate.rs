@@ -1,3 +1,5 @@
+use rayon::prelude::*;
+
 use super::per_log::values_on;
 use super::study::{Fitted, Study};
 use crate::identify::{Shooting, promise};
@@ -71,10 +73,9 @@ pub fn best_start(
             let cost = promised(study, &study.sample.shooting, model, &start, &locals)?;
             Some((start, cost))
         };
-        let best = starts
-            .into_iter()
-            .filter_map(promised)
-            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let promised: Vec<(FittedEffect, f64)> =
+            starts.into_par_iter().filter_map(promised).collect();
+        let best = promised.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         starts = vec![best.0];
     }
     let start = starts.pop()?;

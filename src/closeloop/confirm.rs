@@ -1,3 +1,5 @@
+use rayon::prelude::*;
+
 use super::evidence::{PLAIN, gain, p_of_gains};
 use super::per_log::values_on;
 use super::study::{Fitted, Study};
@@ -59,7 +61,8 @@ fn most_doubtful(
 ) -> Option<(TakenBack, Fitted)> {
     let with = losses(aside, model, model.fit.scale, members)?;
     let declared = study.system.effects.len();
-    (declared..model.effects.len())
+    let unsure: Vec<(f64, TakenBack, Fitted)> = (declared..model.effects.len())
+        .into_par_iter()
         .filter_map(|k| {
             let mut effects = model.effects.clone();
             let effect = effects.remove(k);
@@ -75,6 +78,8 @@ fn most_doubtful(
                 (p, TakenBack { effect, reason }, less)
             })
         })
+        .collect();
+    (unsure.into_iter())
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, taken_back, less)| (taken_back, less))
 }

@@ -1,6 +1,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::candidate::best_start;
 use super::evidence::gain;
 use super::folds::{folds, left_out_losses};
@@ -111,7 +113,7 @@ fn longer(
     folds: &[usize],
 ) -> Option<Sum> {
     let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = TERMS
-        .iter()
+        .par_iter()
         .filter(|term| !terms.contains(term))
         .filter_map(|term| {
             let terms = [terms, &[*term]].concat();
@@ -121,9 +123,9 @@ fn longer(
         })
         .collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
-    screened
-        .into_iter()
-        .take(FITTED)
+    screened.truncate(FITTED);
+    let fitted: Vec<Sum> = screened
+        .into_par_iter()
         .filter_map(|(terms, start, _)| {
             let effects = [model.effects.as_slice(), &[start]].concat();
             let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
@@ -134,12 +136,9 @@ fn longer(
                 effect: fitted.effects.last()?.clone(),
             })
         })
-        .min_by(|a, b| {
-            a.losses
-                .iter()
-                .sum::<f64>()
-                .total_cmp(&b.losses.iter().sum())
-        })
+        .collect();
+    let loss = |sum: &Sum| sum.losses.iter().sum::<f64>();
+    (fitted.into_iter()).min_by(|a, b| loss(a).total_cmp(&loss(b)))
 }
 
 impl Sum {

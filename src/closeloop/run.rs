@@ -1,4 +1,5 @@
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use super::bootstrap::reduction_interval;
 use super::contradicted::contradicted;
@@ -95,7 +96,7 @@ pub fn close_loop(
         within_turn(&mut samples, &system.prismatic);
         samples
     };
-    let (residual_before, residual_after) = (residual(&before), residual(&after));
+    let (residual_before, residual_after) = rayon::join(|| residual(&before), || residual(&after));
     let curves = |samples: &[ForceSample]| curves(samples, &system.prismatic);
     let fine = study.refined();
     let coarse = after.fit.values.clone();
@@ -135,7 +136,7 @@ pub fn close_loop(
         assess(model, |_| &values, &split.test, &horizons_s)
     };
     let scored = |other: &Contender| (other.name.clone(), judge_as_is(&other.system));
-    let (error_before, error_after) = (judge(&before), judge(&after));
+    let (error_before, error_after) = rayon::join(|| judge(&before), || judge(&after));
     let errors = Errors {
         declared: judge_as_is(system),
         hybrid: learned.as_ref().map(|model| judge_hybrid(&model.hybrid)),
@@ -214,7 +215,7 @@ fn findings(
     model: &Fitted,
     parameters: &[Parameter],
     with: &Assessment,
-    judge: impl Fn(&Fitted) -> Assessment,
+    judge: impl Fn(&Fitted) -> Assessment + Sync,
 ) -> Vec<Finding> {
     let folds = folds(&study.shooting);
     let uncertainty = uncertainty(&study.shooting, &model.fit);
@@ -246,6 +247,7 @@ fn findings(
     };
     let declared = study.system.effects.len();
     (declared..model.effects.len())
+        .into_par_iter()
         .filter_map(finding)
         .collect()
 }

@@ -1,5 +1,7 @@
 use std::collections::HashMap;
 
+use rayon::prelude::*;
+
 use super::candidate::{beside, best_start, candidates, starts};
 use super::evidence::{Evidence, PLAIN, WORTHWHILE};
 use super::folds::{folds, left_out_losses};
@@ -130,16 +132,11 @@ impl<'a, 'p> Search<'a, 'p> {
         let rest = screened.split_off(FITTED.min(screened.len()));
         screened.extend(rest.into_iter().filter(is_wanted));
         let losses = left_out_losses(&model.fit, &self.folds);
+        (self.progress)(&format!("fitting {} effects", screened.len()));
+        let (study, folds) = (self.study, self.folds.as_slice());
         let mut evidence: Vec<Evidence> = screened
-            .into_iter()
-            .filter_map(|start| {
-                (self.progress)(&format!(
-                    "fitting {} on joint {}",
-                    start.effect.name,
-                    start.joint + 1
-                ));
-                self.weigh(model, start, &losses)
-            })
+            .into_par_iter()
+            .filter_map(|start| weigh(study, folds, model, start, &losses))
             .collect();
         evidence.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
@@ -154,18 +151,15 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Candidates at their most promising starting points, the most promising ones first.
     fn screened(&mut self, model: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
-        let mut screened: Vec<(FittedEffect, f64)> = Vec::new();
-        for candidate in all {
-            (self.progress)(&format!(
-                "screening {} on joint {}",
-                candidate.effect.name,
-                candidate.joint + 1
-            ));
-            screened.extend(
-                beside(self.study, model, candidate)
-                    .and_then(|beside| best_start(self.study, &beside, candidate)),
-            );
-        }
+        (self.progress)(&format!("screening {} effects", all.len()));
+        let study = self.study;
+        let mut screened: Vec<(FittedEffect, f64)> = all
+            .par_iter()
+            .filter_map(|candidate| {
+                let beside = beside(study, model, candidate)?;
+                best_start(study, &beside, candidate)
+            })
+            .collect();
         // A step away from "absent" promises little truth of an effect that cannot be absent: such candidates are
         // always fitted.
         screened.sort_by(|a, b| {
@@ -174,22 +168,6 @@ impl<'a, 'p> Search<'a, 'p> {
                 .then(a.1.total_cmp(&b.1))
         });
         screened.into_iter().map(|(start, _)| start).collect()
-    }
-
-    /// Fit a candidate and judge it.
-    fn weigh(&self, model: &Fitted, start: FittedEffect, without: &[f64]) -> Option<Evidence> {
-        let mut effects = beside(self.study, model, &start)?.effects;
-        effects.push(start);
-        let fitted = self.refit(model, &effects)?;
-        Evidence::of(self.study, fitted, &self.folds, without)
-    }
-
-    /// Other effects from the values of a model, at its scale.
-    fn refit(&self, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
-        let locals = model.fit.locals.clone();
-        self.study
-            .refit(effects, &model.declared, locals, Some(model.fit.scale))
-            .ok()
     }
 
     /// The scale of the residuals has fallen: from now on the search looks with sharper eyes.
@@ -202,17 +180,18 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
     fn simplified(&self, model: Fitted) -> Fitted {
-        let with: f64 = left_out_losses(&model.fit, &self.folds).iter().sum();
-        for effects in simpler(self.library, &model.effects, self.declared()) {
-            let Some(less) = self.refit(&model, &effects) else {
-                continue;
-            };
-            let without: f64 = left_out_losses(&less.fit, &self.folds).iter().sum();
-            if without < with * (1.0 + 0.5 * WORTHWHILE) {
-                return self.simplified(less);
-            }
+        let (study, folds) = (self.study, self.folds.as_slice());
+        let with: f64 = left_out_losses(&model.fit, folds).iter().sum();
+        let simpler = simpler(self.library, &model.effects, self.declared());
+        let first = simpler.par_iter().find_map_first(|effects| {
+            let less = refit(study, &model, effects)?;
+            let without: f64 = left_out_losses(&less.fit, folds).iter().sum();
+            (without < with * (1.0 + 0.5 * WORTHWHILE)).then_some(less)
+        });
+        match first {
+            Some(less) => self.simplified(less),
+            None => model,
         }
-        model
     }
 
     /// Look at every effect of the model again, beside all others: what came early was chosen without knowing
@@ -257,13 +236,35 @@ impl<'a, 'p> Search<'a, 'p> {
     fn without(&self, model: &Fitted, k: usize) -> Option<(FittedEffect, Fitted)> {
         let mut effects = model.effects.clone();
         let present = effects.remove(k);
-        Some((present, self.refit(model, &effects)?))
+        Some((present, refit(self.study, model, &effects)?))
     }
 
     /// Effects that the file declares stay.
     fn declared(&self) -> usize {
         self.study.system.effects.len()
     }
+}
+
+/// Fit a candidate and judge it.
+fn weigh(
+    study: &Study<'_>,
+    folds: &[usize],
+    model: &Fitted,
+    start: FittedEffect,
+    without: &[f64],
+) -> Option<Evidence> {
+    let mut effects = beside(study, model, &start)?.effects;
+    effects.push(start);
+    let fitted = refit(study, model, &effects)?;
+    Evidence::of(study, fitted, folds, without)
+}
+
+/// Other effects from the values of a model, at its scale.
+fn refit(study: &Study<'_>, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
+    let locals = model.fit.locals.clone();
+    study
+        .refit(effects, &model.declared, locals, Some(model.fit.scale))
+        .ok()
 }
 
 /// Whether some value of a parameter switches the effect off, so that it can start from absent.

@@ -1,4 +1,5 @@
 use rand::Rng;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::candidate::acting;
@@ -72,7 +73,7 @@ pub fn unexplained(
     let omnibus = omnibus(study, before, after, rng);
     let losses = left_out_losses(&after.fit, &folds(&study.shooting));
     let probed: Vec<Probed> = acting(study, probes)
-        .into_iter()
+        .into_par_iter()
         .filter_map(|probe| ask(study, after, probe, &losses))
         .collect();
     #[allow(clippy::cast_precision_loss)] // few probes

@@ -1,8 +1,9 @@
-use std::borrow::Cow;
+use std::marker::PhantomData;
 
+use super::Program;
 use super::op::Op;
+use super::places::Places;
 use super::steps::{Kind, Step};
-use super::{Node, Program};
 use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
 
 /// The number types that programs run on: f64 to fit, f32 to train and plan.
@@ -19,15 +20,46 @@ impl Real for f64 {}
 #[derive(Debug, Clone)]
 pub struct Tape<'p, T, const W: usize> {
     inputs: usize,
-    outputs: Cow<'p, [Node]>,
-    /// Those that depend on held inputs alone, then the others.
-    steps: Vec<Step>,
-    first_moving: usize,
+    program: PhantomData<&'p Program>,
+    /// Steps that depend on held inputs alone.
+    held: Runs,
+    /// The others.
+    moving: Runs,
     /// From this input on inputs are held.
     held_from: usize,
     /// Whether the steps of held inputs have been carried out.
     settled: bool,
     values: Vec<Row<T, W>>,
+    /// Where each output stands among the values.
+    outputs: Vec<u32>,
+}
+
+/// So many steps of one kind, one after the other.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    kind: Kind,
+    count: usize,
+}
+
+/// Steps and the runs that they form.
+#[derive(Debug, Clone)]
+struct Runs {
+    steps: Vec<Step>,
+    runs: Vec<Run>,
+}
+
+impl Runs {
+    fn new(steps: Vec<Step>) -> Self {
+        let of_one_kind = steps.chunk_by(|a, b| a.kind == b.kind);
+        let run = |steps: &[Step]| Run {
+            kind: steps[0].kind,
+            count: steps.len(),
+        };
+        Self {
+            runs: of_one_kind.map(run).collect(),
+            steps,
+        }
+    }
 }
 
 impl Program {
@@ -39,26 +71,42 @@ impl Program {
     /// The same where the inputs from `held_from` on change seldom: what depends on them alone is found anew only
     /// after [`Tape::inputs`] was asked for, while [`Tape::moving`] gives the others.
     pub fn tape_with_held<T: Element, const W: usize>(&self, held_from: usize) -> Tape<'_, T, W> {
-        let number = |value: f64| T::from_f64(value).expect("every f64 has a nearest float");
-        let constant = |op: &Op| match op {
-            Op::Const(value) => number(*value),
-            _ => T::zero(),
-        };
-        let of_ops = self.ops.iter().map(constant);
-        let more = (self.steps.more.iter()).map(|value| value.map_or(T::zero(), number));
         let is_held = |step: &&Step| step.first_input as usize >= held_from;
-        let (mut steps, moving): (Vec<Step>, Vec<Step>) =
+        let (mut held, mut moving): (Vec<Step>, Vec<Step>) =
             self.steps.steps.iter().partition(is_held);
-        let first_moving = steps.len();
-        steps.extend(moving);
+        let of_ops = self.ops.iter().map(|op| match op {
+            Op::Const(value) => Some(*value),
+            _ => None,
+        });
+        let constants: Vec<Option<f64>> = of_ops.chain(self.steps.more.iter().copied()).collect();
+        let mut places = Places::new(constants.len(), self.inputs.len());
+        let constants = || {
+            (0..)
+                .zip(&constants)
+                .filter_map(|(k, value)| Some((k, (*value)?)))
+        };
+        constants().for_each(|(value, _)| places.keep(value));
+        self.outputs
+            .iter()
+            .for_each(|output| places.keep(output.index()));
+        places.settle(&mut held);
+        places.pass(&mut moving);
+        let place = |value: usize| places.of[value] as usize;
+        let mut values = vec![Row::splat(T::zero()); places.count as usize];
+        for (value, number) in constants() {
+            values[place(value)] =
+                Row::splat(T::from_f64(number).expect("every f64 has a nearest float"));
+        }
+        let outputs = self.outputs.iter();
         Tape {
             inputs: self.inputs.len(),
-            outputs: Cow::Borrowed(&self.outputs),
-            steps,
-            first_moving,
+            program: PhantomData,
+            held: Runs::new(held),
+            moving: Runs::new(moving),
             held_from,
             settled: false,
-            values: of_ops.chain(more).map(Row::splat).collect(),
+            values,
+            outputs: outputs.map(|output| places.of[output.index()]).collect(),
         }
     }
 
@@ -82,12 +130,13 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
     pub fn into_owned(self) -> Tape<'static, T, W> {
         Tape {
             inputs: self.inputs,
-            outputs: Cow::Owned(self.outputs.into_owned()),
-            steps: self.steps,
-            first_moving: self.first_moving,
+            program: PhantomData,
+            held: self.held,
+            moving: self.moving,
             held_from: self.held_from,
             settled: self.settled,
             values: self.values,
+            outputs: self.outputs,
         }
     }
 
@@ -107,12 +156,12 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
     /// The k-th output of the last run.
     #[inline(always)]
     pub fn output(&self, k: usize) -> &Row<T, W> {
-        &self.values[self.outputs[k].index()]
+        &self.values[self.outputs[k] as usize]
     }
 
     /// Carry out every operation on every lane.
     pub fn run(&mut self) {
-        Row::<T, W>::dispatch(Run(self));
+        Row::<T, W>::dispatch(CarryOut(self));
     }
 
     /// The same within a function that is on these instructions already.
@@ -127,21 +176,26 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
 
     #[inline(always)]
     fn carry_out<S: Simd>(&mut self, simd: S) {
-        let first = if self.settled { self.first_moving } else { 0 };
-        self.settled = true;
         let mut values = Values {
             simd,
             rows: &mut self.values,
         };
-        for step in &self.steps[first..] {
-            values.carry_out(step);
+        let first = usize::from(self.settled);
+        for part in &[&self.held, &self.moving][first..] {
+            let mut left = part.steps.as_slice();
+            for run in &part.runs {
+                let (steps, rest) = left.split_at(run.count);
+                values.carry_out(run.kind, steps);
+                left = rest;
+            }
         }
+        self.settled = true;
     }
 }
 
-struct Run<'t, 'p, T, const W: usize>(&'t mut Tape<'p, T, W>);
+struct CarryOut<'t, 'p, T, const W: usize>(&'t mut Tape<'p, T, W>);
 
-impl<T: Element, const W: usize> WithSimd for Run<'_, '_, T, W> {
+impl<T: Element, const W: usize> WithSimd for CarryOut<'_, '_, T, W> {
     type Output = ();
 
     #[inline(always)]
@@ -157,68 +211,72 @@ struct Values<'v, S, T, const W: usize> {
 
 // The operations are written into the loop over registers as they are: a closure would be a function of its own that
 // does not know the processor's instructions.
-macro_rules! to_registers {
-    ($values:ident, $step:ident, |$a:ident| $value:expr) => {
-        for part in 0..Row::<T, W>::parts::<S>() {
-            let $a = $values.get($step.a, part);
-            $values.set($step.to, part, $value);
+macro_rules! each {
+    ($values:ident, $steps:ident, |$a:ident| $value:expr) => {
+        for &step in $steps {
+            for part in 0..Row::<T, W>::parts::<S>() {
+                let $a = $values.get(step.a, part);
+                $values.set(step.to, part, $value);
+            }
         }
     };
-    ($values:ident, $step:ident, |$a:ident, $b:ident| $value:expr) => {
-        for part in 0..Row::<T, W>::parts::<S>() {
-            let $a = $values.get($step.a, part);
-            let $b = $values.get($step.b, part);
-            $values.set($step.to, part, $value);
+    ($values:ident, $steps:ident, |$a:ident, $b:ident| $value:expr) => {
+        for &step in $steps {
+            for part in 0..Row::<T, W>::parts::<S>() {
+                let ($a, $b) = ($values.get(step.a, part), $values.get(step.b, part));
+                $values.set(step.to, part, $value);
+            }
         }
     };
-    ($values:ident, $step:ident, |$a:ident, $b:ident, $c:ident| $value:expr) => {
-        for part in 0..Row::<T, W>::parts::<S>() {
-            let $a = $values.get($step.a, part);
-            let $b = $values.get($step.b, part);
-            let $c = $values.get($step.c, part);
-            $values.set($step.to, part, $value);
+    ($values:ident, $steps:ident, |$a:ident, $b:ident, $c:ident| $value:expr) => {
+        for &step in $steps {
+            for part in 0..Row::<T, W>::parts::<S>() {
+                let ($a, $b) = ($values.get(step.a, part), $values.get(step.b, part));
+                let $c = $values.get(step.c, part);
+                $values.set(step.to, part, $value);
+            }
         }
     };
 }
 
 impl<S: Simd, T: Element, const W: usize> Values<'_, S, T, W> {
     #[inline(always)]
-    fn carry_out(&mut self, step: &Step) {
-        match step.kind {
-            Kind::Neg => to_registers!(self, step, |a| -a),
-            Kind::Sin => to_registers!(self, step, |a| a.sin()),
-            Kind::Cos => to_registers!(self, step, |a| a.cos()),
+    fn carry_out(&mut self, kind: Kind, steps: &[Step]) {
+        match kind {
+            Kind::Neg => each!(self, steps, |a| -a),
+            Kind::Sin => each!(self, steps, |a| a.sin()),
+            Kind::Cos => each!(self, steps, |a| a.cos()),
             Kind::SinCos => {
-                for part in 0..Row::<T, W>::parts::<S>() {
-                    let (sine, cosine) = self.get(step.a, part).sin_cos();
-                    self.set(step.to, part, sine);
-                    self.set(step.b, part, cosine);
+                for &step in steps {
+                    for part in 0..Row::<T, W>::parts::<S>() {
+                        let (sine, cosine) = self.get(step.a, part).sin_cos();
+                        self.set(step.to, part, sine);
+                        self.set(step.b, part, cosine);
+                    }
                 }
             }
-            Kind::Tan => to_registers!(self, step, |a| a.tan()),
-            Kind::Exp => to_registers!(self, step, |a| a.exp()),
-            Kind::Log => to_registers!(self, step, |a| a.ln()),
-            Kind::Sqrt => to_registers!(self, step, |a| a.sqrt()),
-            Kind::Abs => to_registers!(self, step, |a| a.abs()),
-            Kind::Sign => to_registers!(self, step, |a| a.sign()),
-            Kind::Tanh => to_registers!(self, step, |a| a.tanh()),
-            Kind::Reciprocal => to_registers!(self, step, |a| a.like(1.0) / a),
-            Kind::Add => to_registers!(self, step, |a, b| a + b),
-            Kind::Sub => to_registers!(self, step, |a, b| a - b),
-            Kind::Mul => to_registers!(self, step, |a, b| a * b),
-            Kind::Div => to_registers!(self, step, |a, b| a / b),
-            Kind::Pow => to_registers!(self, step, |a, b| a.pow(b)),
-            Kind::Atan2 => to_registers!(self, step, |a, b| a.atan2(b)),
+            Kind::Tan => each!(self, steps, |a| a.tan()),
+            Kind::Exp => each!(self, steps, |a| a.exp()),
+            Kind::Log => each!(self, steps, |a| a.ln()),
+            Kind::Sqrt => each!(self, steps, |a| a.sqrt()),
+            Kind::Abs => each!(self, steps, |a| a.abs()),
+            Kind::Sign => each!(self, steps, |a| a.sign()),
+            Kind::Tanh => each!(self, steps, |a| a.tanh()),
+            Kind::Reciprocal => each!(self, steps, |a| a.like(1.0) / a),
+            Kind::Add => each!(self, steps, |a, b| a + b),
+            Kind::Sub => each!(self, steps, |a, b| a - b),
+            Kind::Mul => each!(self, steps, |a, b| a * b),
+            Kind::Div => each!(self, steps, |a, b| a / b),
+            Kind::Pow => each!(self, steps, |a, b| a.pow(b)),
+            Kind::Atan2 => each!(self, steps, |a, b| a.atan2(b)),
             // What is not a number spreads instead of vanishing.
-            Kind::Min => to_registers!(self, step, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
-            Kind::Max => to_registers!(self, step, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
-            Kind::Less => {
-                to_registers!(self, step, |a, b| a.if_less(b, a.like(1.0), a.like(0.0)));
-            }
-            Kind::Where => to_registers!(self, step, |a, b, c| c.like(0.0).if_less(c, a, b)),
-            Kind::MulAdd => to_registers!(self, step, |a, b, c| a.mul_add(b, c)),
-            Kind::MulSub => to_registers!(self, step, |a, b, c| a.mul_add(b, -c)),
-            Kind::SubMul => to_registers!(self, step, |a, b, c| (-a).mul_add(b, c)),
+            Kind::Min => each!(self, steps, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
+            Kind::Max => each!(self, steps, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
+            Kind::Less => each!(self, steps, |a, b| a.if_less(b, a.like(1.0), a.like(0.0))),
+            Kind::Where => each!(self, steps, |a, b, c| c.like(0.0).if_less(c, a, b)),
+            Kind::MulAdd => each!(self, steps, |a, b, c| a.mul_add(b, c)),
+            Kind::MulSub => each!(self, steps, |a, b, c| a.mul_add(b, -c)),
+            Kind::SubMul => each!(self, steps, |a, b, c| (-a).mul_add(b, c)),
         }
     }
 
@@ -401,7 +459,7 @@ mod tests {
                 for (slot, input) in slots.iter_mut().zip(&inputs[..changed]) {
                     *slot = Row(input.map(|x| T::from_f64(x).unwrap()));
                 }
-                Simd::vectorize(simd, super::Run(&mut tape));
+                Simd::vectorize(simd, super::CarryOut(&mut tape));
                 for lane in 0..W {
                     let wanted = plain(&program, &inputs.map(|input| input[lane]), unit);
                     for (k, output) in program.outputs.iter().enumerate() {

@@ -12,6 +12,7 @@ mod graph;
 mod inline;
 mod op;
 mod parse;
+mod places;
 mod print;
 mod program;
 mod replay;

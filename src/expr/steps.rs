@@ -1,11 +1,11 @@
 //! A program as an evaluator carries it out: fewer and cheaper operations with the same results to within rounding.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use super::op::{Binary, Op, Unary};
 
 /// What a [`Step`] does with the values at `a`, `b` and `c`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     Neg,
     Sin,
@@ -60,14 +60,15 @@ pub(super) struct Steps {
 }
 
 /// Sums take in the products and changes of sign that only they need, sines and cosines of one angle are found
-/// together, and divisions by one value share its reciprocal.
+/// together, and divisions by one value share its reciprocal. Steps of one kind stand together as far as what they
+/// need allows: an evaluator then decides once for many.
 pub(super) fn steps(ops: &[Op], outputs: impl Iterator<Item = usize>) -> Steps {
     let mut writer = Writer::new(ops, outputs);
     for (place, op) in ops.iter().enumerate() {
         writer.write(place, *op);
     }
     Steps {
-        steps: writer.steps.into_iter().flatten().collect(),
+        steps: grouped(&writer.steps.into_iter().flatten().collect::<Vec<_>>()),
         more: writer.more,
     }
 }
@@ -228,6 +229,63 @@ impl<'o> Writer<'o> {
         self.reciprocals.insert(of, to);
         Some(to)
     }
+}
+
+impl Step {
+    /// The places that it reads.
+    pub fn reads(self) -> impl Iterator<Item = u32> {
+        let count = match self.kind {
+            Kind::Neg | Kind::Sin | Kind::Cos | Kind::SinCos | Kind::Tan | Kind::Exp => 1,
+            Kind::Log | Kind::Sqrt | Kind::Abs | Kind::Sign | Kind::Tanh | Kind::Reciprocal => 1,
+            Kind::Add | Kind::Sub | Kind::Mul | Kind::Div | Kind::Pow => 2,
+            Kind::Atan2 | Kind::Min | Kind::Max | Kind::Less => 2,
+            Kind::Where | Kind::MulAdd | Kind::MulSub | Kind::SubMul => 3,
+        };
+        [self.a, self.b, self.c].into_iter().take(count)
+    }
+
+    /// The places that it writes.
+    pub fn writes(self) -> impl Iterator<Item = u32> {
+        let second = (self.kind == Kind::SinCos).then_some(self.b);
+        [self.to].into_iter().chain(second)
+    }
+}
+
+/// The same steps, those of one kind together where they can be: of all kinds that can go on, the one of which most
+/// steps can is carried on until none is left.
+fn grouped(steps: &[Step]) -> Vec<Step> {
+    let writers: HashMap<u32, usize> = (steps.iter().enumerate())
+        .flat_map(|(index, step)| step.writes().map(move |place| (place, index)))
+        .collect();
+    let mut missing = vec![0; steps.len()];
+    let mut readers = vec![Vec::new(); steps.len()];
+    for (index, step) in steps.iter().enumerate() {
+        for writer in step.reads().filter_map(|place| writers.get(&place)) {
+            missing[index] += 1;
+            readers[*writer].push(index);
+        }
+    }
+    let mut ready: BTreeMap<Kind, VecDeque<usize>> = BTreeMap::new();
+    for index in (0..steps.len()).filter(|index| missing[*index] == 0) {
+        ready.entry(steps[index].kind).or_default().push_back(index);
+    }
+    let mut order = Vec::with_capacity(steps.len());
+    while let Some((&kind, _)) = ready.iter().max_by_key(|(_, steps)| steps.len()) {
+        while let Some(index) = ready.get_mut(&kind).and_then(VecDeque::pop_front) {
+            order.push(steps[index]);
+            for &reader in &readers[index] {
+                missing[reader] -= 1;
+                if missing[reader] == 0 {
+                    ready
+                        .entry(steps[reader].kind)
+                        .or_default()
+                        .push_back(reader);
+                }
+            }
+        }
+        ready.remove(&kind);
+    }
+    order
 }
 
 fn number(place: usize) -> u32 {

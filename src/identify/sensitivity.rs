@@ -3,7 +3,7 @@ use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::{Dynamics, StepTorque};
 
 /// Lanes of the identification: one AVX-512 register, two AVX2 registers of f64.
-pub(super) const LANES: usize = 8;
+pub(super) const LANES: usize = 16;
 pub(super) type Lane = Row<f64, LANES>;
 
 /// What is free in each window, besides the parameters that all windows share.
@@ -154,7 +154,10 @@ impl<'t> Flow<'t> {
         for (slot, value) in tape.inputs()[first..].iter_mut().zip(values) {
             *slot = Row::splat(*value);
         }
-        let mut reading = tangent.reading.as_ref().map(|reading| reading.tape_with_held(3 * n + 1));
+        let mut reading = tangent
+            .reading
+            .as_ref()
+            .map(|reading| reading.tape_with_held(3 * n + 1));
         if let Some(reading) = &mut reading {
             for (slot, value) in reading.inputs()[3 * n + 1..].iter_mut().zip(values) {
                 *slot = Row::splat(*value);
@@ -261,9 +264,7 @@ impl<'t> Flow<'t> {
             for (k, slope) in self.by_state.iter_mut().enumerate() {
                 *slope = *self.tape.output(n + k);
             }
-            for part in 0..Lane::parts::<S>() {
-                self.stage(simd, part, h, k == 0, stage);
-            }
+            self.stage(simd, h, k == 0, stage);
             std::mem::swap(&mut self.inner, &mut self.next);
         }
         std::mem::swap(&mut self.now, &mut self.sum);
@@ -271,45 +272,61 @@ impl<'t> Flow<'t> {
 
     /// Add a stage's slopes to the sums, and find where they lead to.
     #[inline(always)]
-    fn stage<S: Simd>(
+    fn stage<S: Simd>(&mut self, simd: S, h: &Lane, is_first: bool, stage: (f64, f64, f64)) {
+        // Numbers that the compiler knows: loops over so few rows vanish.
+        match self.tangent.joints {
+            1 => self.stage_of(simd, 1, h, is_first, stage),
+            2 => self.stage_of(simd, 2, h, is_first, stage),
+            n => self.stage_of(simd, n, h, is_first, stage),
+        }
+    }
+
+    #[inline(always)]
+    fn stage_of<S: Simd>(
         &mut self,
         simd: S,
-        part: usize,
+        n: usize,
         h: &Lane,
         is_first: bool,
         (_, weight, reach): (f64, f64, f64),
     ) {
-        let n = self.tangent.joints;
-        let h = h.get(simd, part);
-        let (weighed, reached) = (h * h.like(weight), h * h.like(reach));
+        let rows = 2 * n;
         let inner = if is_first { &self.now } else { &self.inner };
-        for column in 0..=self.tangent.columns() {
-            let rows = 2 * n * column..2 * n * (column + 1);
-            let (now, inner) = (&self.now[rows.clone()], &inner[rows.clone()]);
-            let (next, sum) = (&mut self.next[rows.clone()], &mut self.sum[rows]);
+        let columns = (self.now.chunks_exact(rows))
+            .zip(inner.chunks_exact(rows))
+            .zip(self.next.chunks_exact_mut(rows))
+            .zip(self.sum.chunks_exact_mut(rows));
+        let by_state = &self.by_state[..n * rows];
+        for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
-            for row in 0..2 * n {
-                let slope = match row.checked_sub(n) {
-                    None => inner[n + row].get(simd, part),
-                    Some(joint) => {
+            for part in 0..Lane::parts::<S>() {
+                let h = h.get(simd, part);
+                let (weighed, reached) = (h * h.like(weight), h * h.like(reach));
+                for row in 0..rows {
+                    let slope = if row < n {
+                        inner[n + row].get(simd, part)
+                    } else {
                         let mut slope = match direct {
-                            Some(first) => self.tape.output(first + joint).get(simd, part),
+                            Some(first) => self.tape.output(first + row - n).get(simd, part),
                             None => h.like(0.0),
                         };
                         if column > 0 {
-                            let by_state = &self.by_state[joint * 2 * n..][..2 * n];
-                            for (by_state, inner) in by_state.iter().zip(inner) {
-                                let by_state = by_state.get(simd, part);
-                                slope = by_state.mul_add(inner.get(simd, part), slope);
+                            for state in 0..rows {
+                                let by_state = by_state[(row - n) * rows + state].get(simd, part);
+                                slope = by_state.mul_add(inner[state].get(simd, part), slope);
                             }
                         }
                         slope
-                    }
-                };
-                let now = now[row].get(simd, part);
-                let before = if is_first { now } else { sum[row].get(simd, part) };
-                sum[row].set(part, slope.mul_add(weighed, before));
-                next[row].set(part, slope.mul_add(reached, now));
+                    };
+                    let now = now[row].get(simd, part);
+                    let before = if is_first {
+                        now
+                    } else {
+                        sum[row].get(simd, part)
+                    };
+                    sum[row].set(part, slope.mul_add(weighed, before));
+                    next[row].set(part, slope.mul_add(reached, now));
+                }
             }
         }
     }

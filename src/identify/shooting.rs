@@ -5,7 +5,7 @@ use super::sensitivity::{Flow, LANES, Lane, Tangent};
 use super::values::Values;
 use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
-use crate::lanes::Row;
+use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
 /// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
@@ -271,9 +271,15 @@ impl Pack {
     }
 
     /// The torque from `row` to the next with the windows' own forces, if any, added.
-    fn torque(&self, commands: &[Commands<'_>], row: usize, forces: &[Lane]) -> StepTorque<LANES> {
+    fn put_torque(
+        &self,
+        torque: &mut StepTorque<LANES>,
+        commands: &[Commands<'_>],
+        row: usize,
+        forces: &[Lane],
+    ) {
         let end = self.time.get(row + 1).unwrap_or(&self.time[row]);
-        let mut torque = StepTorque::new(
+        torque.fill(
             self.logs.map(|log| &commands[log]),
             &self.tau[row],
             self.time[row],
@@ -285,7 +291,6 @@ impl Pack {
                 tau[lane] += force[lane];
             }
         }
-        torque
     }
 
     /// The torque that acted until `row`.
@@ -310,10 +315,11 @@ impl Pack {
             rollout.set_in_lane(parameter, lane, value);
             sensors.set_in_lane(parameter, lane, value);
         });
+        let mut torque = StepTorque::default();
         for row in 0..self.rows() {
             let before = || self.torque_before(commands, row);
             see(row, sensors.show(&state, before, self.time[row]));
-            let torque = self.torque(commands, row, &forces);
+            self.put_torque(&mut torque, commands, row, &forces);
             rollout.advance(
                 &mut state,
                 &torque.mean,
@@ -340,6 +346,7 @@ impl Pack {
             flow.set_in_lane(parameter, lane, value);
         });
         flow.start(&states);
+        let mut torque = StepTorque::default();
         for row in 0..self.rows() {
             let before = || self.torque_before(commands, row);
             let (angles, slopes) = flow.shown(before, self.time[row]);
@@ -350,7 +357,7 @@ impl Pack {
                 }));
                 sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
-            let torque = self.torque(commands, row, &states[2 * n..]);
+            self.put_torque(&mut torque, commands, row, &states[2 * n..]);
             flow.advance(&torque, self.time[row], self.dt[row], self.substeps[row]);
         }
         self.windows
@@ -392,18 +399,15 @@ impl Sums {
         for lane in 0..LANES {
             self.cost[lane] += losses[lane].0;
         }
-        let mut entries = self.triangle.iter_mut();
-        for (i, a) in sensitivities.iter().enumerate() {
-            let scaled: Lane = Row(std::array::from_fn(|l| losses[l].1 * weight[l] * a[l]));
-            for lane in 0..LANES {
-                self.gradient[i][lane] += scaled[lane] * residual[lane];
-            }
-            for (b, entry) in sensitivities[i..].iter().zip(&mut entries) {
-                for lane in 0..LANES {
-                    entry[lane] += scaled[lane] * weight[lane] * b[lane];
-                }
-            }
-        }
+        Lane::dispatch(Add {
+            sums: self,
+            // The residual and the weight of each sensitivity, times the weight that Huber's loss gives.
+            residual: Row(std::array::from_fn(|l| {
+                losses[l].1 * weight[l] * residual[l]
+            })),
+            weight: Row(std::array::from_fn(|l| losses[l].1 * weight[l] * weight[l])),
+            sensitivities,
+        });
     }
 
     fn lane(&self, lane: usize) -> WindowTerms {
@@ -420,6 +424,40 @@ impl Sums {
             cost: self.cost[lane],
             gradient: DVector::from_iterator(self.columns, self.gradient.iter().map(|g| g[lane])),
             hessian,
+        }
+    }
+}
+
+struct Add<'a> {
+    sums: &'a mut Sums,
+    residual: Lane,
+    weight: Lane,
+    sensitivities: &'a [Lane],
+}
+
+impl WithSimd for Add<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Sums {
+            gradient, triangle, ..
+        } = self.sums;
+        for part in 0..Lane::parts::<S>() {
+            let (residual, weight) = (self.residual.get(simd, part), self.weight.get(simd, part));
+            let mut entries = triangle.as_mut_slice();
+            for (i, sum) in gradient.iter_mut().enumerate() {
+                let rest = &self.sensitivities[i..];
+                let a = rest[0].get(simd, part);
+                sum.set(part, a.mul_add(residual, sum.get(simd, part)));
+                let scaled = a * weight;
+                let (own, others) = entries.split_at_mut(rest.len());
+                for (b, entry) in rest.iter().zip(own) {
+                    let b = b.get(simd, part);
+                    entry.set(part, b.mul_add(scaled, entry.get(simd, part)));
+                }
+                entries = others;
+            }
         }
     }
 }

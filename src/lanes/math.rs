@@ -230,13 +230,19 @@ impl<S: Simd, T: Element> Vector<S, T> {
         (power, curved + self.like(1.0))
     }
 
+    /// Even and odd powers apart: half as long to wait for.
     #[inline(always)]
     fn polynomial(self, coefficients: &[f64]) -> Self {
-        let mut value = self.like(coefficients[coefficients.len() - 1]);
-        for coefficient in coefficients[..coefficients.len() - 1].iter().rev() {
-            value = value.mul_add(self, self.like(*coefficient));
+        let (zero, square) = (self.like(0.0), self * self);
+        let (mut even, mut odd) = (zero, zero);
+        for pair in coefficients.chunks(2).rev() {
+            even = even.mul_add(square, self.like(pair[0]));
+            odd = odd.mul_add(
+                square,
+                self.like(if pair.len() > 1 { pair[1] } else { 0.0 }),
+            );
         }
-        value
+        odd.mul_add(self, even)
     }
 
     #[inline(always)]

@@ -116,7 +116,7 @@ impl<'l> Commands<'l> {
 }
 
 /// The torque over a step of `W` trajectories: mean and slopes over each of the step's equal parts.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct StepTorque<const W: usize> {
     /// `[part * n + joint][lane]`, in N m (or N). Without filters one part stands for the whole step.
     pub mean: Vec<Row<f64, W>>,
@@ -137,25 +137,41 @@ impl<const W: usize> StepTorque<W> {
         to: Row<f64, W>,
         parts: usize,
     ) -> Self {
+        let mut torque = Self::default();
+        torque.fill(commands, held, from, to, parts);
+        torque
+    }
+
+    /// As [`StepTorque::new`], in the memory of a step before.
+    pub fn fill(
+        &mut self,
+        commands: [&Commands<'_>; W],
+        held: &[Row<f64, W>],
+        from: Row<f64, W>,
+        to: Row<f64, W>,
+        parts: usize,
+    ) {
         let model = commands[0];
-        let mut torque = Self {
-            mean: held.to_vec(),
-            slopes: Vec::new(),
-        };
+        self.mean.clear();
+        self.slopes.clear();
         if model.filters.is_empty() {
-            return torque;
+            self.mean.extend_from_slice(held);
+            return;
         }
-        torque.mean = held.repeat(parts);
-        torque.slopes = vec![Row::splat(0.0); parts * model.filters.len()];
+        for _ in 0..parts {
+            self.mean.extend_from_slice(held);
+        }
+        self.slopes
+            .resize(parts * model.filters.len(), Row::splat(0.0));
         for lane in 0..W {
             for joint in 0..model.joints {
                 if let Some(history) = &commands[lane].histories[joint] {
-                    let means = history.means(from[lane], to[lane], parts);
-                    torque.set(lane, joint, model, &means);
+                    for (part, mean) in history.means(from[lane], to[lane], parts).enumerate() {
+                        self.set(lane, joint, model, part, mean);
+                    }
                 }
             }
         }
-        torque
     }
 
     /// Means over one part, one a joint, and the slopes there, one a filter.
@@ -169,16 +185,14 @@ impl<const W: usize> StepTorque<W> {
         )
     }
 
-    fn set(&mut self, lane: usize, joint: usize, model: &Commands<'_>, means: &[Mean]) {
-        for (part, mean) in means.iter().enumerate() {
-            self.mean[part * model.joints + joint][lane] = mean.value;
-            for (k, filter) in model.filters.iter().enumerate() {
-                if filter.joint == joint {
-                    self.slopes[part * model.filters.len() + k][lane] = match filter.kind {
-                        CommandFilter::Delay => mean.by_delay,
-                        CommandFilter::Lag => mean.by_lag,
-                    };
-                }
+    fn set(&mut self, lane: usize, joint: usize, model: &Commands<'_>, part: usize, mean: Mean) {
+        self.mean[part * model.joints + joint][lane] = mean.value;
+        for (k, filter) in model.filters.iter().enumerate() {
+            if filter.joint == joint {
+                self.slopes[part * model.filters.len() + k][lane] = match filter.kind {
+                    CommandFilter::Delay => mean.by_delay,
+                    CommandFilter::Lag => mean.by_lag,
+                };
             }
         }
     }
@@ -277,21 +291,20 @@ impl<'l> History<'l> {
 
     /// Means over equal parts. Neighbouring parts share the very same instant, so that a jump there counts once.
     #[allow(clippy::cast_precision_loss)] // few parts
-    fn means(&self, from: f64, to: f64, parts: usize) -> Vec<Mean> {
+    fn means(&self, from: f64, to: f64, parts: usize) -> impl Iterator<Item = Mean> {
         let length = (to - from) / parts as f64;
         let mut before = self.at(from);
-        let mut means = Vec::with_capacity(parts);
-        for part in 1..=parts {
+        (1..=parts).map(move |part| {
             let end = if part == parts {
                 to
             } else {
                 from + length * part as f64
             };
             let now = self.at(end);
-            means.push(before.mean_until(&now));
+            let mean = before.mean_until(&now);
             before = now;
-        }
-        means
+            mean
+        })
     }
 }
 

@@ -262,13 +262,7 @@ impl MlpWeights {
     }
 
     /// Write the network's scaled inputs into a graph.
-    pub fn features(
-        &self,
-        graph: &mut Graph,
-        q: &[Node],
-        qd: &[Node],
-        tau: &[Node],
-    ) -> Vec<Node> {
+    pub fn features(&self, graph: &mut Graph, q: &[Node], qd: &[Node], tau: &[Node]) -> Vec<Node> {
         let mut features: Vec<Node> = Vec::new();
         match self.angles {
             Angles::Raw => features.extend(q),

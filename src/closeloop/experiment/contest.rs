@@ -1,3 +1,5 @@
+use rayon::prelude::*;
+
 use super::menu::{Proposal, as_logged, proposals, spread};
 use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
@@ -160,9 +162,9 @@ impl<'a> Contest<'a> {
     /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
     pub fn tests(&self, model: &Fitted, joints: &[usize]) -> Vec<Test> {
         let changes = proposals(self.study, model, joints);
-        let changes = changes.iter().filter_map(|change| self.test(change, None));
+        let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
         let payloads = self.payloads();
-        let loaded = (payloads.iter())
+        let loaded = (payloads.par_iter())
             .filter_map(|payload| self.test(&self.loaded(model, payload), Some(payload)));
         changes.chain(loaded).collect()
     }
