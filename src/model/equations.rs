@@ -67,7 +67,7 @@ pub(super) fn projected(parameters: &[Parameter], scaled: &Tensor<1>) -> Option<
     for (value, p) in values.iter_mut().zip(parameters) {
         let [lowest, highest] = p.bounds.map(|bound| (bound / p.scale) as f32);
         let inside = value.clamp(lowest, highest);
-        moved |= inside < *value || inside > *value;
+        moved |= inside != *value;
         *value = inside;
     }
     let shape = [values.len()];

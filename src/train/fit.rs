@@ -46,6 +46,16 @@ pub enum Ended {
     Stopped,
 }
 
+/// What a run is done with.
+struct Material<'a> {
+    segments: &'a Segments,
+    /// All of them, with gradients.
+    trained: Batch,
+    /// The same without.
+    judged: Batch,
+    validation: Option<Batch>,
+}
+
 /// Means over an epoch.
 #[derive(Clone, Copy, Default)]
 struct Epoch {
@@ -99,18 +109,31 @@ impl Training {
         if let Some(validation) = validation {
             self.check(validation, "validation")?;
         }
-        let validation = validation.map(|segments| segments.all(&plain));
-        let (trained, judged) = (segments.all(&device), segments.all(&plain));
+        let material = Material {
+            segments,
+            trained: segments.all(&device),
+            judged: segments.all(&plain),
+            validation: validation.map(|segments| segments.all(&plain)),
+        };
+        let crew = self.objective.crew();
+        crew.helped(|| self.run_epochs(&material, observer))
+    }
+
+    fn run_epochs(
+        &mut self,
+        material: &Material,
+        observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Ended, TrainError> {
         if self.history.is_empty() {
-            self.record(&judged, validation.as_ref())?;
+            self.record(material)?;
         }
         while self.epoch < self.settings.epochs {
-            let Epoch { loss, error } = self.run_epoch(segments, &trained)?;
+            let Epoch { loss, error } = self.run_epoch(material)?;
             self.epoch += 1;
             self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);
             let every = self.settings.record_every.get();
             if self.epoch.is_multiple_of(every) || self.epoch == self.settings.epochs {
-                self.record(&judged, validation.as_ref())?;
+                self.record(material)?;
             }
             let progress = Progress {
                 epoch: self.epoch,
@@ -177,10 +200,11 @@ impl Training {
         Ok(())
     }
 
-    fn run_epoch(&mut self, segments: &Segments, all: &Batch) -> Result<Epoch, TrainError> {
+    fn run_epoch(&mut self, material: &Material) -> Result<Epoch, TrainError> {
         let Batching::Mini { size } = self.settings.batching else {
-            return self.step(all);
+            return self.step(&material.trained);
         };
+        let segments = material.segments;
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.shuffle(&mut self.rng);
         let device = self.model.device();
@@ -205,14 +229,19 @@ impl Training {
     }
 
     /// Judge the present model on all training segments and on validation.
-    fn record(&mut self, judged: &Batch, validation: Option<&Batch>) -> Result<(), TrainError> {
+    fn record(&mut self, material: &Material) -> Result<(), TrainError> {
         let model = self.model.clone().valid();
         let judge = |batch| self.objective.loss(&model, batch);
-        let (loss, [error, residual_norm]) = self.total(&judge(judged), self.weights())?;
-        let validation = validation.map(|batch| match judge(batch).numbers()[0] {
-            error if error.is_finite() => error,
-            _ => f64::INFINITY,
-        });
+        let (loss, [error, residual_norm]) =
+            self.total(&judge(&material.judged), self.weights())?;
+        let validation =
+            material
+                .validation
+                .as_ref()
+                .map(|batch| match judge(batch).numbers()[0] {
+                    error if error.is_finite() => error,
+                    _ => f64::INFINITY,
+                });
         let weights = self.model.weights();
         self.history.push(Record {
             epoch: self.epoch,

@@ -10,14 +10,14 @@ use crate::model::{HybridModel, Integrator};
 pub(super) const NORM_FLOOR: f64 = 1e-6;
 
 /// What models are judged by: the way their predictions are made and the units of their errors.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Objective {
     integrator: Integrator,
     /// What an error of 1 is in each state.
     scale: Vec<f64>,
     /// 1 / scale.
     precision: Arc<[f32]>,
-    memory: Arc<fused::Memory>,
+    crew: Arc<fused::Crew>,
 }
 
 /// The two parts of the loss, `[2]`.
@@ -55,22 +55,35 @@ impl Objective {
             integrator,
             precision: precision.collect(),
             scale,
-            memory: Arc::default(),
+            crew: Arc::default(),
         })
+    }
+
+    /// The threads for its losses.
+    pub(super) fn crew(&self) -> Arc<fused::Crew> {
+        self.crew.clone()
     }
 
     /// The loss of a model on a batch, through the unrolled integrator.
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
         Loss(match batch {
             Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
-            Batch::Blocks(blocks) => fused::loss(
-                model,
-                blocks,
-                self.integrator,
-                &self.precision,
-                &self.memory,
-            ),
+            Batch::Blocks(blocks) => {
+                fused::loss(model, blocks, self.integrator, &self.precision, &self.crew)
+            }
         })
+    }
+}
+
+/// The copy has threads of its own.
+impl Clone for Objective {
+    fn clone(&self) -> Self {
+        Self {
+            integrator: self.integrator,
+            scale: self.scale.clone(),
+            precision: self.precision.clone(),
+            crew: Arc::default(),
+        }
     }
 }
 

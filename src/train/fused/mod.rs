@@ -13,4 +13,4 @@ mod worker;
 
 pub use blocks::Blocks;
 pub(super) use operation::loss;
-pub(super) use work::Memory;
+pub(super) use work::Crew;

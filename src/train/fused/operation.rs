@@ -11,7 +11,7 @@ use burn::tensor::{Tensor, TensorData};
 use super::plan::Plan;
 use super::scheme::Scheme;
 use super::work::Work;
-use super::{Blocks, Memory};
+use super::{Blocks, Crew};
 use crate::model::{HybridModel, Integrator};
 
 /// E and ||F_r||, `[2]`.
@@ -20,7 +20,7 @@ pub(in crate::train) fn loss(
     blocks: &Arc<Blocks>,
     integrator: Integrator,
     precision: &Arc<[f32]>,
-    memory: &Arc<Memory>,
+    crew: &Arc<Crew>,
 ) -> Tensor<1> {
     let none = || Tensor::zeros([0], &model.device());
     let [prior, residual] = model.tensors().map(|numbers| numbers.unwrap_or_else(none));
@@ -34,7 +34,7 @@ pub(in crate::train) fn loss(
         prior.into_dispatch(),
         residual.into_dispatch(),
         Arc::new(plan),
-        memory.clone(),
+        crew.clone(),
     ))
 }
 
@@ -45,7 +45,7 @@ pub(super) trait LossOperation: Backend {
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
         plan: Arc<Plan>,
-        memory: Arc<Memory>,
+        crew: Arc<Crew>,
     ) -> FloatTensor<Self>;
 }
 
@@ -54,9 +54,9 @@ impl LossOperation for Flex {
         prior: FlexTensor,
         residual: FlexTensor,
         plan: Arc<Plan>,
-        memory: Arc<Memory>,
+        crew: Arc<Crew>,
     ) -> FlexTensor {
-        vector(taken(&prior, &residual, plan, memory).loss.to_vec())
+        vector(taken(&prior, &residual, plan, crew).loss.to_vec())
     }
 }
 
@@ -65,9 +65,9 @@ impl<C: CheckpointStrategy> LossOperation for Autodiff<Flex, C> {
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
         plan: Arc<Plan>,
-        memory: Arc<Memory>,
+        crew: Arc<Crew>,
     ) -> FloatTensor<Self> {
-        let work = taken(prior.primitive(), residual.primitive(), plan, memory);
+        let work = taken(prior.primitive(), residual.primitive(), plan, crew);
         let loss = vector(work.loss.to_vec());
         let preparation = LossBackward.prepare::<C>([prior.node(), residual.node()]);
         match preparation.compute_bound().stateful() {
@@ -93,7 +93,7 @@ impl Backward<Flex, 2> for LossBackward {
         let by_loss = gradients.consume::<Flex>(&ops.node);
         let by_loss = numbers(&by_loss.to_contiguous()).try_into();
         let by_loss = by_loss.expect("the loss is of two numbers");
-        let mut work = ops.state.lock().expect("no other thread uses it");
+        let work = ops.state.lock().expect("no other thread uses it");
         for (parent, slopes) in ops.parents.into_iter().zip(work.derivative(by_loss)) {
             // An input without numbers has no gradient.
             if let Some(parent) = parent.filter(|_| !slopes.is_empty()) {
@@ -103,9 +103,9 @@ impl Backward<Flex, 2> for LossBackward {
     }
 }
 
-fn taken(prior: &FlexTensor, residual: &FlexTensor, plan: Arc<Plan>, memory: Arc<Memory>) -> Work {
+fn taken(prior: &FlexTensor, residual: &FlexTensor, plan: Arc<Plan>, crew: Arc<Crew>) -> Work {
     let (prior, residual) = (prior.to_contiguous(), residual.to_contiguous());
-    Work::new(plan, memory, numbers(&prior), numbers(&residual))
+    Work::new(plan, crew, numbers(&prior), numbers(&residual))
 }
 
 fn numbers(tensor: &FlexTensor) -> &[f32] {

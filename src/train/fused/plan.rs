@@ -10,9 +10,6 @@ use crate::model::Frame;
 /// enough that all that is made of them stays near the processor.
 pub(super) const CHUNK: usize = 4;
 
-/// Blocks of which a thread is worth its waking.
-const LEAST: usize = 2;
-
 /// Records of more rows than these together, 1 GiB, are not kept: the way back then begins with the way there again.
 const KEPT: usize = (1 << 30) / size_of::<Rows>();
 
@@ -59,10 +56,11 @@ impl Plan {
         self.blocks.count() * self.recorded(networks) <= KEPT
     }
 
-    /// The blocks in as many parts of nearly equal size as there are threads that have enough to do.
+    /// The blocks in parts of nearly equal size. They do not hang on the number of threads, so that the sums over
+    /// them do not.
     pub(super) fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         let count = self.blocks.count();
-        let parts = rayon::current_num_threads().min(count.div_ceil(LEAST));
+        let parts = count.div_ceil(2 * CHUNK).min(8 + count / 64).min(64);
         (0..parts).map(move |part| part * count / parts..(part + 1) * count / parts)
     }
 }

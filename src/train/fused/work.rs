@@ -1,136 +1,190 @@
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use pulp::Arch;
 
 use super::part::{Backward, Forward, Part};
 use super::plan::{Numbers, Plan};
 use crate::model::Frame;
+use crate::rounds::Rounds;
 use crate::train::loss::NORM_FLOOR;
 
-/// Memory that serves again for the next loss.
+/// The threads that losses are taken on, and memory that serves again for the next.
 #[derive(Debug, Default)]
-pub struct Memory(Mutex<Vec<Desks>>);
+pub struct Crew {
+    rounds: Rounds,
+    /// What the present round is about; held by the one who leads it.
+    leading: Mutex<()>,
+    task: Mutex<Option<Task>>,
+    desks: Mutex<Vec<Arc<Desks>>>,
+}
+
+/// Work on every part of a loss.
+#[derive(Debug, Clone)]
+struct Task {
+    plan: Arc<Plan>,
+    desks: Arc<Desks>,
+    way: Way,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Way {
+    Forward,
+    /// From the derivatives by the sums that the way forward made.
+    Backward([f32; 2]),
+}
 
 /// All that a loss of one model is worked out with.
 #[derive(Debug)]
 struct Desks {
     frame: Arc<Frame>,
-    numbers: Numbers,
-    parts: Vec<Part>,
+    numbers: RwLock<Numbers>,
+    parts: Vec<Mutex<Part>>,
 }
 
 /// A loss that was taken, and all that its derivative needs.
 #[derive(Debug)]
 pub(super) struct Work {
+    crew: Arc<Crew>,
     plan: Arc<Plan>,
-    /// Given back at the end.
-    desks: Option<Desks>,
-    memory: Arc<Memory>,
+    desks: Arc<Desks>,
     /// E and the norm of F_r.
     pub loss: [f32; 2],
 }
 
-impl Memory {
-    fn take(&self, frame: &Arc<Frame>) -> Desks {
-        let known = self.lock().pop();
-        let fits = known.filter(|desks| Arc::ptr_eq(&desks.frame, frame));
-        fits.unwrap_or_else(|| Desks {
-            frame: frame.clone(),
-            numbers: Numbers::new(frame),
-            parts: Vec::new(),
-        })
+impl Crew {
+    /// Call `lead` while other threads stand by for the losses in it. Without them it takes them alone.
+    pub(in crate::train) fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
+        self.rounds.helped(&|part| self.carry_out(part), lead)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<Desks>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    fn run(&self, task: Task) {
+        let _leading = lock(&self.leading);
+        let parts = task.desks.parts.len();
+        *lock(&self.task) = Some(task);
+        self.rounds.run(parts, &|part| self.carry_out(part));
+        *lock(&self.task) = None;
+    }
+
+    fn carry_out(&self, part: usize) {
+        let task = lock(&self.task).clone();
+        task.expect("a round has a task").carry_out(part);
+    }
+
+    /// Desks that nobody sits at.
+    fn take(&self, frame: &Arc<Frame>, parts: usize) -> Arc<Desks> {
+        let mut desks = lock(&self.desks);
+        desks.retain(|desks| Arc::ptr_eq(&desks.frame, frame));
+        let fitting = desks.iter().position(|desks| desks.parts.len() == parts);
+        match fitting {
+            Some(index) => desks.swap_remove(index),
+            None => Arc::new(Desks {
+                frame: frame.clone(),
+                numbers: RwLock::new(Numbers::new(frame)),
+                parts: (0..parts).map(|_| Mutex::new(Part::new(frame))).collect(),
+            }),
+        }
+    }
+}
+
+impl Task {
+    fn carry_out(&self, part: usize) {
+        let numbers = &*self
+            .desks
+            .numbers
+            .read()
+            .unwrap_or_else(PoisonError::into_inner);
+        let (plan, part) = (&*self.plan, &mut *lock(&self.desks.parts[part]));
+        let arch = Arch::new();
+        match self.way {
+            Way::Forward => arch.dispatch(Forward {
+                plan,
+                numbers,
+                part,
+            }),
+            Way::Backward(seeds) => arch.dispatch(Backward {
+                plan,
+                numbers,
+                part,
+                seeds,
+            }),
+        }
     }
 }
 
 impl Work {
     /// Take the loss with these numbers.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn new(
-        plan: Arc<Plan>,
-        memory: Arc<Memory>,
-        prior: &[f32],
-        residual: &[f32],
-    ) -> Self {
-        let mut desks = memory.take(&plan.frame);
-        let Desks { numbers, parts, .. } = &mut desks;
+    pub(super) fn new(plan: Arc<Plan>, crew: Arc<Crew>, prior: &[f32], residual: &[f32]) -> Self {
+        let desks = crew.take(&plan.frame, plan.parts().count());
+        let mut numbers = desks
+            .numbers
+            .write()
+            .unwrap_or_else(PoisonError::into_inner);
         numbers.set(&plan.frame, prior, residual);
-        let count = plan.parts().count();
-        parts.resize_with(count, || Part::new(&plan.frame));
-        for (part, blocks) in parts.iter_mut().zip(plan.parts()) {
-            part.begin(blocks, &plan, numbers);
+        for (part, blocks) in desks.parts.iter().zip(plan.parts()) {
+            lock(part).begin(blocks, &plan, &numbers);
         }
-        for_each(parts, &|part: &mut Part| {
-            Arch::new().dispatch(Forward {
-                plan: &plan,
-                numbers,
-                part,
-            });
-        });
+        drop(numbers);
+        let mut work = Self {
+            loss: [0.0; 2],
+            crew,
+            plan,
+            desks,
+        };
+        work.run(Way::Forward);
+        let count = work.plan.count();
         // In the order of the parts, so that the result does not hang on which was done first.
-        let mean = |k: usize| parts.iter().map(|part| part.sums[k]).sum::<f64>() / plan.count();
-        let norm = match plan.frame.has_residual {
-            true => (mean(1) + NORM_FLOOR * NORM_FLOOR).sqrt(),
+        let sums = work.desks.parts.iter().map(|part| lock(part).sums);
+        let [error, square] = sums.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        let norm = match work.plan.frame.has_residual {
+            true => (square / count + NORM_FLOOR * NORM_FLOOR).sqrt(),
             false => 0.0,
         };
-        Self {
-            loss: [mean(0) as f32, norm as f32],
-            desks: Some(desks),
-            plan,
-            memory,
-        }
+        work.loss = [(error / count) as f32, norm as f32];
+        work
     }
 
     /// From the derivatives of a number by the two parts of the loss to those by the prior's numbers and the
     /// residual's.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn derivative(&mut self, by_loss: [f32; 2]) -> [Vec<f32>; 2] {
+    pub(super) fn derivative(&self, by_loss: [f32; 2]) -> [Vec<f32>; 2] {
         let (plan, loss) = (&self.plan, self.loss);
-        let desks = self.desks.as_mut().expect("given back at the end alone");
-        let Desks { numbers, parts, .. } = desks;
         let by_mean = match plan.frame.has_residual {
             true => f64::from(by_loss[1]) / (2.0 * f64::from(loss[1])),
             false => 0.0,
         };
         let seeds = [f64::from(by_loss[0]), by_mean].map(|by| (by / plan.count()) as f32);
-        for_each(parts, &|part: &mut Part| {
-            Arch::new().dispatch(Backward {
-                plan,
-                numbers,
-                part,
-                seeds,
-            });
+        self.run(Way::Backward(seeds));
+        gathered(&plan.frame, &self.desks.parts)
+    }
+
+    fn run(&self, way: Way) {
+        self.crew.run(Task {
+            plan: self.plan.clone(),
+            desks: self.desks.clone(),
+            way,
         });
-        gathered(&plan.frame, parts)
     }
 }
 
 impl Drop for Work {
     fn drop(&mut self) {
-        self.memory.lock().extend(self.desks.take());
+        lock(&self.crew.desks).push(self.desks.clone());
     }
 }
 
-/// Do a piece of work for each part. What other threads have not begun when this one is ready it does itself.
-fn for_each(parts: &mut [Part], work: &(impl Fn(&mut Part) + Sync)) {
-    match parts {
-        [] => {}
-        [part] => work(part),
-        _ => {
-            let (first, second) = parts.split_at_mut(parts.len() / 2);
-            rayon::join(|| for_each(first, work), || for_each(second, work));
-        }
-    }
+/// A lock is poisoned only where a thread panicked, which ends the training.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The sum of what the parts found.
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
-fn gathered(frame: &Frame, parts: &mut [Part]) -> [Vec<f32>; 2] {
-    let (first, others) = parts.split_first_mut().expect("there is a part");
+fn gathered(frame: &Frame, parts: &[Mutex<Part>]) -> [Vec<f32>; 2] {
+    let (first, others) = parts.split_first().expect("there is a part");
+    let first = &mut *lock(first);
     for other in others {
+        let other = lock(other);
         let networks = first.by_networks.iter_mut().zip(&other.by_networks);
         for (sum, more) in networks.flat_map(|(sums, more)| sums.iter_mut().zip(more)) {
             *sum += more;
