@@ -107,7 +107,7 @@ fn transitions(joints: usize, count: usize) -> Segments {
 }
 
 /// Epochs that one measurement takes together.
-const EPOCHS: usize = 100;
+const EPOCHS: usize = 1000;
 
 fn train(c: &mut Criterion) {
     for task in &TASKS {
