@@ -9,6 +9,7 @@ mod inputs;
 mod list;
 mod progress;
 mod simulate;
+mod sweep;
 mod train;
 mod tune;
 
@@ -37,6 +38,7 @@ enum Command {
     Audit(audit::Arguments),
     Train(train::Arguments),
     Tune(tune::Arguments),
+    Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
@@ -71,6 +73,7 @@ pub fn main() -> ExitCode {
         Command::Audit(arguments) => audit::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Tune(arguments) => tune::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),

@@ -29,27 +29,35 @@ pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, 
 /// The equations with these values; fixed ones as declared, to the last bit.
 pub(super) fn current(declared: &Dynamics, scaled: Tensor<1>) -> Dynamics {
     let mut dynamics = declared.clone();
-    for (parameter, scaled) in dynamics.parameters.iter_mut().zip(to_f64(scaled)) {
-        if !parameter.fixed {
-            parameter.value = scaled * parameter.scale;
-        }
+    let scaled = to_f64(scaled);
+    let values = values(&declared.parameters, &scaled);
+    for (parameter, value) in dynamics.parameters.iter_mut().zip(values) {
+        parameter.value = value;
     }
     dynamics
 }
 
-/// One tensor of shape `[1]` for each parameter, in its unit.
-pub(super) fn columns(parameters: &[Parameter], scaled: Tensor<1>) -> Vec<Tensor<1>> {
+/// The value of every parameter in its unit; of fixed ones as declared, to the last bit.
+pub(super) fn values(declared: &[Parameter], scaled: &[f64]) -> impl Iterator<Item = f64> {
+    let each = declared.iter().zip(scaled);
+    each.map(|(p, scaled)| if p.fixed { p.value } else { scaled * p.scale })
+}
+
+/// Every parameter in its unit, from value / scale `[models, parameters]`: a tensor of shape `[models * rows]`, each
+/// model's value in `rows` entries, or `[1]` for a fixed one.
+pub(super) fn columns(parameters: &[Parameter], scaled: Tensor<2>, rows: usize) -> Vec<Tensor<1>> {
     if parameters.is_empty() {
         return Vec::new();
     }
-    let device = scaled.device();
-    let values = scaled * tensor(parameters, |p| p.scale, &device);
+    let (device, models) = (scaled.device(), scaled.dims()[0]);
+    let values = scaled * tensor(parameters, |p| p.scale, &device).unsqueeze();
     (parameters.iter().enumerate())
         .map(|(k, parameter)| {
             if parameter.fixed {
                 tensor(std::slice::from_ref(parameter), |p| p.value, &device)
             } else {
-                values.clone().narrow(0, k, 1)
+                let column = values.clone().narrow(1, k, 1);
+                column.expand([models, rows]).reshape([models * rows])
             }
         })
         .collect()

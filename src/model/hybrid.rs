@@ -81,10 +81,10 @@ pub struct Flow {
     pub residual: Option<Tensor<2>>,
 }
 
-/// A model with its parameters unpacked, for the evaluations of one loss.
+/// A model, or several of one frame, with the parameters unpacked for the evaluations of one loss.
 #[derive(Debug)]
 pub struct Prepared<'m> {
-    model: &'m HybridModel,
+    frame: &'m Frame,
     parameters: Vec<Tensor<1>>,
     prior: Option<Mlp<'m>>,
     residual: Option<Mlp<'m>>,
@@ -242,14 +242,11 @@ impl HybridModel {
 
     /// Unpack the parameters, once for all evaluations that one gradient runs through.
     pub fn prepare(&self) -> Prepared<'_> {
-        let (frame, prior) = (&self.frame, self.prior.val());
-        let residual = self.residual.as_ref().map(Param::val);
-        Prepared {
-            model: self,
-            prior: frame.prior().map(|made| Mlp::new(made, &prior)),
-            residual: (frame.residual().zip(residual)).map(|(made, flat)| Mlp::new(made, &flat)),
-            parameters: equations::columns(frame.parameters(), prior),
-        }
+        let residual = self
+            .residual
+            .as_ref()
+            .map(|numbers| numbers.val().unsqueeze());
+        Prepared::new(&self.frame, 1, self.prior.val().unsqueeze(), residual)
     }
 
     /// ds/dt and the part F_r of it that the residual makes, at a batch of points.
@@ -313,11 +310,28 @@ impl HybridModel {
     }
 }
 
-impl Prepared<'_> {
+impl<'m> Prepared<'m> {
+    /// Models of `frame` with the learnable numbers `[models, numbers]` of prior and residual. Each evaluates `rows` rows,
+    /// one model's after the other's; a single model takes any number where `rows` is 1.
+    pub(super) fn new(
+        frame: &'m Frame,
+        rows: usize,
+        prior: Tensor<2>,
+        residual: Option<Tensor<2>>,
+    ) -> Self {
+        let network = |(made, numbers)| Mlp::new(made, &numbers);
+        Self {
+            frame,
+            prior: frame.prior().map(|made| Mlp::new(made, &prior)),
+            residual: frame.residual().zip(residual).map(network),
+            parameters: equations::columns(frame.parameters(), prior, rows),
+        }
+    }
+
     /// ds/dt for columns of shape `[batch]`: `2n` states, `n` inputs held, time in seconds.
     pub fn flow(&self, state: &[Tensor<1>], input: &[Tensor<1>], time: &Tensor<1>) -> Flow {
-        let (q, qd) = state.split_at(self.model.joints());
-        let mut rates = match (&self.model.frame.equations, &self.prior) {
+        let (q, qd) = state.split_at(self.frame.joints);
+        let mut rates = match (&self.frame.equations, &self.prior) {
             (Some(equations), _) => {
                 let mut inputs = state.to_vec();
                 inputs.extend_from_slice(input);

@@ -2,7 +2,8 @@ use burn::tensor::{Device, Tensor, TensorData, activation::relu};
 
 use super::network::{Angles, MlpWeights, ResidualOn};
 
-/// A multilayer perceptron with ReLU on every layer but the last, unpacked for Burn's operations.
+/// Multilayer perceptrons of one shape with ReLU on every layer but the last, unpacked for Burn's operations. Each sees
+/// rows of its own, one network's after the other's.
 #[derive(Debug)]
 pub(super) struct Mlp<'m> {
     made: &'m MlpWeights,
@@ -10,24 +11,26 @@ pub(super) struct Mlp<'m> {
     mean: Tensor<2>,
     /// 1 / standard deviation, `[1, features]`
     factor: Tensor<2>,
-    /// Weights `[input, output]` and biases `[1, output]`.
-    layers: Vec<[Tensor<2>; 2]>,
+    /// Weights `[network, input, output]` and biases `[network, 1, output]`.
+    layers: Vec<[Tensor<3>; 2]>,
 }
 
 impl<'m> Mlp<'m> {
-    /// The network that was made as `made` and has the numbers `flat` now, in the order of [`MlpWeights::flat`].
-    pub(super) fn new(made: &'m MlpWeights, flat: &Tensor<1>) -> Self {
-        let row = |values: &[f64]| vector(values, &flat.device()).reshape([1, values.len()]);
+    /// The networks that were made as `made` and have the numbers `[network, number]` now, in the order of
+    /// [`MlpWeights::flat`].
+    pub(super) fn new(made: &'m MlpWeights, numbers: &Tensor<2>) -> Self {
+        let networks = numbers.dims()[0];
+        let row = |values: &[f64]| vector(values, &numbers.device()).reshape([1, values.len()]);
         let factor: Vec<f64> = made.scaling.std.iter().map(|std| 1.0 / std).collect();
         let mut first = 0;
         let mut next = |rows: usize, columns: usize| {
-            let part = flat.clone().narrow(0, first, rows * columns);
+            let part = numbers.clone().narrow(1, first, rows * columns);
             first += rows * columns;
-            part.reshape([rows, columns])
+            part.reshape([networks, rows, columns])
         };
         let layers = made.layers.iter().map(|layer| {
             let weight = next(layer.outputs, layer.inputs);
-            [weight.transpose(), next(1, layer.outputs)]
+            [weight.swap_dims(1, 2), next(1, layer.outputs)]
         });
         Self {
             mean: row(&made.scaling.mean),
@@ -57,14 +60,18 @@ impl<'m> Mlp<'m> {
         };
         let columns = positions.iter().chain(qd).chain(tau).cloned().collect();
         let features: Tensor<2> = Tensor::stack(columns, 1);
-        let mut values = (features - self.mean.clone()) * self.factor.clone();
+        let scaled = (features - self.mean.clone()) * self.factor.clone();
+        let [batch, width] = scaled.dims();
+        let networks = self.layers[0][0].dims()[0];
+        let mut values = scaled.reshape([networks, batch / networks, width]);
         for (k, [weight, bias]) in self.layers.iter().enumerate() {
             values = values.matmul(weight.clone()) + bias.clone();
             if k + 1 < self.layers.len() {
                 values = relu(values);
             }
         }
-        values
+        let outputs = values.dims()[2];
+        values.reshape([batch, outputs])
     }
 }
 

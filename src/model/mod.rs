@@ -18,6 +18,7 @@ mod rollout;
 mod sections;
 mod sensors;
 mod shift;
+mod stack;
 mod system;
 
 pub use command::{CommandFilter, Commands, Filter, StepTorque};
@@ -37,4 +38,5 @@ pub use reader::FileError;
 pub use rollout::Rollout;
 pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use shift::absorbed;
+pub(crate) use stack::Stack;
 pub use system::{FittedEffect, OwnValue, System, put_own};

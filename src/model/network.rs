@@ -167,18 +167,20 @@ impl MlpWeights {
         let mut widths = vec![settings.angles.features(joints)];
         widths.extend(&settings.hidden);
         widths.push(settings.on.outputs(joints));
-        let count = widths.len() - 1;
-        let layers = (widths.windows(2).enumerate())
-            .map(|(k, pair)| match last {
-                LastLayer::Zero if k + 1 == count => LayerWeights::zero(pair[0], pair[1]),
-                _ => LayerWeights::random(pair[0], pair[1], rng),
-            })
-            .collect();
         Self {
             angles: settings.angles,
             on: settings.on,
             scaling,
-            layers,
+            layers: layers(&widths, last, rng),
+        }
+    }
+
+    /// A new network of the same shape and scaling, as [`MlpWeights::new`] draws it.
+    #[must_use]
+    pub fn redrawn(&self, last: LastLayer, rng: &mut impl Rng) -> Self {
+        Self {
+            layers: layers(&self.widths(), last, rng),
+            ..self.clone()
         }
     }
 
@@ -282,6 +284,16 @@ impl MlpWeights {
             })
             .collect()
     }
+}
+
+fn layers(widths: &[usize], last: LastLayer, rng: &mut impl Rng) -> Vec<LayerWeights> {
+    let count = widths.len() - 1;
+    (widths.windows(2).enumerate())
+        .map(|(k, pair)| match last {
+            LastLayer::Zero if k + 1 == count => LayerWeights::zero(pair[0], pair[1]),
+            _ => LayerWeights::random(pair[0], pair[1], rng),
+        })
+        .collect()
 }
 
 impl LayerWeights {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::RecipeError;
 use super::data::{Data, Logged};
 use crate::expr::suggestion;
-use crate::model::{Dynamics, Integrator, MlpSettings};
+use crate::model::{Dynamics, Integrator, LastLayer, MlpSettings};
 use crate::train::{FitSettings, LearningRates};
 
 const TUNING_EPOCHS: usize = 500;
@@ -55,6 +55,14 @@ impl Kind {
             Self::Hybrid => "hybrid",
             Self::Physics => "physics",
             Self::DataDriven => "data_driven",
+        }
+    }
+
+    /// How the last layer of its network begins.
+    pub(super) fn last_layer(self) -> LastLayer {
+        match self {
+            Self::Hybrid | Self::Physics => LastLayer::Zero,
+            Self::DataDriven => LastLayer::Random,
         }
     }
 }

@@ -42,15 +42,14 @@ impl Job {
         let mut dynamics = equations(&system);
         recipe.set_parameters(&mut dynamics)?;
         let material = Material::gather(&recipe, &system, library, seed)?;
-        let network = |last| new_network(&recipe, &system, &material, seed, last);
+        let last = recipe.kind.last_layer();
+        let network = || new_network(&recipe, &system, &material, seed, last);
         let device = backend.device();
         let model = match recipe.kind {
             Kind::Physics => HybridModel::physics(&dynamics, &device)?,
-            Kind::Hybrid => HybridModel::physics(&dynamics, &device)?
-                .with_residual(&network(LastLayer::Zero))?,
+            Kind::Hybrid => HybridModel::physics(&dynamics, &device)?.with_residual(&network())?,
             Kind::DataDriven => {
-                let network = network(LastLayer::Random);
-                HybridModel::network(&system.name, system.joints, &network, &device)?
+                HybridModel::network(&system.name, system.joints, &network(), &device)?
             }
         };
         let config = json!({

@@ -8,6 +8,8 @@ mod file;
 mod job;
 mod material;
 mod outcome;
+mod sweep;
+mod swept;
 mod tune;
 
 pub use data::{Data, Logged, Simulated};
@@ -16,3 +18,5 @@ pub use file::{Kind, Recipe};
 pub use job::Job;
 pub use material::Material;
 pub use outcome::{Change, Learnt, Outcome};
+pub use sweep::Member;
+pub use swept::{Model, Quartiles, Swept, Totals};

@@ -4,7 +4,7 @@ use burn::tensor::Tensor;
 
 use super::Columns;
 use super::loss::NORM_FLOOR;
-use crate::model::{HybridModel, Integrator};
+use crate::model::{HybridModel, Integrator, Prepared};
 
 /// E and ||F_r||, `[2]`.
 pub(super) fn loss(
@@ -13,13 +13,29 @@ pub(super) fn loss(
     integrator: Integrator,
     scale: &[f64],
 ) -> Tensor<1> {
-    let model = model.prepare();
+    Tensor::cat(
+        of_each(&model.prepare(), 1, batch, integrator, scale).to_vec(),
+        0,
+    )
+}
+
+/// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
+/// after the other's.
+pub(super) fn of_each(
+    model: &Prepared,
+    models: usize,
+    batch: &Columns,
+    integrator: Integrator,
+    scale: &[f64],
+) -> [Tensor<1>; 2] {
+    let rows = batch.size / models;
     let mut state = batch.states[0].clone();
     let (mut errors, mut residuals) = (Vec::new(), Vec::new());
     for (k, input) in batch.inputs.iter().enumerate() {
-        let step = integrator.step(&model, &state, input, &batch.time[k], &batch.dt[k]);
-        errors.push(squared_error(&step.state, &batch.states[k + 1], scale));
-        residuals.extend(step.residual.map(|r| r.square().sum() / batch.size as f64));
+        let step = integrator.step(model, &state, input, &batch.time[k], &batch.dt[k]);
+        let error = squared_error(&step.state, &batch.states[k + 1], scale);
+        errors.push(mean_of_each(error, models, rows));
+        residuals.extend((step.residual).map(|r| mean_of_each(r.square(), models, rows)));
         state = step.state;
     }
     let steps = batch.inputs.len() as f64;
@@ -28,16 +44,22 @@ pub(super) fn loss(
         || error.zeros_like(),
         |square| (square + NORM_FLOOR * NORM_FLOOR).sqrt(),
     );
-    Tensor::cat(vec![error, norm], 0)
+    [error, norm]
 }
 
-/// Mean over the batch of the squared norm of the error, `[1]`.
+/// The squared norm of the error, `[batch]`.
 fn squared_error(found: &[Tensor<1>], wanted: &[Tensor<1>], scale: &[f64]) -> Tensor<1> {
     (found.iter().zip(wanted).zip(scale))
         .map(|((found, wanted), scale)| ((found.clone() - wanted.clone()) / *scale).square())
         .reduce(|sum, part| sum + part)
         .expect("models have states")
-        .mean()
+}
+
+/// The sum of each model's entries, divided by its rows, `[models]`.
+fn mean_of_each<const D: usize>(entries: Tensor<D>, models: usize, rows: usize) -> Tensor<1> {
+    let count = entries.shape().num_elements();
+    let sums = entries.reshape([models, count / models]).sum_dim(1);
+    sums.reshape([models]) / rows as f64
 }
 
 fn mean(parts: Vec<Tensor<1>>, count: f64) -> Option<Tensor<1>> {

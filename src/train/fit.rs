@@ -14,7 +14,7 @@ use crate::model::HybridModel;
 pub struct Training {
     pub(super) model: HybridModel,
     pub(super) settings: FitSettings,
-    pub(super) optimizer: Stepper,
+    pub(super) optimizer: Stepper<1>,
     pub(super) rng: ChaCha8Rng,
     pub(super) epoch: usize,
     pub(super) penalty_weight: f64,
@@ -81,7 +81,7 @@ impl Training {
                 settings.error_scale.as_deref(),
                 model.joints(),
             )?,
-            optimizer: Stepper::new(&model, &settings.learning_rates),
+            optimizer: Stepper::new(model.frame(), &settings.learning_rates),
             epoch: 0,
             penalty_weight: settings.penalty.initial(),
             history: Vec::new(),
@@ -103,11 +103,11 @@ impl Training {
         validation: Option<&Segments>,
         observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Ended, TrainError> {
-        self.check(segments, "training")?;
+        segments.check_for(self.model.frame(), "training")?;
         let device = self.model.device();
         let plain = device.clone().without_autodiff();
         if let Some(validation) = validation {
-            self.check(validation, "validation")?;
+            validation.check_for(self.model.frame(), "validation")?;
         }
         let material = Material {
             segments,
@@ -185,21 +185,6 @@ impl Training {
         self.best.as_ref()
     }
 
-    fn check(&self, segments: &Segments, role: &'static str) -> Result<(), TrainError> {
-        if segments.is_empty() {
-            return Err(super::SegmentsError::Empty.into());
-        }
-        if segments.joints() != self.model.joints() {
-            return Err(TrainError::Joints {
-                role,
-                system: self.model.system().to_owned(),
-                expected: self.model.joints(),
-                found: segments.joints(),
-            });
-        }
-        Ok(())
-    }
-
     fn run_epoch(&mut self, material: &Material) -> Result<Epoch, TrainError> {
         let Batching::Mini { size } = self.settings.batching else {
             return self.step(&material.trained);
@@ -224,7 +209,8 @@ impl Training {
         let weights = self.weights();
         let (total, [error, _]) = self.total(&loss, weights)?;
         let gradients = loss.weighted(weights).backward();
-        self.model = self.optimizer.step(&self.model, gradients).project();
+        let stepped = self.optimizer.step(self.model.tensors(), gradients);
+        self.model = self.model.with_tensors(stepped).project();
         Ok(Epoch { loss: total, error })
     }
 

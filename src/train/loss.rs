@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use burn::tensor::{Tensor, TensorData};
 
-use super::{Batch, TrainError, composed, fused};
-use crate::model::{HybridModel, Integrator};
+use super::{Batch, Columns, TrainError, composed, fused};
+use crate::model::{HybridModel, Integrator, Prepared};
 
 /// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
 /// where every residual starts.
@@ -72,6 +72,19 @@ impl Objective {
                 fused::loss(model, blocks, self.integrator, &self.precision, &self.crew)
             }
         })
+    }
+}
+
+impl Objective {
+    /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
+    /// after the other's.
+    pub(super) fn of_each(
+        &self,
+        models: usize,
+        prepared: &Prepared,
+        batch: &Columns,
+    ) -> [Tensor<1>; 2] {
+        composed::of_each(prepared, models, batch, self.integrator, &self.scale)
     }
 }
 

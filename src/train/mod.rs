@@ -15,6 +15,7 @@ mod optimizer;
 mod penalty;
 mod segments;
 mod settings;
+mod sweep;
 mod weights;
 
 #[cfg(test)]
@@ -31,3 +32,4 @@ pub use manifest::{FORMAT, Manifest};
 pub use penalty::Penalty;
 pub use segments::{Batch, Columns, Segments, SegmentsError};
 pub use settings::{Batching, FitSettings, LearningRates};
+pub use sweep::{Start, Sweep, SweepProgress, Trained};

@@ -2,19 +2,19 @@ use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer}
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
 use super::LearningRates;
-use crate::model::HybridModel;
+use crate::model::Frame;
 
 // PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
 // and would stop them short of it.
 const ADAM_EPSILON: f32 = 1e-8;
 
-/// Adam on the two tensors of a model, each with a learning rate of its own.
+/// Adam on the two tensors of a model or, entry by entry alike, of many: each tensor with a learning rate of its own.
 #[derive(Clone)]
-pub(super) struct Stepper {
+pub(super) struct Stepper<const D: usize> {
     adam: Adam,
     rates: [f64; 2],
     /// Of the prior and of the residual; none before their first step.
-    moments: [Option<AdamState<1>>; 2],
+    moments: [Option<AdamState<D>>; 2],
 }
 
 /// What Adam remembers of one tensor, in plain form.
@@ -27,9 +27,9 @@ pub(super) struct Moments {
     pub second: Vec<f32>,
 }
 
-impl Stepper {
-    pub(super) fn new(model: &HybridModel, rates: &LearningRates) -> Self {
-        let prior = match model.frame().equations {
+impl<const D: usize> Stepper<D> {
+    pub(super) fn new(frame: &Frame, rates: &LearningRates) -> Self {
+        let prior = match frame.equations {
             Some(_) => rates.physics,
             None => rates.prior,
         };
@@ -40,9 +40,12 @@ impl Stepper {
         }
     }
 
-    /// The model after a step against these gradients.
-    pub(super) fn step(&mut self, model: &HybridModel, mut gradients: Gradients) -> HybridModel {
-        let mut tensors = model.tensors();
+    /// The tensors of prior and residual after a step against these gradients.
+    pub(super) fn step(
+        &mut self,
+        mut tensors: [Option<Tensor<D>>; 2],
+        mut gradients: Gradients,
+    ) -> [Option<Tensor<D>>; 2] {
         let each = tensors.iter_mut().zip(self.rates).zip(&mut self.moments);
         for ((tensor, rate), moments) in each {
             let Some(numbers) = tensor.take() else {
@@ -55,9 +58,11 @@ impl Stepper {
                 *tensor = Some(Tensor::from_inner(stepped));
             }
         }
-        model.with_tensors(tensors)
+        tensors
     }
+}
 
+impl Stepper<1> {
     /// What is remembered of the prior and of the residual.
     pub(super) fn moments(&self) -> [Option<Moments>; 2] {
         let numbers = |tensor: &Tensor<1>| tensor.to_data().iter().collect();
@@ -93,23 +98,14 @@ impl Stepper {
 /// Every so many steps, numbers below the smallest normal f32 become zero. The moments of a weight whose gradient has
 /// become zero for good, as below a neuron that no row reaches, would shrink into them and stay there, where
 /// processors are slow.
-fn without_subnormals(mut state: AdamState<1>) -> AdamState<1> {
+fn without_subnormals<const D: usize>(mut state: AdamState<D>) -> AdamState<D> {
     let momentum = &mut state.momentum;
     if !momentum.time.is_multiple_of(32) {
         return state;
     }
     for moment in [&mut momentum.moment_1, &mut momentum.moment_2] {
-        let device = moment.device();
-        let taken = std::mem::replace(moment, Tensor::empty([0], &device));
-        let mut data = taken.into_data();
-        for number in data.as_mut_slice::<f32>().expect("training runs in f32") {
-            *number = if number.abs() < f32::MIN_POSITIVE {
-                0.0
-            } else {
-                *number
-            };
-        }
-        *moment = Tensor::from_data(data, &device);
+        let subnormal = moment.clone().abs().lower_elem(f32::MIN_POSITIVE);
+        *moment = moment.clone().mask_fill(subnormal, 0.0);
     }
     state
 }

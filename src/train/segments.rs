@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::Blocks;
-use crate::model::{Angles, InputScaling};
+use super::{Blocks, TrainError};
+use crate::model::{Angles, Frame, InputScaling};
 
 /// Why rows of numbers are no segments.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -181,6 +181,25 @@ impl Segments {
     /// Number of steps k in each segment.
     pub fn steps(&self) -> usize {
         self.steps
+    }
+
+    /// Can a model of this frame learn from them? `role` is what they are for.
+    ///
+    /// # Errors
+    /// No segments, or another number of joints.
+    pub(super) fn check_for(&self, frame: &Frame, role: &'static str) -> Result<(), TrainError> {
+        if self.is_empty() {
+            return Err(SegmentsError::Empty.into());
+        }
+        if self.joints != frame.joints {
+            return Err(TrainError::Joints {
+                role,
+                system: frame.system.clone(),
+                expected: frame.joints,
+                found: self.joints,
+            });
+        }
+        Ok(())
     }
 
     /// A number that tells apart segments of other contents: FNV-1a over all bits. It finds changed

@@ -24,7 +24,7 @@ const INTEGRATORS: [Integrator; 3] = [
 ];
 
 /// Segments of `steps` irregular steps that lead through random states.
-fn segments(joints: usize, count: usize, steps: usize) -> Segments {
+pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
     let mut rng = rng(5);
     let mut segments = Segments::new(joints, steps);
     for _ in 0..count {
@@ -43,7 +43,7 @@ fn segments(joints: usize, count: usize, steps: usize) -> Segments {
 }
 
 /// The library's equations, one of their parameters held.
-fn equations(joints: usize) -> Dynamics {
+pub(super) fn equations(joints: usize) -> Dynamics {
     let name = ["pendulum", "acrobot"][joints - 1];
     let system = Library::built_in().system(Path::new(name)).unwrap();
     let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; joints]);
@@ -51,7 +51,7 @@ fn equations(joints: usize) -> Dynamics {
     dynamics
 }
 
-fn network(joints: usize, angles: Angles, on: ResidualOn, seed: u64) -> MlpWeights {
+pub(super) fn network(joints: usize, angles: Angles, on: ResidualOn, seed: u64) -> MlpWeights {
     let settings = MlpSettings {
         hidden: vec![16, 13],
         angles,

@@ -6,6 +6,7 @@ mod gradients;
 mod parity;
 mod recovery;
 mod resume;
+mod sweep;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,0 +1,180 @@
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+
+use super::{Answer, Common, inputs, progress};
+use crate::recipe::{Job, Member, Recipe, Swept};
+use crate::report::write_whole;
+use crate::train::{SweepProgress, Trained};
+
+/// Train many models by one recipe at once, from other initial networks or with other weights of the penalty
+///
+/// All models see the data of --seed. A graphics card (--device cuda) trains hundreds about as fast as one.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        residyn sweep --config configs/train-pendulum.toml --seeds 100\n  \
+        residyn sweep --config configs/train-pendulum.toml --seeds 20 --one-seed --alpha 1e-6-1e-2")]
+pub(super) struct Arguments {
+    /// Training recipe
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// How many models to train; their initial networks have the seeds --seed, --seed + 1, ...
+    #[arg(long, value_name = "COUNT")]
+    seeds: NonZeroUsize,
+    /// Weights of the penalty, one for each model, from LOW to HIGH in equal ratios
+    #[arg(long, value_name = "LOW-HIGH")]
+    alpha: Option<Alphas>,
+    /// Begin all models with the network of --seed, so that they differ in alpha alone
+    #[arg(long, requires = "alpha")]
+    one_seed: bool,
+    /// Models that are trained at once; fewer need less memory
+    #[arg(long, default_value = "1000", value_name = "COUNT")]
+    together: NonZeroUsize,
+    /// Folder of the result, sweep.json
+    #[arg(long, default_value = "sweep", value_name = "DIR")]
+    out: PathBuf,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// A range of weights, both above zero and finite.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Alphas {
+    low: f64,
+    high: f64,
+}
+
+impl FromStr for Alphas {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        // 1e-6-1e-2: the hyphen in the middle is the one with a number on either side.
+        let numbers = text.match_indices('-').find_map(|(at, _)| {
+            let (low, high) = (text[..at].parse().ok()?, text[at + 1..].parse().ok()?);
+            Some(Self { low, high })
+        });
+        let found = numbers.ok_or("give two numbers as LOW-HIGH, 1e-6-1e-2 say")?;
+        let Self { low, high } = found;
+        if !(low > 0.0 && high.is_finite()) {
+            return Err(format!(
+                "LOW is {low} and HIGH is {high}; both must be finite and above zero"
+            ));
+        }
+        if low > high {
+            return Err(format!("LOW is {low}, above HIGH, {high}; exchange them"));
+        }
+        Ok(found)
+    }
+}
+
+impl Alphas {
+    /// Number `k` of `count` in equal ratios.
+    fn at(self, k: usize, count: usize) -> f64 {
+        let share = k as f64 / (count.max(2) - 1) as f64;
+        self.low.powf(1.0 - share) * self.high.powf(share)
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let Arguments {
+        config,
+        out,
+        common,
+        ..
+    } = arguments;
+    if arguments.alpha.is_some() && arguments.seeds.get() == 1 {
+        bail!("--alpha is a range of weights, and --seeds 1 trains one model; raise --seeds");
+    }
+    let library = inputs::library(&arguments.effects)?;
+    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
+    let members = arguments.members();
+    let begun = Instant::now();
+    let trained = train(&job, &members, arguments)?;
+    let swept = Swept::new(&job, &members, trained, begun.elapsed().as_secs_f64());
+    let json = serde_json::to_string_pretty(&swept)? + "\n";
+    std::fs::create_dir_all(out).with_context(|| format!("{} cannot be made", out.display()))?;
+    write_whole(&out.join("sweep.json"), json.as_bytes())?;
+    inputs::print(&if common.json { json } else { swept.text() })?;
+    let all_diverged = swept.totals.diverged == swept.totals.models;
+    Ok(if all_diverged {
+        Answer::No
+    } else {
+        Answer::Yes
+    })
+}
+
+impl Arguments {
+    fn members(&self) -> Vec<Member> {
+        let count = self.seeds.get();
+        let each = (0..count).zip(self.common.seed..);
+        each.map(|(k, seed)| Member {
+            seed: if self.one_seed {
+                self.common.seed
+            } else {
+                seed
+            },
+            alpha: self.alpha.map(|alphas| alphas.at(k, count)),
+        })
+        .collect()
+    }
+}
+
+fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
+    inputs::check_writable(&arguments.out)?;
+    for note in &job.material.notes {
+        eprintln!("note: {note}");
+    }
+    let epochs = job.recipe.fit.epochs;
+    let parts = members.chunks(arguments.together.get());
+    let bar = progress::bar(parts.len() * epochs);
+    let mut trained: Vec<Trained> = Vec::new();
+    for part in parts {
+        let before = trained.iter().filter(|model| model.diverged).count();
+        let mut observer = |at: SweepProgress| {
+            bar.inc(1);
+            bar.set_message(format!("epochs, {} diverged", before + at.diverged));
+        };
+        let mut sweep = job.sweep(part)?;
+        trained.extend(sweep.run(&job.material.training, &mut observer)?);
+    }
+    bar.finish_and_clear();
+    Ok(trained)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Alphas;
+
+    #[test]
+    fn a_range_of_weights_is_read_and_divided_in_equal_ratios() {
+        let alphas: Alphas = "1e-6-1e-2".parse().unwrap();
+        assert_eq!((alphas.low, alphas.high), (1e-6, 1e-2));
+        let weights: Vec<f64> = (0..5).map(|k| alphas.at(k, 5)).collect();
+        assert_eq!((weights[0], weights[4]), (1e-6, 1e-2));
+        for pair in weights.windows(2) {
+            assert!((pair[1] / pair[0] - 10.0).abs() < 1e-12);
+        }
+        assert_eq!(alphas.at(0, 1), 1e-6);
+    }
+
+    #[test]
+    fn ranges_that_are_none_are_refused() {
+        for (text, part) in [
+            ("1e-2-1e-6", "above HIGH"),
+            ("0-1", "above zero"),
+            ("1e-6", "LOW-HIGH"),
+            ("-1-2", "above zero"),
+            ("1-inf", "finite"),
+        ] {
+            let message = text.parse::<Alphas>().unwrap_err();
+            assert!(message.contains(part), "{text}: {message}");
+        }
+    }
+}

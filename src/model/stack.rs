@@ -1,0 +1,139 @@
+use std::sync::Arc;
+
+use burn::tensor::{Bool, Device, Tensor, TensorData};
+
+use super::equations;
+use super::frame::Frame;
+use super::hybrid::Prepared;
+use super::mlp::{to_f32, to_f64};
+use super::network::MlpWeights;
+use super::{HybridModel, Parameter};
+
+/// Independent models of one frame side by side, so that one operation on a device serves them all.
+#[derive(Debug, Clone)]
+pub(crate) struct Stack {
+    frame: Arc<Frame>,
+    models: usize,
+    /// The learnable numbers of the prior and of the residual, `[models, numbers]` each.
+    tensors: [Option<Tensor<2>>; 2],
+    /// The lowest and the highest value / scale of each physical parameter, `[1, parameters]`; none without bounds.
+    bounds: Option<[Tensor<2>; 2]>,
+}
+
+impl Stack {
+    /// Copies of `model`, each with a network of its own in place of the model's: of its residual or, where it has none,
+    /// of its prior.
+    ///
+    /// # Panics
+    /// When there are no networks, or not of the shape of the model's own.
+    pub(crate) fn new(model: &HybridModel, networks: &[MlpWeights]) -> Self {
+        let (frame, device) = (model.frame().clone(), model.device());
+        let made = frame.networks.last().map(MlpWeights::widths);
+        let fits = |network: &MlpWeights| Some(network.widths()) == made;
+        assert!(
+            !networks.is_empty() && networks.iter().all(fits),
+            "networks are of the shape of the model's"
+        );
+        let models = networks.len();
+        let flat: Vec<f64> = networks.iter().flat_map(MlpWeights::flat).collect();
+        let width = flat.len() / models;
+        let drawn = matrix(&flat, [models, width], &device);
+        let [prior, _] = model.tensors();
+        let detached = |prior: Tensor<1>| Tensor::from_inner(prior.inner());
+        let tensors = if frame.has_residual {
+            let prior = prior.map(|prior| detached(prior).unsqueeze().repeat_dim(0, models));
+            [prior, Some(drawn)]
+        } else {
+            [Some(drawn), None]
+        };
+        Self {
+            bounds: bounds(frame.parameters(), &device),
+            tensors: tensors.map(|tensor| tensor.map(Tensor::require_grad)),
+            models,
+            frame,
+        }
+    }
+
+    /// Number of models.
+    pub(crate) fn models(&self) -> usize {
+        self.models
+    }
+
+    /// What the models are without their learnable numbers.
+    pub(crate) fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    pub(crate) fn device(&self) -> Device {
+        let [prior, _] = &self.tensors;
+        prior.as_ref().expect("every model has a prior").device()
+    }
+
+    /// The learnable numbers of the prior and of the residual, `[models, numbers]` each.
+    pub(crate) fn tensors(&self) -> [Option<Tensor<2>>; 2] {
+        self.tensors.clone()
+    }
+
+    /// Unpack the parameters for evaluations at so many rows for each model, one model's after the other's.
+    pub(crate) fn prepare(&self, rows: usize) -> Prepared<'_> {
+        let [prior, residual] = self.tensors();
+        let prior = prior.expect("every model has a prior");
+        Prepared::new(&self.frame, rows, prior, residual)
+    }
+
+    /// The models that are `alive` (`[models]`) with other learnable numbers, physical parameters brought back within
+    /// their bounds; the others as they are.
+    pub(crate) fn stepped(&self, tensors: [Option<Tensor<2>>; 2], alive: &Tensor<1, Bool>) -> Self {
+        let alive: Tensor<2, Bool> = alive.clone().unsqueeze_dim(1);
+        let [prior, residual] = tensors.map(|tensor| tensor.map(Tensor::inner));
+        let mut stepped = [prior.map(|prior| self.project(prior)), residual];
+        for (stepped, before) in stepped.iter_mut().zip(self.tensors()) {
+            if let (Some(numbers), Some(before)) = (stepped.take(), before) {
+                let alive = alive.clone().expand(numbers.dims());
+                let numbers = before.inner().mask_where(alive, numbers);
+                *stepped = Some(Tensor::from_inner(numbers).require_grad());
+            }
+        }
+        Self {
+            tensors: stepped,
+            ..self.clone()
+        }
+    }
+
+    /// Comparisons rather than minimum and maximum: what is not a number must stay so.
+    fn project(&self, prior: Tensor<2>) -> Tensor<2> {
+        let Some([lowest, highest]) = &self.bounds else {
+            return prior;
+        };
+        let [lowest, highest] = [lowest, highest].map(|b| b.clone().expand(prior.dims()));
+        let prior = (prior.clone()).mask_where(prior.lower(lowest.clone()), lowest);
+        (prior.clone()).mask_where(prior.greater(highest.clone()), highest)
+    }
+
+    /// Values of the physical parameters of each model, in their units.
+    pub(crate) fn parameters(&self) -> Vec<Vec<f64>> {
+        let declared = self.frame.parameters();
+        if declared.is_empty() {
+            return vec![Vec::new(); self.models];
+        }
+        let [prior, _] = self.tensors();
+        let scaled = to_f64(prior.expect("every model has a prior"));
+        (scaled.chunks(declared.len()))
+            .map(|scaled| equations::values(declared, scaled).collect())
+            .collect()
+    }
+}
+
+fn bounds(parameters: &[Parameter], device: &Device) -> Option<[Tensor<2>; 2]> {
+    let bounded = |p: &Parameter| p.bounds.iter().any(|bound| bound.is_finite());
+    let plain = device.clone().without_autodiff();
+    let bound = |end: usize| {
+        let values: Vec<f64> = parameters.iter().map(|p| p.bounds[end] / p.scale).collect();
+        matrix(&values, [1, values.len()], &plain)
+    };
+    parameters.iter().any(bounded).then(|| [bound(0), bound(1)])
+}
+
+fn matrix(values: &[f64], shape: [usize; 2], device: &Device) -> Tensor<2> {
+    Tensor::from_data(TensorData::new(to_f32(values), shape), device)
+}

@@ -1,0 +1,97 @@
+use super::material::{Purpose, stream};
+use super::{Job, Kind, Recipe, RecipeError};
+use crate::model::MlpWeights;
+use crate::train::{Penalty, Start, Sweep};
+
+/// What one model of a sweep has of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Member {
+    /// Of its initial network and of the order of its minibatches.
+    pub seed: u64,
+    /// In place of the recipe's weight of the penalty.
+    pub alpha: Option<f64>,
+}
+
+impl Job {
+    /// A run of many models, all on the data of this job, in place of one. Each begins with the weights that a job of its
+    /// seed would draw.
+    ///
+    /// # Errors
+    /// A model without a network, in which nothing would differ; alphas where there is none; settings that are out of
+    /// range.
+    ///
+    /// # Panics
+    /// When there are no members.
+    pub fn sweep(&self, members: &[Member]) -> Result<Sweep, RecipeError> {
+        self.check(members)?;
+        let made = self.model.frame().networks.last();
+        let made = made.expect("only models of equations alone have no network");
+        let starts = members.iter().map(|member| self.start(made, member));
+        Ok(Sweep::new(
+            &self.model,
+            self.recipe.fit.clone(),
+            starts.collect(),
+        )?)
+    }
+
+    fn start(&self, made: &MlpWeights, member: &Member) -> Start {
+        let Recipe { kind, fit, .. } = &self.recipe;
+        let mut rng = stream(member.seed, Purpose::Network);
+        Start {
+            network: made.redrawn(kind.last_layer(), &mut rng),
+            penalty_weight: member.alpha.unwrap_or(fit.penalty.initial()),
+            order: stream(member.seed, Purpose::Order),
+        }
+    }
+
+    fn check(&self, members: &[Member]) -> Result<(), RecipeError> {
+        let Self { recipe, .. } = self;
+        let with_alpha = members.iter().any(|member| member.alpha.is_some());
+        match (recipe.kind, recipe.fit.penalty) {
+            (Kind::Physics, _) => Err(recipe.wrong(
+                "kind = \"physics\" has no network, so that all models of a sweep would be the same; take kind = \
+                 \"hybrid\", or `residyn train`"
+                    .into(),
+            )),
+            (Kind::DataDriven, _) if with_alpha => Err(recipe.wrong(
+                "alpha weighs the residual, and kind = \"data_driven\" has none; leave out --alpha, or take kind = \
+                 \"hybrid\""
+                    .into(),
+            )),
+            (_, Penalty::Adaptive { .. }) if with_alpha => Err(recipe.wrong(
+                "[fit] has the adaptive penalty, which finds its weight itself; leave out --alpha, or take penalty = \
+                 { fixed = { alpha = 1e-4 } }"
+                    .into(),
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::Member;
+    use crate::model::Library;
+    use crate::recipe::{Job, Recipe};
+    use crate::train::Backend;
+
+    #[test]
+    fn a_member_begins_with_the_weights_of_its_own_job() {
+        let smoke = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/smoke");
+        for name in ["train-acrobot.toml", "train-pendulum-offline.toml"] {
+            let job = |seed| {
+                let recipe = Recipe::read(&smoke.join(name)).unwrap();
+                Job::train(recipe, &Library::built_in(), Backend::Flex, seed).unwrap()
+            };
+            let (first, own) = (job(4), job(5));
+            let network = |job: &Job| job.model.frame().networks.last().unwrap().clone();
+            let (seed, alpha) = (5, None);
+            let start = first.start(&network(&first), &Member { seed, alpha });
+            assert_eq!(start.network.layers, network(&own).layers);
+            assert_ne!(start.network.layers, network(&first).layers);
+            assert_eq!(start.network.scaling, network(&first).scaling);
+        }
+    }
+}

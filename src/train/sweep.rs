@@ -1,0 +1,216 @@
+//! Many independent models of one shape trained as one batch, for devices that one model leaves idle.
+
+use std::ops::Range;
+
+use burn::tensor::{Bool, Tensor, TensorData};
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::optimizer::Stepper;
+
+use super::{Batching, Columns, FitSettings, Objective, Penalty, Segments, TrainError};
+use crate::model::mlp::to_f32;
+use crate::model::{HybridModel, MlpWeights, Stack};
+
+/// A run of many models. The sum of their losses is minimised, in which each model has numbers of its own: every gradient
+/// and every step of Adam, which goes entry by entry, is that of a model alone. One whose loss is no longer finite
+/// stays as it is from then on and harms no other.
+pub struct Sweep {
+    stack: Stack,
+    settings: FitSettings,
+    objective: Objective,
+    optimizer: Stepper<2>,
+    /// Of the minibatches of each model.
+    orders: Vec<ChaCha8Rng>,
+    /// alpha, or the present lambda, `[models]`.
+    penalty_weights: Tensor<1>,
+    /// Whether all losses of a model were finite so far, `[models]`.
+    alive: Tensor<1, Bool>,
+}
+
+/// What tells a model of a sweep from the others.
+#[derive(Debug, Clone)]
+pub struct Start {
+    /// In place of the network of the sweep's model.
+    pub network: MlpWeights,
+    /// alpha, or the first lambda.
+    pub penalty_weight: f64,
+    /// Orders the minibatches.
+    pub order: ChaCha8Rng,
+}
+
+/// A model of a sweep after its training.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trained {
+    /// Prediction error on the training segments.
+    pub error: f64,
+    /// ||F_r||; 0 in a model without a residual.
+    pub residual_norm: f64,
+    /// Values of the physical parameters, in their order and units.
+    pub parameters: Vec<f64>,
+    /// The loss became infinite or no number. All else here is then of the last step before or not finite.
+    pub diverged: bool,
+}
+
+/// What an observer sees after each epoch.
+#[derive(Debug, Clone, Copy)]
+pub struct SweepProgress {
+    /// Epochs done.
+    pub epoch: usize,
+    /// Models that had diverged when last counted, every `record_every` epochs.
+    pub diverged: usize,
+}
+
+impl Sweep {
+    /// A run that has not begun: copies of `model`, each with what its start says. The model must be on a device
+    /// with gradients and have a network.
+    ///
+    /// # Errors
+    /// Settings that are out of range.
+    ///
+    /// # Panics
+    /// When there are no starts, or with networks that are not of the shape of the model's own.
+    pub fn new(
+        model: &HybridModel,
+        settings: FitSettings,
+        starts: Vec<Start>,
+    ) -> Result<Self, TrainError> {
+        settings.check()?;
+        let scale = settings.error_scale.as_deref();
+        let objective = Objective::new(settings.integrator, scale, model.joints())?;
+        let weights: Vec<f64> = starts.iter().map(|start| start.penalty_weight).collect();
+        let (networks, orders): (Vec<_>, Vec<_>) = (starts.into_iter())
+            .map(|start| (start.network, start.order))
+            .unzip();
+        let weights = TensorData::new(to_f32(&weights), [weights.len()]);
+        let penalty_weights = Tensor::from_data(weights, &model.device().without_autodiff());
+        Ok(Self {
+            alive: penalty_weights.clone().is_finite(),
+            stack: Stack::new(model, &networks),
+            optimizer: Stepper::new(model.frame(), &settings.learning_rates),
+            orders,
+            penalty_weights,
+            objective,
+            settings,
+        })
+    }
+
+    /// Train to the last epoch; `observer` is called after each.
+    ///
+    /// # Errors
+    /// Segments that do not fit the model.
+    pub fn run(
+        &mut self,
+        segments: &Segments,
+        observer: &mut dyn FnMut(SweepProgress),
+    ) -> Result<Vec<Trained>, TrainError> {
+        segments.check_for(self.stack.frame(), "training")?;
+        let whole = self.columns(segments, &self.in_order(segments), 0..segments.len());
+        let mut diverged = 0;
+        for epoch in 1..=self.settings.epochs {
+            let error = self.run_epoch(segments, &whole);
+            self.penalty_weights = self.next_weights(error);
+            // Only now and then, since it waits for the device.
+            if epoch.is_multiple_of(self.settings.record_every.get()) {
+                diverged = self
+                    .diverged()
+                    .into_iter()
+                    .filter(|diverged| *diverged)
+                    .count();
+            }
+            observer(SweepProgress { epoch, diverged });
+        }
+        Ok(self.judge(&whole))
+    }
+
+    /// Prediction error of each model, mean over the epoch, `[models]`.
+    fn run_epoch(&mut self, segments: &Segments, whole: &Columns) -> Tensor<1> {
+        let Batching::Mini { size } = self.settings.batching else {
+            return self.step(whole);
+        };
+        let mut orders = self.in_order(segments);
+        for (order, rng) in orders.iter_mut().zip(&mut self.orders) {
+            order.shuffle(rng);
+        }
+        let mut mean = self.penalty_weights.zeros_like();
+        for first in (0..segments.len()).step_by(size.get()) {
+            let chosen = first..segments.len().min(first + size.get());
+            let share = chosen.len() as f64 / segments.len() as f64;
+            mean = mean + self.step(&self.columns(segments, &orders, chosen)) * share;
+        }
+        mean
+    }
+
+    /// One step of the optimiser on one batch. Returns the prediction error of each model before it, `[models]`.
+    fn step(&mut self, batch: &Columns) -> Tensor<1> {
+        let rows = batch.size / self.stack.models();
+        let prepared = self.stack.prepare(rows);
+        let parts = self
+            .objective
+            .of_each(self.stack.models(), &prepared, batch);
+        let [error, _] = parts.clone().map(Tensor::inner);
+        let losses = self.losses(parts);
+        self.alive = self
+            .alive
+            .clone()
+            .bool_and(losses.clone().inner().is_finite());
+        let stepped = self.optimizer.step(self.stack.tensors(), losses.backward());
+        self.stack = self.stack.stepped(stepped, &self.alive);
+        error
+    }
+
+    /// What is minimised for each model, `[models]`, from E and ||F_r||.
+    fn losses(&self, [error, norm]: [Tensor<1>; 2]) -> Tensor<1> {
+        let weights = Tensor::from_inner(self.penalty_weights.clone());
+        match self.settings.penalty {
+            _ if !self.stack.frame().has_residual => error,
+            Penalty::Fixed { .. } => error + norm * weights,
+            Penalty::Adaptive { .. } => norm + error * weights,
+        }
+    }
+
+    /// The weights for the next epoch.
+    fn next_weights(&self, epoch_error: Tensor<1>) -> Tensor<1> {
+        match self.settings.penalty {
+            Penalty::Fixed { .. } => self.penalty_weights.clone(),
+            Penalty::Adaptive { rate, .. } => self.penalty_weights.clone() + epoch_error * rate,
+        }
+    }
+
+    fn judge(&self, whole: &Columns) -> Vec<Trained> {
+        let models = self.stack.models();
+        let prepared = self.stack.prepare(whole.size / models);
+        let parts = self.objective.of_each(models, &prepared, whole);
+        let [error, norm] = parts.map(|part| part.into_data().iter::<f64>().collect::<Vec<_>>());
+        let found = error.into_iter().zip(norm).zip(self.stack.parameters());
+        found
+            .zip(self.diverged())
+            .map(|(((error, residual_norm), parameters), diverged)| Trained {
+                diverged: diverged || !(error + residual_norm).is_finite(),
+                error,
+                residual_norm,
+                parameters,
+            })
+            .collect()
+    }
+
+    fn diverged(&self) -> Vec<bool> {
+        self.alive
+            .clone()
+            .bool_not()
+            .into_data()
+            .iter::<bool>()
+            .collect()
+    }
+
+    /// For each model all segments as they come.
+    fn in_order(&self, segments: &Segments) -> Vec<Vec<usize>> {
+        vec![(0..segments.len()).collect(); self.stack.models()]
+    }
+
+    /// The `chosen` of each model's order, one model's after the other's.
+    fn columns(&self, segments: &Segments, orders: &[Vec<usize>], chosen: Range<usize>) -> Columns {
+        let rows = orders.iter().flat_map(|order| &order[chosen.clone()]);
+        segments.columns(&rows.copied().collect::<Vec<_>>(), &self.stack.device())
+    }
+}
