@@ -26,5 +26,6 @@ mod recipes;
 mod rigs;
 mod shift;
 mod support;
+mod sweep;
 mod train;
 mod unexplained;

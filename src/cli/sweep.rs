@@ -134,18 +134,19 @@ fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Tra
     let epochs = job.recipe.fit.epochs;
     let parts = members.chunks(arguments.together.get());
     let bar = progress::bar(parts.len() * epochs);
-    let mut trained: Vec<Trained> = Vec::new();
-    for part in parts {
-        let before = trained.iter().filter(|model| model.diverged).count();
+    let mut diverged = 0;
+    let mut train_part = |part: &[Member]| {
         let mut observer = |at: SweepProgress| {
             bar.inc(1);
-            bar.set_message(format!("epochs, {} diverged", before + at.diverged));
+            bar.set_message(format!("epochs, {} diverged", diverged + at.diverged));
         };
-        let mut sweep = job.sweep(part)?;
-        trained.extend(sweep.run(&job.material.training, &mut observer)?);
-    }
+        let trained = (job.sweep(part)?).run(&job.material.training, &mut observer)?;
+        diverged += trained.iter().filter(|model| model.diverged).count();
+        Ok::<_, anyhow::Error>(trained)
+    };
+    let trained: Result<Vec<_>> = parts.map(&mut train_part).collect();
     bar.finish_and_clear();
-    Ok(trained)
+    Ok(trained?.concat())
 }
 
 #[cfg(test)]
