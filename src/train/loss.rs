@@ -73,9 +73,7 @@ impl Objective {
             }
         })
     }
-}
 
-impl Objective {
     /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
     /// after the other's.
     pub(super) fn of_each(
