@@ -63,7 +63,12 @@ fn people_read_quartiles() {
     let out = ["--out", text(dir.path())];
     let arguments = ["sweep", "--config", text(&config), "--seeds", "4"];
     let printed = succeeds(&[&arguments[..], &out].concat());
-    for part in ["4 models", "0 diverged", "prediction error", "models per second"] {
+    for part in [
+        "4 models",
+        "0 diverged",
+        "prediction error",
+        "models per second",
+    ] {
         assert!(printed.contains(part), "{part:?} in {printed}");
     }
 }
@@ -93,7 +98,9 @@ fn what_cannot_be_swept_is_refused_with_a_remedy() {
     let smoke = std::fs::read_to_string(configs().join("smoke/train-pendulum.toml")).unwrap();
     let smoke = smoke.replace("../plants", text(&configs().join("plants")));
     let network = smoke.find("[network]").unwrap()..smoke.find("[fit]").unwrap();
-    let physics = smoke.replace(&smoke[network], "").replace("hybrid", "physics");
+    let physics = smoke
+        .replace(&smoke[network], "")
+        .replace("hybrid", "physics");
     let adaptive = smoke.replace(
         "fixed = { alpha = 1e-4 }",
         "adaptive = { initial = 1, rate = 1 }",
