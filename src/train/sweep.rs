@@ -22,8 +22,10 @@ pub struct Sweep {
     optimizer: Stepper<2>,
     /// Of the minibatches of each model.
     orders: Vec<ChaCha8Rng>,
-    /// alpha, or the present lambda, `[models]`.
-    penalty_weights: Tensor<1>,
+    /// alpha, or the present lambda, of each model.
+    penalty_weights: Vec<f64>,
+    /// What E and ||F_r|| are multiplied by, `[models]` each.
+    weights: [Tensor<1>; 2],
     /// Whether all losses of a model were finite so far, `[models]`.
     alive: Tensor<1, Bool>,
 }
@@ -61,6 +63,13 @@ pub struct SweepProgress {
     pub diverged: usize,
 }
 
+/// What a step saw.
+struct Step {
+    share: f64,
+    /// The prediction error of each model before it, `[models]`.
+    error: Tensor<1>,
+}
+
 impl Sweep {
     /// A run that has not begun: copies of `model`, each with what its start says. The model must be on a device
     /// with gradients and have a network.
@@ -78,21 +87,24 @@ impl Sweep {
         settings.check()?;
         let scale = settings.error_scale.as_deref();
         let objective = Objective::new(settings.integrator, scale, model.joints())?;
-        let weights: Vec<f64> = starts.iter().map(|start| start.penalty_weight).collect();
+        let penalty_weights: Vec<f64> = starts.iter().map(|s| s.penalty_weight).collect();
         let (networks, orders): (Vec<_>, Vec<_>) = (starts.into_iter())
             .map(|start| (start.network, start.order))
             .unzip();
-        let weights = TensorData::new(to_f32(&weights), [weights.len()]);
-        let penalty_weights = Tensor::from_data(weights, &model.device().without_autodiff());
-        Ok(Self {
-            alive: penalty_weights.clone().is_finite(),
-            stack: Stack::new(model, &networks),
+        let stack = Stack::new(model, &networks);
+        let weights = [(); 2].map(|()| Tensor::zeros([networks.len()], &stack.device()));
+        let mut sweep = Self {
+            alive: weights[0].clone().inner().is_finite(),
             optimizer: Stepper::new(model.frame(), &settings.learning_rates),
+            weights,
+            stack,
             orders,
             penalty_weights,
             objective,
             settings,
-        })
+        };
+        sweep.weights = sweep.weights_on_device();
+        Ok(sweep)
     }
 
     /// Train to the last epoch; `observer` is called after each.
@@ -108,8 +120,8 @@ impl Sweep {
         let whole = self.columns(segments, &self.in_order(segments), 0..segments.len());
         let mut diverged = 0;
         for epoch in 1..=self.settings.epochs {
-            let error = self.run_epoch(segments, &whole);
-            self.penalty_weights = self.next_weights(error);
+            let steps = self.run_epoch(segments, &whole);
+            self.reweigh(steps);
             // Only now and then, since it waits for the device.
             if epoch.is_multiple_of(self.settings.record_every.get()) {
                 diverged = self
@@ -123,58 +135,74 @@ impl Sweep {
         Ok(self.judge(&whole))
     }
 
-    /// Prediction error of each model, mean over the epoch, `[models]`.
-    fn run_epoch(&mut self, segments: &Segments, whole: &Columns) -> Tensor<1> {
+    fn run_epoch(&mut self, segments: &Segments, whole: &Columns) -> Vec<Step> {
         let Batching::Mini { size } = self.settings.batching else {
-            return self.step(whole);
+            return vec![self.step(whole, 1.0)];
         };
         let mut orders = self.in_order(segments);
         for (order, rng) in orders.iter_mut().zip(&mut self.orders) {
             order.shuffle(rng);
         }
-        let mut mean = self.penalty_weights.zeros_like();
-        for first in (0..segments.len()).step_by(size.get()) {
-            let chosen = first..segments.len().min(first + size.get());
-            let share = chosen.len() as f64 / segments.len() as f64;
-            mean = mean + self.step(&self.columns(segments, &orders, chosen)) * share;
-        }
-        mean
+        let firsts = (0..segments.len()).step_by(size.get());
+        firsts
+            .map(|first| {
+                let chosen = first..segments.len().min(first + size.get());
+                let share = chosen.len() as f64 / segments.len() as f64;
+                self.step(&self.columns(segments, &orders, chosen), share)
+            })
+            .collect()
     }
 
-    /// One step of the optimiser on one batch. Returns the prediction error of each model before it, `[models]`.
-    fn step(&mut self, batch: &Columns) -> Tensor<1> {
+    /// One step of the optimiser on one batch, which is so large a `share` of all segments.
+    fn step(&mut self, batch: &Columns, share: f64) -> Step {
         let rows = batch.size / self.stack.models();
         let prepared = self.stack.prepare(rows);
-        let parts = self
+        let [error, norm] = self
             .objective
             .of_each(self.stack.models(), &prepared, batch);
-        let [error, _] = parts.clone().map(Tensor::inner);
-        let losses = self.losses(parts);
-        self.alive = self
-            .alive
-            .clone()
-            .bool_and(losses.clone().inner().is_finite());
-        let stepped = self.optimizer.step(self.stack.tensors(), losses.backward());
+        let before = error.clone().inner();
+        let [of_error, of_norm] = self.weights.clone();
+        let losses = error * of_error + norm * of_norm;
+        self.alive = (self.alive.clone()).bool_and(losses.clone().inner().is_finite());
+        // Backwards from every loss at once, as from their sum.
+        let stepped = (self.optimizer).step(self.stack.tensors(), losses.backward());
         self.stack = self.stack.stepped(stepped, &self.alive);
-        error
-    }
-
-    /// What is minimised for each model, `[models]`, from E and ||F_r||.
-    fn losses(&self, [error, norm]: [Tensor<1>; 2]) -> Tensor<1> {
-        let weights = Tensor::from_inner(self.penalty_weights.clone());
-        match self.settings.penalty {
-            _ if !self.stack.frame().has_residual => error,
-            Penalty::Fixed { .. } => error + norm * weights,
-            Penalty::Adaptive { .. } => norm + error * weights,
+        Step {
+            share,
+            error: before,
         }
     }
 
-    /// The weights for the next epoch.
-    fn next_weights(&self, epoch_error: Tensor<1>) -> Tensor<1> {
-        match self.settings.penalty {
-            Penalty::Fixed { .. } => self.penalty_weights.clone(),
-            Penalty::Adaptive { rate, .. } => self.penalty_weights.clone() + epoch_error * rate,
+    /// Carry the weights of the penalty on after an epoch's steps, as a run alone does.
+    fn reweigh(&mut self, steps: Vec<Step>) {
+        // It would wait for the device, for nothing.
+        if let Penalty::Fixed { .. } = self.settings.penalty {
+            return;
         }
+        let mut means = vec![0.0; self.penalty_weights.len()];
+        for Step { share, error } in steps {
+            for (mean, error) in means.iter_mut().zip(error.into_data().iter::<f64>()) {
+                *mean += share * error;
+            }
+        }
+        for (weight, error) in self.penalty_weights.iter_mut().zip(means) {
+            *weight = self.settings.penalty.next(*weight, error);
+        }
+        self.weights = self.weights_on_device();
+    }
+
+    fn weights_on_device(&self) -> [Tensor<1>; 2] {
+        let has_residual = self.stack.frame().has_residual;
+        let weigh = |weight: &f64| self.settings.penalty.weights(*weight, has_residual);
+        [0, 1].map(|part| {
+            let weights: Vec<f64> = self
+                .penalty_weights
+                .iter()
+                .map(|w| weigh(w)[part])
+                .collect();
+            let data = TensorData::new(to_f32(&weights), [weights.len()]);
+            Tensor::from_data(data, &self.stack.device())
+        })
     }
 
     fn judge(&self, whole: &Columns) -> Vec<Trained> {

@@ -84,7 +84,6 @@ fn assert_close(found: &Trained, wanted: &Trained) {
         all
     };
     for (found, wanted) in numbers(found).into_iter().zip(numbers(wanted)) {
-        eprintln!("{:e}", (found - wanted).abs() / wanted.abs().max(1e-30));
         assert!(
             (found - wanted).abs() <= 1e-4 * wanted.abs(),
             "{found}, alone {wanted}"
@@ -161,7 +160,13 @@ fn minibatches_penalties_and_bounds_are_those_of_a_run_alone() {
                 },
                 ..settings()
             };
-            let starts = starts(&model, LastLayer::Zero);
+            let mut starts = starts(&model, LastLayer::Zero);
+            if penalty == adaptive {
+                // Far enough from zero, where the norm of the residual is not smooth.
+                starts
+                    .iter_mut()
+                    .for_each(|start| start.penalty_weight *= 1000.0);
+            }
             let together = sweep(&model, &of(1.0), &starts, &segments);
             for (start, found) in starts.into_iter().zip(&together) {
                 let model = begun(&model, &start);
