@@ -1,8 +1,8 @@
 //! Work in many short rounds on all cores. A round of a tenth of a millisecond is over before a sleeping thread has
 //! woken up; here those who help stay awake from one round to the next.
 
-use std::hint::spin_loop;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::thread::yield_now;
 use std::time::{Duration, Instant};
 
 /// So long a helper without a task stays awake; then it looks again each time after a nap.
@@ -58,7 +58,8 @@ impl Rounds {
             self.carry_out(task, work);
         }
         while self.left.load(Ordering::Acquire) > 0 {
-            spin_loop();
+            // Where cores are fewer than threads, the one that is waited for may need this one.
+            yield_now();
         }
     }
 
@@ -69,7 +70,7 @@ impl Rounds {
                 self.carry_out(task, work);
                 idle_since = Instant::now();
             } else if idle_since.elapsed() < AWAKE {
-                spin_loop();
+                yield_now();
             } else {
                 std::thread::sleep(NAP);
             }

@@ -242,11 +242,16 @@ impl HybridModel {
 
     /// Unpack the parameters, once for all evaluations that one gradient runs through.
     pub fn prepare(&self) -> Prepared<'_> {
-        let residual = self
-            .residual
-            .as_ref()
-            .map(|numbers| numbers.val().unsqueeze());
-        Prepared::new(&self.frame, 1, self.prior.val().unsqueeze(), residual)
+        let one_row = |numbers: &Param<Tensor<1>>| {
+            let numbers = numbers.val();
+            match numbers.dims() {
+                // Burn takes a length of 0 as that of the same dimension before.
+                [0] => Tensor::zeros([1, 0], &numbers.device()),
+                _ => numbers.unsqueeze(),
+            }
+        };
+        let residual = self.residual.as_ref().map(one_row);
+        Prepared::new(&self.frame, 1, one_row(&self.prior), residual)
     }
 
     /// ds/dt and the part F_r of it that the residual makes, at a batch of points.

@@ -8,7 +8,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, Flex, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 
-use super::plan::Plan;
+use super::plan::{KEPT, Plan};
 use super::scheme::Scheme;
 use super::work::Work;
 use super::{Blocks, Crew};
@@ -29,6 +29,7 @@ pub(in crate::train) fn loss(
         blocks: blocks.clone(),
         scheme: Scheme::of(integrator),
         precision: precision.clone(),
+        kept: KEPT,
     };
     Tensor::from_dispatch(<Dispatch as LossOperation>::fused_loss(
         prior.into_dispatch(),

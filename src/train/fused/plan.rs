@@ -10,8 +10,8 @@ use crate::model::Frame;
 /// enough that all that is made of them stays near the processor.
 pub(super) const CHUNK: usize = 4;
 
-/// Records of more rows than these together, 1 GiB, are not kept: the way back then begins with the way there again.
-const KEPT: usize = (1 << 30) / size_of::<Rows>();
+/// 1 GiB of records.
+pub(super) const KEPT: usize = (1 << 30) / size_of::<Rows>();
 
 /// What stays the same while a loss and its derivative are taken.
 #[derive(Debug)]
@@ -21,6 +21,8 @@ pub(super) struct Plan {
     pub scheme: Scheme,
     /// 1 / scale of each state's error.
     pub precision: Arc<[f32]>,
+    /// Records of more rows than these together are not kept: the way back then begins with the way there again.
+    pub kept: usize,
 }
 
 /// The learnable numbers as the kernels read them.
@@ -53,7 +55,7 @@ impl Plan {
 
     /// Whether the records of all blocks are kept.
     pub(super) fn keeps(&self, networks: &[Network]) -> bool {
-        self.blocks.count() * self.recorded(networks) <= KEPT
+        self.blocks.count() * self.recorded(networks) <= self.kept
     }
 
     /// The blocks in parts of nearly equal size. They do not hang on the number of threads, so that the sums over

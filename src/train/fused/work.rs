@@ -205,3 +205,45 @@ fn gathered(frame: &Frame, parts: &[Mutex<Part>]) -> [Vec<f32>; 2] {
     };
     [prior, networks.next().unwrap_or_default()]
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::{Crew, Work};
+    use crate::model::{Integrator, LastLayer};
+    use crate::train::fused::plan::{KEPT, Plan};
+    use crate::train::fused::scheme::Scheme;
+    use crate::train::tests::{hybrid, transitions};
+    use crate::train::{Backend, Batch};
+
+    #[test]
+    fn what_is_not_kept_is_worked_out_again_to_the_last_bit() {
+        let segments = transitions(1000, -0.5, 1);
+        let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Random);
+        let Batch::Blocks(blocks) = segments.all(&model.device()) else {
+            panic!("the processor's own backend takes blocks");
+        };
+        let numbers = model.tensors().map(|numbers| {
+            let data = numbers.unwrap().into_data();
+            data.iter().collect::<Vec<f32>>()
+        });
+        let derivative = |kept| {
+            let plan = Plan {
+                frame: model.frame().clone(),
+                blocks: blocks.clone(),
+                scheme: Scheme::of(Integrator::Rk4),
+                precision: [1.0; 2].into(),
+                kept,
+            };
+            let work = Work::new(
+                Arc::new(plan),
+                Arc::new(Crew::default()),
+                &numbers[0],
+                &numbers[1],
+            );
+            (work.loss, work.derivative([1.0, 0.3]))
+        };
+        assert_eq!(derivative(0), derivative(KEPT));
+    }
+}

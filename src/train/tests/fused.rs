@@ -239,3 +239,28 @@ fn the_same_run_twice_has_the_same_bits() {
         assert_eq!(run(), first);
     }
 }
+
+#[test]
+fn a_run_by_either_way_reaches_the_same_error() {
+    let segments = transitions(500, -0.5, 1);
+    let [fused, composed] = [Backend::Flex, Backend::NdArray].map(|backend| {
+        let model = hybrid((8.0, 2.0), &segments, backend, LastLayer::Zero);
+        let settings = FitSettings {
+            epochs: 300,
+            ..FitSettings::default()
+        };
+        let mut training = Training::new(model, settings, rng(3)).unwrap();
+        training
+            .run(&segments, None, &mut |_| ControlFlow::Continue(()))
+            .unwrap();
+        training.history().last().unwrap().clone()
+    });
+    // Rounding grows over 300 steps of Adam to some 1e-3.
+    assert!(
+        (fused.error / composed.error - 1.0).abs() < 0.02,
+        "{fused:?} {composed:?}"
+    );
+    for (a, b) in fused.parameters.iter().zip(&composed.parameters) {
+        assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+    }
+}
