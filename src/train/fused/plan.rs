@@ -8,7 +8,7 @@ use crate::model::Frame;
 
 /// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
 /// enough that all that is made of them stays near the processor.
-pub(super) const CHUNK: usize = 4;
+pub(super) const CHUNK: usize = 8;
 
 /// 1 GiB of records.
 pub(super) const KEPT: usize = (1 << 30) / size_of::<Rows>();
@@ -62,7 +62,7 @@ impl Plan {
     /// them do not.
     pub(super) fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         let count = self.blocks.count();
-        let parts = count.div_ceil(2 * CHUNK).min(8 + count / 64).min(64);
+        let parts = count.div_ceil(CHUNK).min(8 + count / 64).min(64);
         (0..parts).map(move |part| part * count / parts..(part + 1) * count / parts)
     }
 }
