@@ -242,16 +242,8 @@ impl HybridModel {
 
     /// Unpack the parameters, once for all evaluations that one gradient runs through.
     pub fn prepare(&self) -> Prepared<'_> {
-        let one_row = |numbers: &Param<Tensor<1>>| {
-            let numbers = numbers.val();
-            match numbers.dims() {
-                // Burn takes a length of 0 as that of the same dimension before.
-                [0] => Tensor::zeros([1, 0], &numbers.device()),
-                _ => numbers.unsqueeze(),
-            }
-        };
-        let residual = self.residual.as_ref().map(one_row);
-        Prepared::new(&self.frame, 1, one_row(&self.prior), residual)
+        let each = |tensor: Option<Tensor<1>>| tensor.and_then(|numbers| rows_of(numbers, 1));
+        Prepared::new(&self.frame, 1, self.tensors().map(each))
     }
 
     /// ds/dt and the part F_r of it that the residual makes, at a batch of points.
@@ -316,20 +308,20 @@ impl HybridModel {
 }
 
 impl<'m> Prepared<'m> {
-    /// Models of `frame` with the learnable numbers `[models, numbers]` of prior and residual. Each evaluates `rows` rows,
+    /// Models of `frame` with the learnable numbers `[models, numbers]` of prior and residual, where they have any. Each evaluates `rows` rows,
     /// one model's after the other's; a single model takes any number where `rows` is 1.
     pub(super) fn new(
         frame: &'m Frame,
         rows: usize,
-        prior: Tensor<2>,
-        residual: Option<Tensor<2>>,
+        [prior, residual]: [Option<Tensor<2>>; 2],
     ) -> Self {
         let network = |(made, numbers)| Mlp::new(made, &numbers);
+        let parameters = |prior| equations::columns(frame.parameters(), prior, rows);
         Self {
             frame,
-            prior: frame.prior().map(|made| Mlp::new(made, &prior)),
+            prior: frame.prior().zip(prior.clone()).map(network),
             residual: frame.residual().zip(residual).map(network),
-            parameters: equations::columns(frame.parameters(), prior, rows),
+            parameters: prior.map_or_else(Vec::new, parameters),
         }
     }
 
@@ -364,6 +356,12 @@ impl<'m> Prepared<'m> {
         }
         Flow { rates, residual }
     }
+}
+
+/// A vector as so many equal rows of a matrix; none of an empty vector, since Burn has no empty matrices.
+pub(super) fn rows_of(vector: Tensor<1>, rows: usize) -> Option<Tensor<2>> {
+    let width = vector.dims()[0];
+    (width > 0).then(|| vector.expand([rows, width]))
 }
 
 fn learnable(id: u64, tensor: Tensor<1>) -> Param<Tensor<1>> {

@@ -4,7 +4,7 @@ use burn::tensor::{Bool, Device, Tensor, TensorData};
 
 use super::equations;
 use super::frame::Frame;
-use super::hybrid::Prepared;
+use super::hybrid::{Prepared, rows_of};
 use super::mlp::{to_f32, to_f64};
 use super::network::MlpWeights;
 use super::{HybridModel, Parameter};
@@ -14,7 +14,7 @@ use super::{HybridModel, Parameter};
 pub(crate) struct Stack {
     frame: Arc<Frame>,
     models: usize,
-    /// The learnable numbers of the prior and of the residual, `[models, numbers]` each.
+    /// The learnable numbers of the prior and of the residual, `[models, numbers]` each; none where there are no numbers.
     tensors: [Option<Tensor<2>>; 2],
     /// The lowest and the highest value / scale of each physical parameter, `[1, parameters]`; none without bounds.
     bounds: Option<[Tensor<2>; 2]>,
@@ -41,7 +41,7 @@ impl Stack {
         let [prior, _] = model.tensors();
         let detached = |prior: Tensor<1>| Tensor::from_inner(prior.inner());
         let tensors = if frame.has_residual {
-            let prior = prior.map(|prior| detached(prior).unsqueeze().repeat_dim(0, models));
+            let prior = prior.and_then(|prior| rows_of(detached(prior), models));
             [prior, Some(drawn)]
         } else {
             [Some(drawn), None]
@@ -65,8 +65,8 @@ impl Stack {
     }
 
     pub(crate) fn device(&self) -> Device {
-        let [prior, _] = &self.tensors;
-        prior.as_ref().expect("every model has a prior").device()
+        let mut tensors = self.tensors.iter().flatten();
+        tensors.next().expect("a network has numbers").device()
     }
 
     /// The learnable numbers of the prior and of the residual, `[models, numbers]` each.
@@ -76,9 +76,7 @@ impl Stack {
 
     /// Unpack the parameters for evaluations at so many rows for each model, one model's after the other's.
     pub(crate) fn prepare(&self, rows: usize) -> Prepared<'_> {
-        let [prior, residual] = self.tensors();
-        let prior = prior.expect("every model has a prior");
-        Prepared::new(&self.frame, rows, prior, residual)
+        Prepared::new(&self.frame, rows, self.tensors())
     }
 
     /// The models that are `alive` (`[models]`) with other learnable numbers, physical parameters brought back within
@@ -117,7 +115,7 @@ impl Stack {
             return vec![Vec::new(); self.models];
         }
         let [prior, _] = self.tensors();
-        let scaled = to_f64(prior.expect("every model has a prior"));
+        let scaled = to_f64(prior.expect("declared parameters have values"));
         (scaled.chunks(declared.len()))
             .map(|scaled| equations::values(declared, scaled).collect())
             .collect()

@@ -212,3 +212,20 @@ fn segments_of_other_joints_are_refused() {
     let message = sweep.run(&segments(2, 5, 1), &mut |_| ()).unwrap_err();
     assert!(message.to_string().contains("2 joints"), "{message}");
 }
+
+#[test]
+fn equations_without_parameters_can_have_a_residual() {
+    let segments = segments(1, 20, 1);
+    let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
+    for backend in BACKENDS {
+        let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
+        let model = HybridModel::physics(&dynamics, &backend.device())
+            .and_then(|model| model.with_residual(&residual))
+            .unwrap();
+        let starts = starts(&model, LastLayer::Zero);
+        let together = sweep(&model, &settings(), &starts, &segments);
+        for (start, found) in starts.iter().zip(&together) {
+            assert_close(found, &alone(&model, &settings(), start, &segments));
+        }
+    }
+}
