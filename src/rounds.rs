@@ -3,10 +3,10 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::yield_now;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// So long a helper without a task stays awake; then it looks again each time after a nap.
-const AWAKE: Duration = Duration::from_millis(1);
+/// So many times a helper without a task looks for one and lets others run, about a millisecond; then it naps each time.
+const AWAKE: usize = 4096;
 const NAP: Duration = Duration::from_micros(100);
 
 /// The tasks of the present round. One leads, others may help; the one who leads never waits for help that has not
@@ -64,12 +64,13 @@ impl Rounds {
     }
 
     fn help(&self, work: &impl Fn(usize)) {
-        let mut idle_since = Instant::now();
+        let mut looked = 0;
         while !self.over.load(Ordering::Acquire) {
             if let Some(task) = self.take() {
                 self.carry_out(task, work);
-                idle_since = Instant::now();
-            } else if idle_since.elapsed() < AWAKE {
+                looked = 0;
+            } else if looked < AWAKE {
+                looked += 1;
                 yield_now();
             } else {
                 std::thread::sleep(NAP);
