@@ -13,7 +13,7 @@ use crate::train::{SweepProgress, Trained};
 
 /// Train many models by one recipe at once, from other initial networks or with other weights of the penalty
 ///
-/// All models see the data of --seed. A graphics card (--device cuda) trains hundreds about as fast as one.
+/// All models see the data of --seed. They are one batch, so that a graphics card (--device cuda) has enough to do.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         residyn sweep --config configs/train-pendulum.toml --seeds 100\n  \
