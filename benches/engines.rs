@@ -16,7 +16,7 @@ use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn::model::{
     Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
 };
-use residyn::plan::{CrossEntropy, Objective, Settings, Start};
+use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::train::{Backend, FitSettings, Segments, Training};
 
@@ -149,13 +149,13 @@ fn plan(c: &mut Criterion) {
         let rollouts = task.rollouts();
         let settings = Settings {
             population: 300,
-            elite: 20,
             iterations: 10,
             horizon: task.horizon,
+            method: Method::Cem(Cem { elite: 20 }),
         };
         let bounds = vec![[-3.0, 3.0]; rollouts.joints()];
         let rng = ChaCha8Rng::seed_from_u64(4);
-        let planner = CrossEntropy::new(settings, &bounds, || rollouts.block(), &rng);
+        let planner = Planner::new(&settings, &bounds, || rollouts.block(), &rng);
         let start = Start::new(task.start, 0.0);
         c.benchmark_group("plan")
             .measurement_time(Duration::from_secs(2))
@@ -179,7 +179,7 @@ fn rollout(c: &mut Criterion) {
         let inputs = vec![Rows::splat(0.1); task.horizon * rollouts.joints()];
         let mut returns = Rows::splat(0.0);
         c.bench_function(&format!("rollout/{}", task.name), |b| {
-            b.iter(|| block.returns(&start, 0.0, black_box(&inputs), &mut returns));
+            b.iter(|| block.returns(&start, 0.0, &[], black_box(&inputs), &mut returns));
         });
     }
 }

@@ -16,7 +16,7 @@ use residyn::model::{
     Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
     System,
 };
-use residyn::plan::{CrossEntropy, Objective, Settings, Start};
+use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::train::{Backend, FitSettings, Progress, Segments, Training};
 
@@ -121,13 +121,13 @@ impl Work {
         );
         let settings = Settings {
             population: self.population,
-            elite: 20,
             iterations: 10,
             horizon: self.horizon,
+            method: Method::Cem(Cem { elite: 20 }),
         };
         let bounds = vec![[-3.0, 3.0]; self.joints];
         let rng = ChaCha8Rng::seed_from_u64(4);
-        let planner = CrossEntropy::new(settings, &bounds, || rollouts.block(), &rng);
+        let planner = Planner::new(&settings, &bounds, || rollouts.block(), &rng);
         let start = Start::new(&vec![0.1; 2 * self.joints], 0.0);
         planner.helped(|| {
             best(|| {

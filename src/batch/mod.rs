@@ -1,6 +1,7 @@
 //! Many rows side by side in f32, as wide as the processor's vectors: networks and their derivatives, and rollouts of a
 //! whole model.
 
+mod memory;
 mod network;
 mod network_gradient;
 mod product;
@@ -10,6 +11,7 @@ mod rollout;
 mod tests;
 
 pub use network::Network;
+pub(crate) use product::{Finish, Product};
 pub use rollout::{Block, Rollouts};
 
 use crate::lanes::Row;

@@ -5,7 +5,7 @@ use crate::lanes::{Element, Vector};
 
 /// What becomes of a sum before it is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Finish {
+pub(crate) enum Finish {
     /// Nothing.
     Plain,
     /// Negative ones become zero.
@@ -16,7 +16,7 @@ pub(super) enum Finish {
 
 /// A matrix times a vector of [`Rows`].
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Product<'a> {
+pub(crate) struct Product<'a> {
     /// `[from][to]`
     pub weight: &'a [f32],
     /// `[to]`, or empty for none.
@@ -26,7 +26,7 @@ pub(super) struct Product<'a> {
 
 impl Product<'_> {
     #[inline(always)]
-    pub(super) fn run<S: Simd>(self, simd: S, from: &[Rows], to: &mut [Rows]) {
+    pub(crate) fn run<S: Simd>(self, simd: S, from: &[Rows], to: &mut [Rows]) {
         let mut first = 0;
         // Sums stay in registers: eight outputs of two registers each where there are 32.
         if S::REGISTER_COUNT >= 32 {

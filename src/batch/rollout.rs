@@ -1,3 +1,4 @@
+use super::memory::Memory;
 use super::{Network, Rows, W};
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
@@ -13,6 +14,8 @@ pub struct Rollouts {
     program: Program,
     parameters: Vec<f32>,
     networks: Vec<Added>,
+    /// Where torques are filtered.
+    memory: Option<Memory>,
     stages: &'static [Stage],
     semi_implicit: bool,
     substeps: usize,
@@ -68,15 +71,18 @@ pub struct Block<'r> {
     rates: Vec<Rows>,
     /// Of each network: features, then activations.
     values: Vec<[Vec<Rows>; 2]>,
+    /// The torques that act, `[step * n + joint]`, where they are not those commanded.
+    acting: Vec<Rows>,
 }
 
 impl Rollouts {
     /// `equations` with the outputs of `networks` added to their derivative, in steps of `step_s` seconds, under an
     /// objective whose one output is the reward of the state and torque that a step leads to. Its inputs are `q`,
-    /// `qd`, `tau` of every joint and `t`.
+    /// `qd`, `tau` of every joint and `t`; it sees the torque commanded. Where the equations filter their torques, the
+    /// mean of what they make of it acts over each step.
     ///
     /// # Panics
-    /// When the equations filter their torques or a network or the objective does not belong to their joints.
+    /// When a network or the objective does not belong to their joints.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
     pub fn new(
         equations: &Dynamics,
@@ -85,10 +91,6 @@ impl Rollouts {
         integrator: Integrator,
         step_s: f64,
     ) -> Self {
-        assert!(
-            equations.filters.is_empty(),
-            "a state has no memory of torques"
-        );
         for network in networks {
             network
                 .check(equations.joints)
@@ -104,6 +106,7 @@ impl Rollouts {
             program: whole(equations, networks, objective),
             parameters: equations.values().iter().map(|x| *x as f32).collect(),
             networks: added(equations.joints, networks),
+            memory: Memory::new(equations, step_s),
             stages,
             semi_implicit: integrator == Integrator::SemiImplicitEuler,
             substeps,
@@ -114,6 +117,18 @@ impl Rollouts {
     /// Number of joints n.
     pub fn joints(&self) -> usize {
         self.joints
+    }
+
+    /// How many steps before a plan matter to it: none without filters.
+    pub fn memory(&self) -> usize {
+        self.memory.as_ref().map_or(0, Memory::steps)
+    }
+
+    /// What of the acting torque in a plan of so many steps comes from the torques `past` (`[step][joint]`, oldest
+    /// first, which was held for ever before): `[step * n + joint]`, as far as they reach. Empty without filters.
+    pub fn carried(&self, past: &[Vec<f64>], steps: usize) -> Vec<f32> {
+        let memory = self.memory.as_ref();
+        memory.map_or_else(Vec::new, |memory| memory.carried(past, steps))
     }
 
     /// Working memory for one block.
@@ -137,6 +152,7 @@ impl Rollouts {
             next: states(),
             rates: states(),
             values: self.networks.iter().map(values).collect(),
+            acting: Vec::new(),
         }
     }
 }
@@ -180,25 +196,48 @@ fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> 
 }
 
 impl Block<'_> {
+    /// What this block rolls out.
+    pub fn rollouts(&self) -> &Rollouts {
+        self.rollouts
+    }
+
     /// The sum of rewards of each rollout from `start` (positions, then velocities) at `time_s` under `inputs`
-    /// (`[step * n + joint]`), each held for a step. Not a number or infinite where a rollout diverges.
+    /// (`[step * n + joint]`), each held for a step, after torques of which so much is [carried](Rollouts::carried)
+    /// over. Not a number or infinite where a rollout diverges.
     ///
     /// # Panics
     /// When `start` or `inputs` is not of the model's size.
-    pub fn returns(&mut self, start: &[f32], time_s: f32, inputs: &[Rows], returns: &mut Rows) {
+    pub fn returns(
+        &mut self,
+        start: &[f32],
+        time_s: f32,
+        carried: &[f32],
+        inputs: &[Rows],
+        returns: &mut Rows,
+    ) {
         let n = self.rollouts.joints;
         assert_eq!(start.len(), 2 * n, "one value for each state");
         assert!(
             !inputs.is_empty() && inputs.len().is_multiple_of(n),
             "whole steps"
         );
+        let mut filtered = std::mem::take(&mut self.acting);
+        let acting = match &self.rollouts.memory {
+            None => inputs,
+            Some(memory) => {
+                memory.act(self.arch, carried, inputs, &mut filtered);
+                &filtered
+            }
+        };
         self.arch.dispatch(Run {
             block: self,
             start,
             time_s,
             inputs,
+            acting,
             returns,
         });
+        self.acting = filtered;
     }
 }
 
@@ -207,6 +246,7 @@ struct Run<'a, 'r> {
     start: &'a [f32],
     time_s: f32,
     inputs: &'a [Rows],
+    acting: &'a [Rows],
     returns: &'a mut Rows,
 }
 
@@ -221,6 +261,7 @@ impl WithSimd for Run<'_, '_> {
             start,
             time_s,
             inputs,
+            acting,
             returns,
         } = self;
         let Rollouts {
@@ -236,7 +277,7 @@ impl WithSimd for Run<'_, '_> {
         }
         *returns = Rows::splat(0.0);
         for step in 0..=steps {
-            block.hold(inputs, step);
+            block.hold(inputs, acting, step);
             for substep in 0..substeps {
                 let begin_s = time_s + (step * substeps + substep) as f32 * h;
                 block.begin();
@@ -259,12 +300,12 @@ impl WithSimd for Run<'_, '_> {
 }
 
 impl Block<'_> {
-    /// Hold the input of `step`; the reward sees that of the step before.
+    /// Hold the torque that acts over `step`; the reward sees the input of the step before.
     #[inline(always)]
-    fn hold(&mut self, inputs: &[Rows], step: usize) {
+    fn hold(&mut self, inputs: &[Rows], acting: &[Rows], step: usize) {
         let n = self.rollouts.joints;
         let slots = self.tape.moving();
-        if let Some(now) = inputs[step * n..].get(..n) {
+        if let Some(now) = acting[step * n..].get(..n) {
             slots[2 * n..3 * n].copy_from_slice(now);
         }
         if step > 0 {

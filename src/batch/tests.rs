@@ -48,7 +48,9 @@ fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -
         .collect();
     let start: Vec<f32> = (0..2 * n).map(|k| 0.4 - 0.3 * k as f32).collect();
     let mut returns = Rows::splat(f32::NAN);
-    rollouts.block().returns(&start, 1.5, &inputs, &mut returns);
+    rollouts
+        .block()
+        .returns(&start, 1.5, &[], &inputs, &mut returns);
 
     let whole = networks.iter().fold(equations.clone(), |sum, mlp| {
         with_residual(&sum, mlp).unwrap()
@@ -126,7 +128,7 @@ fn a_rollout_that_diverges_does_so_alone_and_says_so() {
     let mut returns = Rows::splat(0.0);
     rollouts
         .block()
-        .returns(&[0.1, 0.0], 0.0, &inputs, &mut returns);
+        .returns(&[0.1, 0.0], 0.0, &[], &inputs, &mut returns);
     for (lane, value) in returns.iter().enumerate() {
         assert_eq!(value.is_finite(), lane != 7, "{lane}: {value}");
     }
@@ -148,6 +150,6 @@ fn a_network_does_not_hide_what_is_not_a_number() {
     let start = [0.1, f32::NAN];
     rollouts
         .block()
-        .returns(&start, 0.0, &[Rows::splat(0.0); STEPS], &mut returns);
+        .returns(&start, 0.0, &[], &[Rows::splat(0.0); STEPS], &mut returns);
     assert!(returns.iter().all(|value| value.is_nan()), "{returns:?}");
 }

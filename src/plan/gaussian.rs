@@ -10,6 +10,7 @@ const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
 /// Standard normal numbers, by the method of Box and Muller (1958): each pair of rows from two rows of uniform
 /// numbers. With 24 bits none is beyond 5.8 standard deviations.
+#[derive(Debug, Clone)]
 pub struct Gaussian {
     bits: Vec<u32>,
 }

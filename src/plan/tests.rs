@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::gaussian::Gaussian;
-use super::{CrossEntropy, Evaluate, Objective, Settings, Start};
+use super::{Cem, Evaluate, Method, Objective, Planner, Settings, Start};
 use crate::batch::{Rollouts, Rows, W};
 use crate::expr::SignForm;
 use crate::lanes::Arch;
@@ -13,9 +13,9 @@ use crate::plant::Environment;
 
 const SETTINGS: Settings = Settings {
     population: 300,
-    elite: 20,
     iterations: 10,
     horizon: 6,
+    method: Method::Cem(Cem { elite: 20 }),
 };
 
 fn rng(seed: u64) -> ChaCha8Rng {
@@ -27,6 +27,11 @@ struct Near;
 
 impl Evaluate for Near {
     type Start = f32;
+    type Prepared = f32;
+
+    fn prepare(&self, goal: f32, _: usize) -> f32 {
+        goal
+    }
 
     fn returns(&mut self, goal: &f32, inputs: &[Rows], returns: &mut Rows) {
         for lane in 0..W {
@@ -42,7 +47,7 @@ impl Evaluate for Near {
 
 #[test]
 fn the_search_finds_the_best_sequence() {
-    let search = CrossEntropy::new(SETTINGS, &[[-3.0, 3.0]; 2], || Near, &rng(1));
+    let search = Planner::new(&SETTINGS, &[[-3.0, 3.0]; 2], || Near, &rng(1));
     let plan = search.plan(0.7);
     assert_eq!(plan.inputs.len(), SETTINGS.horizon);
     assert!(
@@ -54,7 +59,7 @@ fn the_search_finds_the_best_sequence() {
 
 #[test]
 fn inputs_keep_to_their_bounds() {
-    let search = CrossEntropy::new(SETTINGS, &[[-3.0, 3.0], [-0.5, 0.1]], || Near, &rng(2));
+    let search = Planner::new(&SETTINGS, &[[-3.0, 3.0], [-0.5, 0.1]], || Near, &rng(2));
     for step in search.plan(1.0).inputs {
         assert!(
             (step[0] - 1.0).abs() < 0.1 && (0.08..=0.1).contains(&step[1]),
@@ -66,10 +71,10 @@ fn inputs_keep_to_their_bounds() {
 #[test]
 fn candidates_that_diverge_are_the_worst() {
     // The best known sequences border on those that nobody knows.
-    let search = CrossEntropy::new(SETTINGS, &[[-3.0, 3.0]], || Near, &rng(3));
+    let search = Planner::new(&SETTINGS, &[[-3.0, 3.0]], || Near, &rng(3));
     let plan = search.plan(2.5);
     assert!(plan.inputs.iter().flatten().all(|x| *x < 2.0), "{plan:?}");
-    let search = CrossEntropy::new(SETTINGS, &[[2.5, 3.0]], || Near, &rng(3));
+    let search = Planner::new(&SETTINGS, &[[2.5, 3.0]], || Near, &rng(3));
     let lost = search.plan(2.5);
     assert_eq!(lost.best, f64::NEG_INFINITY);
     assert_eq!(lost.diverged, SETTINGS.population * SETTINGS.iterations);
@@ -83,7 +88,7 @@ fn what_is_left_of_a_plan_starts_the_next_search() {
         ..SETTINGS
     };
     let errors = |warm: bool| {
-        let search = CrossEntropy::new(settings, &[[-3.0, 3.0]], || Near, &rng(4));
+        let search = Planner::new(&settings, &[[-3.0, 3.0]], || Near, &rng(4));
         for _ in 0..8 {
             search.plan(-1.5);
         }
@@ -107,11 +112,11 @@ fn what_is_left_of_a_plan_starts_the_next_search() {
 
 #[test]
 fn a_plan_does_not_depend_on_the_number_of_cores() {
-    let search = || CrossEntropy::new(SETTINGS, &[[-3.0, 3.0]], || Near, &rng(5));
+    let search = || Planner::new(&SETTINGS, &[[-3.0, 3.0]], || Near, &rng(5));
     let alone = search().plan(0.3);
     let with_help = search();
     assert_eq!(with_help.helped(|| with_help.plan(0.3)), alone);
-    let other = CrossEntropy::new(SETTINGS, &[[-3.0, 3.0]], || Near, &rng(6));
+    let other = Planner::new(&SETTINGS, &[[-3.0, 3.0]], || Near, &rng(6));
     assert_ne!(other.plan(0.3), alone);
 }
 
@@ -162,7 +167,7 @@ fn swung_up(seed: u64) -> f64 {
         ..SETTINGS
     };
     let evaluate = || rollouts.block();
-    let search = CrossEntropy::new(settings, &[[-3.0, 3.0]], evaluate, &rng(seed));
+    let search = Planner::new(&settings, &[[-3.0, 3.0]], evaluate, &rng(seed));
     let values = equations.values();
     let mut rig = Environment::new(&equations, &values, integrator, 0.02);
     let (mut state, mut sum) = ([std::f64::consts::PI, 0.0], 0.0);

@@ -1,0 +1,25 @@
+use serde::{Deserialize, Serialize};
+
+use super::method::Search;
+use super::population::Population;
+use super::proposal::Proposal;
+use super::settings::check_elite;
+
+/// The cross-entropy method (Rubinstein 1999): draw sequences from normal distributions, take mean and standard
+/// deviation of the elite, and again. The mean is the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cem {
+    /// The best candidates, from which the next distributions are taken.
+    pub elite: usize,
+}
+
+impl Search for Cem {
+    fn check(&self, population: usize) -> Result<(), String> {
+        check_elite(self.elite, population)
+    }
+
+    fn learn(&self, population: &Population<'_>, proposal: &mut Proposal) {
+        proposal.fit(population, &population.elite(self.elite), 0.0);
+    }
+}

@@ -1,0 +1,82 @@
+use serde::{Deserialize, Serialize};
+
+use super::method::Search;
+use super::noise::Noise;
+use super::population::Population;
+use super::proposal::Proposal;
+use super::settings::{check_elite, within};
+
+/// The improved cross-entropy method (Pinneri et al. 2020, arXiv 2008.06389): candidates scatter with coloured noise, so
+/// that they move the rig and do not shake it; the best of them stay candidates, in a search and from one to the
+/// next; distributions follow the elite with momentum. The best candidate is the plan.
+///
+/// The published method also lets the population shrink from one iteration to the next, and this one does not: a search
+/// costs what its settings say.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Icem {
+    /// The best candidates, from which the next distributions are taken.
+    pub elite: usize,
+    /// beta: the power of the noise falls with the frequency f as f^-beta. 0 is white noise; published are 0.25 to
+    /// 3.5, the higher the slower the motion that is wanted.
+    #[serde(default = "noise_exponent")]
+    pub noise_exponent: f64,
+    /// The share of the elite that stays, at least the best.
+    #[serde(default = "keep")]
+    pub keep: f64,
+    /// alpha: the share of the old mean and standard deviation in the new.
+    #[serde(default = "momentum")]
+    pub momentum: f64,
+}
+
+fn noise_exponent() -> f64 {
+    2.0
+}
+
+fn keep() -> f64 {
+    0.3
+}
+
+fn momentum() -> f64 {
+    0.1
+}
+
+impl Icem {
+    /// With so many elite, and the published numbers beside.
+    pub fn new(elite: usize) -> Self {
+        Self {
+            elite,
+            noise_exponent: noise_exponent(),
+            keep: keep(),
+            momentum: momentum(),
+        }
+    }
+}
+
+impl Search for Icem {
+    fn check(&self, population: usize) -> Result<(), String> {
+        check_elite(self.elite, population)?;
+        let exponent = self.noise_exponent;
+        within("noise_exponent", exponent, 0.0..=10.0, "from 0 to 10")?;
+        within("keep", self.keep, 0.0..=1.0, "from 0 to 1")?;
+        within(
+            "momentum",
+            self.momentum,
+            0.0..1.0,
+            "at least 0 and below 1",
+        )
+    }
+
+    fn noise(&self, steps: usize, inputs: usize) -> Noise {
+        Noise::coloured(steps, inputs, self.noise_exponent)
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a share of a small count
+    fn learn(&self, population: &Population<'_>, proposal: &mut Proposal) {
+        let elite = population.elite(self.elite);
+        proposal.fit(population, &elite, self.momentum as f32);
+        let kept = (self.keep * self.elite as f64).round().max(1.0) as usize;
+        let kept = elite.iter().take(kept);
+        proposal.keep(kept.map(|(_, index)| population.sequence(*index)).collect());
+    }
+}

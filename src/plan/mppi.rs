@@ -1,0 +1,55 @@
+use serde::{Deserialize, Serialize};
+
+use super::method::Search;
+use super::population::Population;
+use super::proposal::Proposal;
+use super::settings::within;
+
+/// Model-predictive path-integral control (Williams et al. 2017): the next mean is that of all candidates, each with
+/// the weight exp((return - best) / scale). The standard deviation stays. The mean is the plan.
+///
+/// A temperature in units of return would have to be found anew for every objective, rig and horizon. Here it is a
+/// share of the spread of the population's returns, of what lies between the best and the median: an objective
+/// times a factor or plus a constant leads to the same plans, and a few candidates that fail badly, as they would rule a
+/// standard deviation, change nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Mppi {
+    /// By this share of the spread of returns a candidate is worse whose weight is 1/e of the best one's.
+    pub temperature: f64,
+    /// Standard deviation of the candidates, as a share of half an input's range.
+    pub deviation: f64,
+}
+
+impl Default for Mppi {
+    fn default() -> Self {
+        Self {
+            temperature: 0.05,
+            deviation: 0.5,
+        }
+    }
+}
+
+impl Search for Mppi {
+    fn check(&self, _: usize) -> Result<(), String> {
+        let above_zero = "above 0 and at most 10";
+        for (key, value) in [
+            ("temperature", self.temperature),
+            ("deviation", self.deviation),
+        ] {
+            within(key, value, f64::MIN_POSITIVE..=10.0, above_zero)?;
+        }
+        Ok(())
+    }
+
+    fn deviation(&self) -> f64 {
+        self.deviation
+    }
+
+    fn learn(&self, population: &Population<'_>, proposal: &mut Proposal) {
+        let (best, median) = (population.best(), population.median());
+        // All alike where there is no spread: then zero over anything is zero.
+        let scale = (self.temperature as f32 * (best - median)).max(f32::MIN_POSITIVE);
+        proposal.average(population, |value| ((value - best) / scale).exp());
+    }
+}

@@ -1,0 +1,192 @@
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+
+use rand_chacha::ChaCha8Rng;
+
+use super::Settings;
+use super::noise::Noise;
+use super::population::Population;
+use super::proposal::Proposal;
+use crate::batch::{Rows, W};
+use crate::lanes::Arch;
+use crate::rounds::Rounds;
+
+/// Who knows what sequences of inputs bring. One of them serves one block of candidates.
+pub trait Evaluate: Send {
+    /// Where a plan starts.
+    type Start;
+    /// The same with what all candidates need of it.
+    type Prepared: Send + Sync;
+
+    /// What a plan of so many steps from `start` begins with.
+    fn prepare(&self, start: Self::Start, steps: usize) -> Self::Prepared;
+
+    /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); not a number or
+    /// infinite where it cannot be told.
+    fn returns(&mut self, start: &Self::Prepared, inputs: &[Rows], returns: &mut Rows);
+}
+
+/// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings: draw sequences,
+/// evaluate them, draw others where they were good. What is left of a plan after some steps starts the next search.
+///
+/// One who plans again and again does so within [`Planner::helped`].
+///
+/// Candidates outside of the bounds are drawn back to them before they are evaluated. The result is the same on any
+/// number of processor cores: each block of candidates has a random stream of its own.
+pub struct Planner<E: Evaluate> {
+    settings: Settings,
+    // Locks, since those who help share all of it with the one who leads. Nobody waits at them.
+    start: RwLock<Option<E::Prepared>>,
+    proposal: RwLock<Proposal>,
+    blocks: Vec<Mutex<Candidates<E>>>,
+    rounds: Rounds,
+}
+
+/// One block of candidates.
+struct Candidates<E> {
+    evaluate: E,
+    rng: ChaCha8Rng,
+    noise: Noise,
+    arch: Arch,
+    /// `[step * n + input]`
+    inputs: Vec<Rows>,
+    returns: Rows,
+}
+
+/// What a search found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// `[step][input]`
+    pub inputs: Vec<Vec<f64>>,
+    /// The best return of a candidate in the last iteration; minus infinity where all of them diverged.
+    pub best: f64,
+    /// Candidates of all iterations whose return was not finite: they count as the worst.
+    pub diverged: usize,
+}
+
+impl<E: Evaluate> Planner<E> {
+    /// A search for inputs within `bounds`; `evaluate` makes one evaluator for each block of candidates.
+    ///
+    /// # Panics
+    /// When [`Settings::check`] refuses the settings, or there are no bounds or an empty range.
+    pub fn new(
+        settings: &Settings,
+        bounds: &[[f64; 2]],
+        evaluate: impl Fn() -> E,
+        rng: &ChaCha8Rng,
+    ) -> Self {
+        settings.check().expect("settings that have been checked");
+        assert!(!bounds.is_empty(), "something to search");
+        assert!(
+            bounds.iter().all(|[low, high]| low < high),
+            "ranges that are not empty"
+        );
+        let Settings {
+            population,
+            horizon,
+            method,
+            ..
+        } = *settings;
+        let noise = method.search().noise(horizon, bounds.len());
+        let block = |index: usize| {
+            let mut rng = rng.clone();
+            rng.set_stream(index as u64);
+            Candidates {
+                evaluate: evaluate(),
+                rng,
+                noise: noise.clone(),
+                arch: Arch::new(),
+                inputs: vec![Rows::splat(0.0); horizon * bounds.len()],
+                returns: Rows::splat(0.0),
+            }
+        };
+        Self {
+            settings: *settings,
+            start: RwLock::new(None),
+            proposal: RwLock::new(Proposal::new(bounds, horizon)),
+            blocks: (0..population.div_ceil(W))
+                .map(|index| Mutex::new(block(index)))
+                .collect(),
+            rounds: Rounds::new(),
+        }
+    }
+
+    /// Call `lead`, while all cores stay ready for the searches in it. Outside of it a search runs on one core.
+    pub fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
+        self.rounds
+            .helped(&|index| self.draw_and_evaluate(index), lead)
+    }
+
+    /// Begin again in the middle of the bounds.
+    pub fn forget(&self) {
+        write(&self.proposal).forget();
+    }
+
+    /// The first `steps` of the plan have been carried out: the next search starts from the rest, and from the
+    /// middle of the bounds behind it.
+    pub fn shift(&self, steps: usize) {
+        write(&self.proposal).shift(steps);
+    }
+
+    /// Search for the best inputs from `start`.
+    pub fn plan(&self, start: E::Start) -> Plan {
+        let Settings {
+            population,
+            iterations,
+            horizon,
+            method,
+        } = self.settings;
+        let start = lock(&self.blocks[0]).evaluate.prepare(start, horizon);
+        *write(&self.start) = Some(start);
+        write(&self.proposal).begin(method.search().deviation());
+        let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);
+        for _ in 0..iterations {
+            let tasks = self.blocks.len();
+            self.rounds
+                .run(tasks, &|index| self.draw_and_evaluate(index));
+            let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
+            let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
+            let population = Population::new(evaluated, population);
+            write(&self.proposal).learn(&population, method.search());
+            best = population.best();
+            diverged += population.diverged();
+        }
+        Plan {
+            inputs: read(&self.proposal).plan(),
+            best: f64::from(best),
+            diverged,
+        }
+    }
+
+    fn draw_and_evaluate(&self, index: usize) {
+        let mut block = lock(&self.blocks[index]);
+        block.draw(&read(&self.proposal), index);
+        block.evaluate(read(&self.start).as_ref().expect("a search has a start"));
+    }
+}
+
+impl<E: Evaluate> Candidates<E> {
+    /// Draw the candidates of the block with this index.
+    fn draw(&mut self, from: &Proposal, index: usize) {
+        self.noise.fill(self.arch, &mut self.rng, &mut self.inputs);
+        from.place(self.arch, index, &mut self.inputs);
+    }
+
+    fn evaluate(&mut self, start: &E::Prepared) {
+        self.evaluate
+            .returns(start, &self.inputs, &mut self.returns);
+    }
+}
+
+// A lock is poisoned only where a thread panicked, which ends the search.
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn read<T>(lock: &RwLock<T>) -> RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn write<T>(lock: &RwLock<T>) -> RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
+}

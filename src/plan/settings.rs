@@ -1,0 +1,92 @@
+use std::fmt::Display;
+use std::ops::RangeBounds;
+
+use serde::{Deserialize, Serialize};
+
+use super::method::Search;
+use super::{Cem, Icem, Mppi};
+
+/// How a planner searches. In a file all of it is one table:
+///
+/// ```toml
+/// method = "cem"
+/// population = 300
+/// elite = 20
+/// iterations = 10
+/// horizon = 80
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Candidates evaluated in each iteration.
+    pub population: usize,
+    pub iterations: usize,
+    /// Steps of a plan.
+    pub horizon: usize,
+    #[serde(flatten)]
+    pub method: Method,
+}
+
+/// How the next candidates come from the last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "method", rename_all = "snake_case")]
+pub enum Method {
+    Cem(Cem),
+    Icem(Icem),
+    Mppi(Mppi),
+}
+
+// Limits that keep the memory of a search below a few GB.
+const MOST_CANDIDATES: usize = 100_000;
+const MOST_STEPS: usize = 2_000;
+const MOST_ITERATIONS: usize = 10_000;
+
+impl Settings {
+    /// Refuse what no search can run with.
+    ///
+    /// # Errors
+    /// One sentence that names the key, its value and what it may be.
+    pub fn check(&self) -> Result<(), String> {
+        whole("population", self.population, MOST_CANDIDATES)?;
+        whole("iterations", self.iterations, MOST_ITERATIONS)?;
+        whole("horizon", self.horizon, MOST_STEPS)?;
+        self.method.search().check(self.population)
+    }
+}
+
+impl Method {
+    pub(super) fn search(&self) -> &dyn Search {
+        match self {
+            Self::Cem(cem) => cem,
+            Self::Icem(icem) => icem,
+            Self::Mppi(mppi) => mppi,
+        }
+    }
+}
+
+/// Refuse an elite that is none of the population.
+pub(super) fn check_elite(elite: usize, population: usize) -> Result<(), String> {
+    let remedy = format!("a whole number from 1 to {population}, the population");
+    within("elite", elite, 1..=population, &remedy)
+}
+
+fn whole(key: &str, value: usize, most: usize) -> Result<(), String> {
+    within(
+        key,
+        value,
+        1..=most,
+        &format!("a whole number from 1 to {most}"),
+    )
+}
+
+/// Refuse the value of `key` outside of `range`, which `remedy` puts into words.
+pub(super) fn within<T: PartialOrd + Display>(
+    key: &str,
+    value: T,
+    range: impl RangeBounds<T>,
+    remedy: &str,
+) -> Result<(), String> {
+    if range.contains(&value) {
+        return Ok(());
+    }
+    Err(format!("`{key}` is {value}; it must be {remedy}"))
+}
