@@ -7,8 +7,8 @@ use super::{Rollouts, Rows, W};
 use crate::expr::SignForm;
 use crate::lanes::Row;
 use crate::model::{
-    Angles, Dynamics, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
-    ResidualOn, with_residual,
+    Angles, Commands, Dynamics, FittedEffect, InputScaling, Integrator, LastLayer, Library,
+    MlpSettings, MlpWeights, ResidualOn, Rollout, StepTorque, with_residual,
 };
 use crate::plan::Objective;
 use crate::plant::Environment;
@@ -152,4 +152,137 @@ fn a_network_does_not_hide_what_is_not_a_number() {
         .block()
         .returns(&start, 0.0, &[], &[Rows::splat(0.0); STEPS], &mut returns);
     assert!(returns.iter().all(|value| value.is_nan()), "{returns:?}");
+}
+
+/// A system with these filters: effect, joint from 0, parameter in s.
+fn filtered(name: &str, filters: &[(&str, usize, f64)]) -> Dynamics {
+    let library = Library::built_in();
+    let system = library.system(Path::new(name)).unwrap();
+    let effects: Vec<_> = filters
+        .iter()
+        .map(|(name, joint, value)| {
+            let mut effect = FittedEffect::absent(library.effect(name).unwrap(), *joint);
+            effect.values[0].0 = *value;
+            effect
+        })
+        .collect();
+    system.dynamics_with(&effects, &vec![SignForm::DEFAULT; system.joints])
+}
+
+fn filtered_rollouts(equations: &Dynamics, objective: &Objective) -> Rollouts {
+    Rollouts::new(equations, &[], objective.program(), Integrator::Rk4, STEP_S)
+}
+
+#[test]
+fn torques_are_filtered_as_everywhere_else() {
+    let cases: [(&str, &[(&str, usize, f64)]); 4] = [
+        ("pendulum", &[("actuator_delay", 0, 1.5 * STEP_S)]),
+        ("pendulum", &[("actuator_lag", 0, 0.05)]),
+        ("acrobot", &[("actuator_lag", 1, 0.03)]),
+        (
+            "acrobot",
+            &[
+                ("actuator_delay", 0, 0.013),
+                ("actuator_lag", 0, 0.02),
+                ("actuator_delay", 1, 0.07),
+            ],
+        ),
+    ];
+    for (name, filters) in cases {
+        let model = filtered(name, filters);
+        let n = model.joints;
+        let objective = Objective::new("cos(q1) - 0.1 * tau1^2", n).unwrap();
+        let rollouts = filtered_rollouts(&model, &objective);
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut draw = |steps: usize| -> Vec<Vec<f64>> {
+            let mut step = || (0..n).map(|_| rng.random_range(-3.0..3.0)).collect();
+            (0..steps).map(|_| step()).collect()
+        };
+        let inputs = draw(STEPS);
+        for past in [vec![], draw(1), draw(4), draw(200)] {
+            let start: Vec<f64> = (0..2 * n).map(|k| 0.4 - 0.3 * k as f64).collect();
+            let mut found = Rows::splat(f32::NAN);
+            let rows: Vec<_> = inputs
+                .iter()
+                .flatten()
+                .map(|x| Rows::splat(*x as f32))
+                .collect();
+            let begin: Vec<f32> = start.iter().map(|x| *x as f32).collect();
+            let carried = rollouts.carried(&past, STEPS);
+            rollouts
+                .block()
+                .returns(&begin, 0.0, &carried, &rows, &mut found);
+            let wanted = filtered_return(&model, &objective, &start, &past, &inputs);
+            for found in found.iter() {
+                let off = (f64::from(*found) - wanted).abs();
+                assert!(
+                    off < 2e-4,
+                    "{found} or {wanted}: {filters:?} after {}",
+                    past.len()
+                );
+            }
+        }
+    }
+}
+
+/// The return of one sequence in f64, under the torques that [`Commands`] let act.
+fn filtered_return(
+    model: &Dynamics,
+    objective: &Objective,
+    start: &[f64],
+    past: &[Vec<f64>],
+    inputs: &[Vec<f64>],
+) -> f64 {
+    let at_rest = vec![0.0; model.joints];
+    let past = if past.is_empty() { &[at_rest] } else { past };
+    let rows = [past, inputs].concat();
+    let time: Vec<f64> = (0..=rows.len())
+        .map(|row| STEP_S * (row as f64 - past.len() as f64))
+        .collect();
+    let tau: Vec<Vec<f64>> = (0..model.joints)
+        .map(|joint| rows.iter().map(|tau| tau[joint]).collect())
+        .collect();
+    let values = model.values();
+    let commands = Commands::new(model, &values, &time[..rows.len()], &tau);
+    let mut rollout = Rollout::<f64, 1>::new(model, &values);
+    let mut state: Vec<_> = start.iter().map(|x| Row([*x])).collect();
+    let mut sum = 0.0;
+    for row in past.len()..rows.len() {
+        let held: Vec<_> = rows[row].iter().map(|x| Row([*x])).collect();
+        let (from, to) = (Row([time[row]]), Row([time[row + 1]]));
+        let acting = StepTorque::new([&commands], &held, from, to, 1).mean;
+        rollout.advance(&mut state, &acting, from, Row([STEP_S]), 1);
+        let seen = [state.as_slice(), &held, &[to]].concat();
+        let seen: Vec<f64> = seen.iter().map(|row| row[0]).collect();
+        sum += objective.program().eval(&seen)[0];
+    }
+    sum
+}
+
+#[test]
+fn what_lies_beyond_the_memory_does_not_matter() {
+    let objective = Objective::new("cos(q1)", 1).unwrap();
+    let memory = |filters: &[(&str, usize, f64)]| {
+        filtered_rollouts(&filtered("pendulum", filters), &objective).memory()
+    };
+    assert_eq!(memory(&[]), 0);
+    assert_eq!(memory(&[("actuator_delay", 0, 0.0)]), 0);
+    assert_eq!(memory(&[("actuator_delay", 0, 1.5 * STEP_S)]), 2);
+    let lag = filtered("pendulum", &[("actuator_lag", 0, 0.05)]);
+    let rollouts = filtered_rollouts(&lag, &objective);
+    let past: Vec<_> = (0..100).map(|k| vec![f64::from(k).sin()]).collect();
+    let recent = &past[past.len() - rollouts.memory()..];
+    assert_eq!(
+        rollouts.carried(&past, STEPS),
+        rollouts.carried(recent, STEPS)
+    );
+    let forgotten = &recent[1..];
+    assert_ne!(
+        rollouts.carried(&past, STEPS),
+        rollouts.carried(forgotten, STEPS)
+    );
+    // However slow, a filter lets all of a constant torque act.
+    let slow = filtered("pendulum", &[("actuator_lag", 0, 1000.0)]);
+    let carried = filtered_rollouts(&slow, &objective).carried(&[vec![1.0]], 1);
+    assert!((carried[0] - 1.0).abs() < 1e-4, "{carried:?}");
 }
