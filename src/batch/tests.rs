@@ -154,8 +154,11 @@ fn a_network_does_not_hide_what_is_not_a_number() {
     assert!(returns.iter().all(|value| value.is_nan()), "{returns:?}");
 }
 
-/// A system with these filters: effect, joint from 0, parameter in s.
-fn filtered(name: &str, filters: &[(&str, usize, f64)]) -> Dynamics {
+/// Effect, joint from 0, parameter in s.
+type Filter = (&'static str, usize, f64);
+
+/// A system with these filters.
+fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
     let library = Library::built_in();
     let system = library.system(Path::new(name)).unwrap();
     let effects: Vec<_> = filters
@@ -175,7 +178,7 @@ fn filtered_rollouts(equations: &Dynamics, objective: &Objective) -> Rollouts {
 
 #[test]
 fn torques_are_filtered_as_everywhere_else() {
-    let cases: [(&str, &[(&str, usize, f64)]); 4] = [
+    let cases: [(&str, &[Filter]); 4] = [
         ("pendulum", &[("actuator_delay", 0, 1.5 * STEP_S)]),
         ("pendulum", &[("actuator_lag", 0, 0.05)]),
         ("acrobot", &[("actuator_lag", 1, 0.03)]),
@@ -262,9 +265,8 @@ fn filtered_return(
 #[test]
 fn what_lies_beyond_the_memory_does_not_matter() {
     let objective = Objective::new("cos(q1)", 1).unwrap();
-    let memory = |filters: &[(&str, usize, f64)]| {
-        filtered_rollouts(&filtered("pendulum", filters), &objective).memory()
-    };
+    let memory =
+        |filters: &[Filter]| filtered_rollouts(&filtered("pendulum", filters), &objective).memory();
     assert_eq!(memory(&[]), 0);
     assert_eq!(memory(&[("actuator_delay", 0, 0.0)]), 0);
     assert_eq!(memory(&[("actuator_delay", 0, 1.5 * STEP_S)]), 2);

@@ -19,7 +19,7 @@ mod tests;
 
 pub use cem::Cem;
 pub use icem::Icem;
-pub use model::Start;
+pub use model::{Prepared, Start};
 pub use mppi::Mppi;
 pub use objective::Objective;
 pub use planner::{Evaluate, Plan, Planner};

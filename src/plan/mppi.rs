@@ -15,7 +15,7 @@ use super::settings::within;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mppi {
-    /// By this share of the spread of returns a candidate is worse whose weight is 1/e of the best one's.
+    /// How much worse than the best a candidate is whose weight is 1/e of the best one's, as a share of the spread.
     pub temperature: f64,
     /// Standard deviation of the candidates, as a share of half an input's range.
     pub deviation: f64,
