@@ -1,8 +1,9 @@
 //! The report's figures, as SVG text.
 //!
-//! Three figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
-//! unexplained ([`residual_shape`]), and how far off it is ([`error_bars`]). They take plain numbers and return a
-//! complete SVG document; the caller writes it. A [`Role`] has the same colour and line in every figure.
+//! Four figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
+//! unexplained ([`residual_shape`]), how far off it is ([`error_bars`]), and what a planner gains with it as it
+//! learns ([`learning_curves`]). They take plain numbers and return a complete SVG document; the caller writes it.
+//! A [`Role`] or a [`Method`] has the same colour and line in every figure.
 //!
 //! The documents carry no identifiers and no style sheets, so that several can stand in one HTML page, and name
 //! only the generic font `sans-serif`.
@@ -11,17 +12,21 @@ mod axes;
 mod canvas;
 mod decimate;
 mod error_bars;
+mod learning;
 mod legend;
 mod predictions;
 mod residual_shape;
 mod scale;
 mod style;
 
+pub use axes::Quantity;
 pub use decimate::decimate;
 pub use error_bars::{Bar, ErrorRow, error_bars};
+pub use learning::{Course, LearningPanel, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
 pub use residual_shape::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
-pub use style::Role;
+pub use scale::Scale;
+pub use style::{Method, Role};
 
 /// A figure that cannot be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

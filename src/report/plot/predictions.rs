@@ -103,7 +103,7 @@ fn entries(panels: &[Panel]) -> Vec<Entry> {
     tracks.sort_by_key(|track| track.role);
     let mut entries: Vec<Entry> = Vec::new();
     for track in &tracks {
-        let entry = Entry::new(Sample::Line(track.role), &track.label);
+        let entry = Entry::new(Sample::Line(track.role.stroke()), &track.label);
         if !entries.contains(&entry) {
             entries.push(entry);
         }
