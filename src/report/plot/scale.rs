@@ -77,6 +77,15 @@ impl Range {
         }
     }
 
+    /// As wide as asked for, around the same middle.
+    pub fn around_middle(self, width: f64) -> Self {
+        let middle = f64::midpoint(self.lo, self.hi);
+        Self {
+            lo: middle - width / 2.0,
+            hi: middle + width / 2.0,
+        }
+    }
+
     /// A range that an axis can show: one without a width, or with one lost in rounding, is opened around its value.
     pub fn drawable(self) -> Self {
         let [lo, hi] = [self.lo, self.hi].map(|end| end.clamp(-FARTHEST, FARTHEST));

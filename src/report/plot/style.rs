@@ -102,6 +102,16 @@ impl Method {
     }
 }
 
+/// Things of one kind, such as joints, counted from 0.
+pub(super) fn numbered(k: usize) -> Stroke {
+    let colours = [BLUE, VERMILION, GREEN, OTHERS[0]];
+    Stroke {
+        colour: colours[k % colours.len()],
+        width: 1.6,
+        dash: "none",
+    }
+}
+
 pub(super) const WIDTH: f64 = 900.0;
 pub(super) const MARGIN: f64 = 18.0;
 pub(super) const TITLE_SIZE: f64 = 17.0;
