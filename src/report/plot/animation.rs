@@ -1,6 +1,6 @@
 //! An episode to watch.
 
-use svg::node::element::{Animate, AnimateTransform, Group, Path, SVG};
+use svg::node::element::{Animate, AnimateTransform, Group, Path};
 
 use super::PlotError;
 use super::axes::{Axis, FOOT, Frame, HEAD, Quantity, remark};
@@ -225,8 +225,9 @@ fn span(motion: &Motion, coordinate: impl Fn(&(f64, f64)) -> f64) -> Range {
         .widened(0.08)
 }
 
-/// Trace, bars and joints.
-fn drawn_motion(stage: &Frame, motion: &Motion) -> SVG {
+/// Trace, bars and joints; all of them lie within the stage. In a group, because browsers give an inner `svg` a clock
+/// of its own, which need not run with the cursor's.
+fn drawn_motion(stage: &Frame, motion: &Motion) -> Group {
     let chains: Vec<Vec<Vec<(f64, f64)>>> = motion
         .chains
         .iter()
@@ -237,7 +238,8 @@ fn drawn_motion(stage: &Frame, motion: &Motion) -> SVG {
             frames.map(in_px).collect()
         })
         .collect();
-    let mut inner = clipped(stage.area);
+    let corner = format!("translate({} {})", px(stage.area.x), px(stage.area.y));
+    let mut inner = Group::new().set("transform", corner);
     let colour = numbered(chains.len() - 1).colour;
     if let Some(last) = chains.last() {
         inner = inner.add(trace(last, motion.duration_s, colour));
@@ -483,6 +485,14 @@ mod tests {
         };
         let last = attribute("values").split(';').next_back();
         assert_eq!(last, Some(attribute("d")));
+    }
+
+    #[test]
+    fn all_that_moves_shares_one_clock() {
+        let mut episode = acrobot(5, 0.1);
+        episode.strips.clear();
+        let film = animation(&episode).unwrap();
+        assert_eq!(film.matches("<svg").count(), 1, "{film}");
     }
 
     #[test]
