@@ -7,10 +7,12 @@ mod model_file;
 mod picture;
 pub mod plot;
 mod summary;
+mod tensorboard;
 mod text;
 
 pub use folder::{WriteError, write, write_whole};
 pub use json::Report;
 pub use model_file::model_file;
 pub use summary::summary;
+pub use tensorboard::EventFile;
 pub use text::text;

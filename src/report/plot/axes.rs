@@ -3,7 +3,7 @@
 use svg::node::element::Group;
 
 use super::canvas::{Anchor, Area, TO_BASELINE, rule, text, text_width};
-use super::scale::{Range, Ticks, scaled_unit};
+use super::scale::{Range, Scale, Ticks, scaled_unit};
 use super::style::{FAINT_INK, GRID, INK, SMALL_SIZE, SPINE, TEXT_SIZE};
 
 /// Room below a frame for numbers and label.
@@ -15,9 +15,29 @@ const X_TICK_PX: f64 = 60.0;
 const Y_TICK_PX: f64 = 42.0;
 const LABEL_GAP_PX: f64 = 14.0;
 
+/// What an axis measures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// What it is called.
+    pub name: String,
+    /// Empty for a plain number.
+    pub unit: String,
+}
+
+impl Quantity {
+    /// A quantity with its unit, which is empty for a plain number.
+    pub fn new(name: &str, unit: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+        }
+    }
+}
+
 /// A quantity along one side of a frame.
 pub(super) struct Axis {
     pub range: Range,
+    scale: Scale,
     ticks: Ticks,
     label: String,
 }
@@ -25,21 +45,32 @@ pub(super) struct Axis {
 impl Axis {
     /// An axis to run over so many pixels from left to right, its numbers apart from one another.
     pub fn horizontal(range: Range, pixels: f64, quantity: &str, unit: &str) -> Self {
+        Self::horizontal_on(Scale::Linear, range, pixels, quantity, unit)
+    }
+
+    /// A horizontal axis on a scale of choice.
+    pub fn horizontal_on(
+        scale: Scale,
+        range: Range,
+        pixels: f64,
+        quantity: &str,
+        unit: &str,
+    ) -> Self {
         let mut wanted = (pixels / X_TICK_PX).max(2.0) as usize;
-        let mut ticks = Ticks::new(range, wanted);
+        let mut ticks = scale.ticks(range, wanted);
         while wanted > 2
             && widest(&ticks) + LABEL_GAP_PX > pixels / ticks.values.len().max(1) as f64
         {
             wanted -= 1;
-            ticks = Ticks::new(range, wanted);
+            ticks = scale.ticks(range, wanted);
         }
-        Self::labelled(range, ticks, quantity, unit)
+        Self::labelled(scale, range, ticks, quantity, unit)
     }
 
     /// An axis to run over so many pixels from bottom to top.
     pub fn vertical(range: Range, pixels: f64, quantity: &str, unit: &str) -> Self {
         let ticks = Ticks::new(range, (pixels / Y_TICK_PX).max(2.0) as usize);
-        Self::labelled(range, ticks, quantity, unit)
+        Self::labelled(Scale::Linear, range, ticks, quantity, unit)
     }
 
     /// An axis along which things are lined up rather than measured.
@@ -51,18 +82,29 @@ impl Axis {
         };
         Self {
             range,
+            scale: Scale::Linear,
             ticks,
             label: String::new(),
         }
     }
 
-    fn labelled(range: Range, ticks: Ticks, quantity: &str, unit: &str) -> Self {
-        let label = format!("{quantity} ({})", scaled_unit(unit, ticks.exponent));
+    fn labelled(scale: Scale, range: Range, ticks: Ticks, quantity: &str, unit: &str) -> Self {
+        let label = match scaled_unit(unit, ticks.exponent).trim() {
+            "" => quantity.to_owned(),
+            unit => format!("{quantity} ({unit})"),
+        };
         Self {
             range,
+            scale,
             ticks,
             label,
         }
+    }
+
+    /// How far along the axis a value lies, from 0 to 1.
+    fn share(&self, value: f64) -> f64 {
+        let Range { lo, hi } = self.scale.stretched(self.range);
+        (self.scale.forward(value) - lo) / (hi - lo)
     }
 
     /// Room that numbers and label take at the left of a frame.
@@ -89,12 +131,12 @@ pub(super) struct Frame<'a> {
 impl Frame<'_> {
     /// Pixels from the left side of the area.
     pub fn x_px(&self, value: f64) -> f64 {
-        (value - self.x.range.lo) / self.x.range.width() * self.area.width
+        self.x.share(value) * self.area.width
     }
 
     /// Pixels from the upper side of the area.
     pub fn y_px(&self, value: f64) -> f64 {
-        (self.y.range.hi - value) / self.y.range.width() * self.area.height
+        (1.0 - self.y.share(value)) * self.area.height
     }
 
     /// Pixels from the upper left corner of the area.

@@ -123,18 +123,31 @@ pub(super) fn rule(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
         .set("stroke", colour)
 }
 
+/// Path data of an open line.
+pub(super) fn line_data(points: &[(f64, f64)]) -> String {
+    let mut data = String::new();
+    for (index, point) in points.iter().enumerate() {
+        push(&mut data, if index == 0 { 'M' } else { 'L' }, *point);
+    }
+    data
+}
+
+/// Path data of zero-length strokes.
+pub(super) fn dots_data(points: impl IntoIterator<Item = (f64, f64)>) -> String {
+    let mut data = String::new();
+    for point in points {
+        push(&mut data, 'M', point);
+        data.push_str("h0");
+    }
+    data
+}
+
 /// Open curves in one style.
 pub(super) fn curves<'a>(
     lines: impl IntoIterator<Item = &'a [(f64, f64)]>,
     stroke: &Stroke,
 ) -> Path {
-    let mut data = String::new();
-    for line in lines {
-        for (index, point) in line.iter().enumerate() {
-            let command = if index == 0 { 'M' } else { 'L' };
-            push(&mut data, command, *point);
-        }
-    }
+    let data: String = lines.into_iter().map(line_data).collect();
     Path::new()
         .set("d", data)
         .set("fill", "none")
@@ -146,11 +159,7 @@ pub(super) fn curves<'a>(
 
 /// The area within an outline.
 pub(super) fn filled(outline: &[(f64, f64)], colour: &str) -> Path {
-    let mut data = String::new();
-    for (index, point) in outline.iter().enumerate() {
-        push(&mut data, if index == 0 { 'M' } else { 'L' }, *point);
-    }
-    data.push('Z');
+    let data = line_data(outline) + "Z";
     Path::new().set("d", data).set("fill", colour)
 }
 
@@ -160,13 +169,8 @@ pub(super) fn dots(
     diameter: f64,
     colour: &str,
 ) -> Path {
-    let mut data = String::new();
-    for point in points {
-        push(&mut data, 'M', point);
-        data.push_str("h0");
-    }
     Path::new()
-        .set("d", data)
+        .set("d", dots_data(points))
         .set("fill", "none")
         .set("stroke", colour)
         .set("stroke-width", diameter)
@@ -218,7 +222,7 @@ fn push(data: &mut String, command: char, (x, y): (f64, f64)) {
 }
 
 /// Tenths of a pixel: finer cannot be seen, and only makes the file longer.
-fn px(value: f64) -> f64 {
+pub(super) fn px(value: f64) -> f64 {
     (value.clamp(-FARTHEST_PX, FARTHEST_PX) * 10.0).round() / 10.0
 }
 

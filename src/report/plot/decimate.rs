@@ -31,6 +31,12 @@ fn extremes(run: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
     kept.into_iter().map(|index| run[index])
 }
 
+/// The pieces of a curve between the points that are not finite.
+pub(super) fn drawable_pieces(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
+    let is_broken = |(x, y): &(f64, f64)| !x.is_finite() || !y.is_finite();
+    points.split(is_broken).filter(|piece| !piece.is_empty())
+}
+
 #[cfg(test)]
 mod tests {
     use super::decimate;

@@ -74,7 +74,7 @@ pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
 fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     for bar in rows.iter().flat_map(|row| &row.bars) {
-        let entry = Entry::new(Sample::Bar(bar.role), &bar.label);
+        let entry = Entry::new(Sample::Bar(bar.role.colour()), &bar.label);
         if !entries.contains(&entry) {
             entries.push(entry);
         }

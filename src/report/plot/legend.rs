@@ -3,7 +3,7 @@
 use svg::node::element::{Group, Rectangle};
 
 use super::canvas::{Anchor, TO_BASELINE, curves, dots, filled, marker, text, text_width};
-use super::style::{INK, MARGIN, Role, START_MARK_PX, TEXT_SIZE, WIDTH};
+use super::style::{INK, MARGIN, START_MARK_PX, Stroke, TEXT_SIZE, WIDTH};
 
 const SAMPLE_PX: f64 = 30.0;
 const ROW_PX: f64 = 21.0;
@@ -12,16 +12,15 @@ const ENTRY_GAP_PX: f64 = 26.0;
 /// What stands beside a name.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Sample {
-    /// The line of a role.
-    Line(Role),
-    /// A faint point of a role.
-    Point(Role),
-    /// A filled bar of a role.
-    Bar(Role),
+    Line(Stroke),
+    /// A faint point of a colour.
+    Point(&'static str),
+    /// A filled bar of a colour.
+    Bar(&'static str),
     /// The mark at the start of a piece of a curve.
     Start,
-    /// The line of a role in its band.
-    Band(Role),
+    /// A line in its band.
+    Band(Stroke),
 }
 
 /// An entry of a legend.
@@ -64,25 +63,23 @@ fn sample(sample: Sample, x: f64, y: f64) -> Group {
     let centre = (x + SAMPLE_PX / 2.0, y);
     let group = Group::new();
     match sample {
-        Sample::Line(role) => {
-            group.add(curves([&[(x, y), (x + SAMPLE_PX, y)][..]], &role.stroke()))
-        }
-        Sample::Point(role) => group.add(dots([centre], 7.0, role.colour()).set("opacity", 0.6)),
-        Sample::Bar(role) => group.add(
+        Sample::Line(stroke) => group.add(curves([&[(x, y), (x + SAMPLE_PX, y)][..]], &stroke)),
+        Sample::Point(colour) => group.add(dots([centre], 7.0, colour).set("opacity", 0.6)),
+        Sample::Bar(colour) => group.add(
             Rectangle::new()
                 .set("x", x)
                 .set("y", y - 5.5)
                 .set("width", SAMPLE_PX)
                 .set("height", 11)
-                .set("fill", role.colour()),
+                .set("fill", colour),
         ),
         Sample::Start => group.add(marker(centre, START_MARK_PX, INK)),
-        Sample::Band(role) => {
+        Sample::Band(stroke) => {
             let (right, low, high) = (x + SAMPLE_PX, y + 6.0, y - 6.0);
             let outline = [(x, low), (right, low), (right, high), (x, high)];
             group
-                .add(filled(&outline, role.colour()).set("opacity", 0.25))
-                .add(curves([&[(x, y), (right, y)][..]], &role.stroke()))
+                .add(filled(&outline, stroke.colour).set("opacity", 0.25))
+                .add(curves([&[(x, y), (right, y)][..]], &stroke))
         }
     }
 }

@@ -1,27 +1,34 @@
 //! The report's figures, as SVG text.
 //!
-//! Three figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
-//! unexplained ([`residual_shape`]), and how far off it is ([`error_bars`]). They take plain numbers and return a
-//! complete SVG document; the caller writes it. A [`Role`] has the same colour and line in every figure.
+//! Four figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
+//! unexplained ([`residual_shape`]), how far off it is ([`error_bars`]), and what a planner gains with it as it
+//! learns ([`learning_curves`]). And a film: an episode in motion ([`animation`](animation())). They take plain numbers and return a complete SVG document; the caller writes it.
+//! A [`Role`] or a [`Method`] has the same colour and line in every figure.
 //!
 //! The documents carry no identifiers and no style sheets, so that several can stand in one HTML page, and name
 //! only the generic font `sans-serif`.
 
+mod animation;
 mod axes;
 mod canvas;
 mod decimate;
 mod error_bars;
+mod learning;
 mod legend;
 mod predictions;
 mod residual_shape;
 mod scale;
 mod style;
 
+pub use animation::{Animation, Chain, Strip, StripLine, animation};
+pub use axes::Quantity;
 pub use decimate::decimate;
 pub use error_bars::{Bar, ErrorRow, error_bars};
+pub use learning::{Course, LearningPanel, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
 pub use residual_shape::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
-pub use style::Role;
+pub use scale::Scale;
+pub use style::{Method, Role};
 
 /// A figure that cannot be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -31,6 +38,16 @@ pub enum PlotError {
     Empty {
         /// The title that the figure would have had.
         title: String,
+    },
+    /// Frames of an animation that do not belong together.
+    #[error(
+        "animation {title:?}: chain {chain} changes its number of points, or its number of frames is not that of chain 1; give every frame of a chain the same points, and every chain the same frames"
+    )]
+    Uneven {
+        /// The animation's title.
+        title: String,
+        /// The chain, from 1.
+        chain: usize,
     },
 }
 

@@ -2,7 +2,7 @@
 
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, marker};
-use super::decimate::decimate;
+use super::decimate::{decimate, drawable_pieces};
 use super::legend::{Entry, Sample, legend};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, START_MARK_PX, WIDTH};
@@ -103,7 +103,7 @@ fn entries(panels: &[Panel]) -> Vec<Entry> {
     tracks.sort_by_key(|track| track.role);
     let mut entries: Vec<Entry> = Vec::new();
     for track in &tracks {
-        let entry = Entry::new(Sample::Line(track.role), &track.label);
+        let entry = Entry::new(Sample::Line(track.role.stroke()), &track.label);
         if !entries.contains(&entry) {
             entries.push(entry);
         }
@@ -190,13 +190,11 @@ fn add_remark(canvas: &mut Canvas, frame: &Frame, panel: &Panel) {
 /// The pieces of a curve in pixels, thinned, and parted where a point is not finite.
 fn visible_lines(track: &Track, frame: &Frame) -> Vec<Vec<(f64, f64)>> {
     let total = track_points(track).count().max(1);
-    let is_broken = |(x, y): &(f64, f64)| !x.is_finite() || !y.is_finite();
     let pieces = track
         .segments
         .iter()
-        .flat_map(|segment| segment.split(is_broken));
+        .flat_map(|segment| drawable_pieces(segment));
     pieces
-        .filter(|piece| !piece.is_empty())
         .map(|piece| {
             let share = MAX_TRACK_POINTS * piece.len() / total;
             let kept = decimate(piece, share);

@@ -84,12 +84,12 @@ pub fn residual_shape(panels: &[ShapePanel], title: &str) -> Result<String, Plot
 }
 
 fn entries(panels: &[ShapePanel]) -> Vec<Entry> {
-    let mut entries = vec![Entry::new(Sample::Point(Role::Before), "before")];
+    let mut entries = vec![Entry::new(Sample::Point(Role::Before.colour()), "before")];
     if panels.iter().any(|panel| !panel.after.is_empty()) {
-        entries.push(Entry::new(Sample::Point(Role::After), "after"));
+        entries.push(Entry::new(Sample::Point(Role::After.colour()), "after"));
     }
     entries.push(Entry::new(
-        Sample::Band(Role::After),
+        Sample::Band(Role::After.stroke()),
         "what this variable carries by itself, 95 % band",
     ));
     entries

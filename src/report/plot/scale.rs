@@ -2,6 +2,8 @@
 
 /// An axis ends here, so that its width is still a number.
 const FARTHEST: f64 = 1e300;
+/// A logarithmic axis spans at most from the inverse of this power of ten to the power itself.
+const FARTHEST_DECADE: f64 = 300.0;
 
 /// A part of the number line that has a width.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,6 +77,15 @@ impl Range {
         }
     }
 
+    /// As wide as asked for, around the same middle.
+    pub fn around_middle(self, width: f64) -> Self {
+        let middle = f64::midpoint(self.lo, self.hi);
+        Self {
+            lo: middle - width / 2.0,
+            hi: middle + width / 2.0,
+        }
+    }
+
     /// A range that an axis can show: one without a width, or with one lost in rounding, is opened around its value.
     pub fn drawable(self) -> Self {
         let [lo, hi] = [self.lo, self.hi].map(|end| end.clamp(-FARTHEST, FARTHEST));
@@ -86,6 +97,61 @@ impl Range {
         Self {
             lo: lo - reach,
             hi: hi + reach,
+        }
+    }
+}
+
+/// How values are laid out along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Equal steps for equal differences.
+    Linear,
+    /// Equal steps for equal ratios; shows only values above zero.
+    Logarithmic,
+}
+
+impl Scale {
+    /// The number that a value's place is proportional to.
+    pub(super) fn forward(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Logarithmic => value.log10(),
+        }
+    }
+
+    fn back(self, place: f64) -> f64 {
+        match self {
+            Self::Linear => place,
+            Self::Logarithmic => 10_f64.powf(place.clamp(-FARTHEST_DECADE, FARTHEST_DECADE)),
+        }
+    }
+
+    /// Whether a value has a place.
+    pub(super) fn shows(self, value: f64) -> bool {
+        self.forward(value).is_finite()
+    }
+
+    /// The places between which a range lies.
+    pub(super) fn stretched(self, Range { lo, hi }: Range) -> Range {
+        Range {
+            lo: self.forward(lo),
+            hi: self.forward(hi),
+        }
+    }
+
+    /// A range opened by a share of its length on the axis at both ends.
+    pub(super) fn widened(self, range: Range, share: f64) -> Range {
+        let Range { lo, hi } = self.stretched(range).widened(share);
+        Range {
+            lo: self.back(lo),
+            hi: self.back(hi),
+        }
+    }
+
+    pub(super) fn ticks(self, range: Range, wanted: usize) -> Ticks {
+        match self {
+            Self::Linear => Ticks::new(range, wanted),
+            Self::Logarithmic => Ticks::logarithmic(range, wanted),
         }
     }
 }
@@ -119,6 +185,38 @@ impl Ticks {
             exponent,
         }
     }
+
+    /// At most `wanted` marks at 1, 2 and 5 times the powers of ten, or at powers of ten alone. A range that holds
+    /// fewer than two has the marks of a linear axis.
+    fn logarithmic(range: Range, wanted: usize) -> Self {
+        let Range { lo, hi } = Scale::Logarithmic.stretched(range);
+        let decades = lo.floor() as i32..=hi.floor() as i32;
+        let stride = (hi - lo) as i32 / wanted.max(1) as i32 + 1;
+        let fine = marks(range, decades.clone(), &[1.0, 2.0, 5.0]);
+        let values = if fine.len() <= wanted {
+            fine
+        } else {
+            marks(range, decades.filter(|decade| decade % stride == 0), &[1.0])
+        };
+        if values.len() < 2 {
+            return Self::new(range, wanted);
+        }
+        let labels = values.iter().map(|value| power_number(*value)).collect();
+        Self {
+            values,
+            labels,
+            exponent: 0,
+        }
+    }
+}
+
+/// The products of factors and powers of ten that lie in a range.
+fn marks(range: Range, exponents: impl Iterator<Item = i32>, factors: &[f64]) -> Vec<f64> {
+    let products = exponents.flat_map(|exponent| {
+        let power = 10_f64.powi(exponent);
+        factors.iter().map(move |factor| factor * power)
+    });
+    products.filter(|value| range.contains(*value)).collect()
 }
 
 /// The nearest of 1, 2 and 5 times a power of ten, by ratio.
@@ -175,6 +273,19 @@ pub(super) fn three_digits(value: f64) -> String {
     )
 }
 
+/// One digit and a power of ten, written out where that is short.
+fn power_number(value: f64) -> String {
+    let magnitude = (value.log10() + 1e-9).floor();
+    if (-3.0..6.0).contains(&magnitude) {
+        return number(value, (-magnitude).max(0.0) as usize);
+    }
+    let power = superscript(magnitude as i32);
+    match number(value / 10_f64.powf(magnitude), 0).as_str() {
+        "1" => format!("10{power}"),
+        factor => format!("{factor}\u{b7}10{power}"),
+    }
+}
+
 /// A unit counted in a power of ten: `10⁻³ rad`.
 pub(super) fn scaled_unit(unit: &str, exponent: i32) -> String {
     match exponent {
@@ -202,7 +313,7 @@ fn superscript(exponent: i32) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Range, Ticks, scaled_unit, three_digits};
+    use super::{Range, Scale, Ticks, scaled_unit, three_digits};
 
     fn ticks(lo: f64, hi: f64, wanted: usize) -> Ticks {
         Ticks::new(Range { lo, hi }, wanted)
@@ -227,6 +338,38 @@ mod tests {
         assert_eq!(small.labels, ["−4", "−2", "0", "2", "4"]);
         assert_eq!(scaled_unit("rad", small.exponent), "10⁻³ rad");
         assert_eq!(ticks(0.0, 3e6, 3).labels, ["0", "1", "2", "3"]);
+    }
+
+    #[test]
+    fn logarithmic_marks_thin_out() {
+        let labels = |lo, hi, wanted| Scale::Logarithmic.ticks(Range { lo, hi }, wanted).labels;
+        assert_eq!(labels(25.0, 600.0, 6), ["50", "100", "200", "500"]);
+        assert_eq!(labels(25.0, 10_000.0, 6), ["100", "1000", "10000"]);
+        assert_eq!(labels(0.5, 2e6, 4), ["1", "100", "10000", "10⁶"]);
+        assert_eq!(labels(1e-4, 1e-3, 4), ["10⁻⁴", "2·10⁻⁴", "5·10⁻⁴", "0.001"]);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_of_less_than_a_step_has_linear_marks() {
+        let range = Range {
+            lo: 210.0,
+            hi: 290.0,
+        };
+        assert_eq!(
+            Scale::Logarithmic.ticks(range, 4).labels,
+            ["220", "240", "260", "280"]
+        );
+    }
+
+    #[test]
+    fn equal_ratios_take_equal_room() {
+        let range = Range {
+            lo: 10.0,
+            hi: 1000.0,
+        };
+        let Range { lo, hi } = Scale::Logarithmic.widened(range, 0.5);
+        assert!((lo - 1.0).abs() < 1e-12 && (hi - 1e4).abs() < 1e-8);
+        assert!(!Scale::Logarithmic.shows(0.0) && !Scale::Logarithmic.shows(-1.0));
     }
 
     #[test]
