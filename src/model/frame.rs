@@ -1,4 +1,4 @@
-use super::network::{MlpWeights, ResidualOn};
+use super::network::{MlpWeights, nothing_but};
 use super::{Dynamics, Parameter};
 use crate::expr::{Graph, Node, Program};
 
@@ -75,7 +75,7 @@ impl Frame {
         let mut outline = Outline::new(joints, parameters);
         let mut outputs = match &equations {
             Some(dynamics) => outline.append(&dynamics.program),
-            None => outline.rates_around(networks[0].on),
+            None => outline.append(&nothing_but(&system, joints, networks[0].on).program),
         };
         for network in &networks {
             outputs.extend(outline.features(network));
@@ -120,16 +120,6 @@ impl Outline {
 
     fn append(&mut self, program: &Program) -> Vec<Node> {
         self.graph.append(program, &self.inputs)
-    }
-
-    /// The rates that a network is added to where there are no equations.
-    fn rates_around(&mut self, on: ResidualOn) -> Vec<Node> {
-        let n = self.joints;
-        let mut rates = vec![self.graph.constant(0.0); 2 * n];
-        if on == ResidualOn::Accelerations {
-            rates[..n].copy_from_slice(&self.inputs[n..2 * n]);
-        }
-        rates
     }
 
     fn features(&mut self, network: &MlpWeights) -> Vec<Node> {

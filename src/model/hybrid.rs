@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use super::equations;
 use super::frame::Frame;
 use super::mlp::{Mlp, flat, to_f64};
-use super::network::{MlpWeights, ResidualOn, network_dynamics, with_residual};
+use super::network::{MlpWeights, ResidualOn, nothing_but, with_residual};
 use super::{Dynamics, Parameter};
 
 /// Why a model cannot be put together.
@@ -220,18 +220,26 @@ impl HybridModel {
     /// # Errors
     /// None for a model made by this module's constructors.
     pub fn to_dynamics(&self) -> Result<Dynamics, HybridError> {
-        let weights = self.weights();
-        let prior = match (self.equations(), &weights.prior) {
+        let (around, networks) = self.parts();
+        networks.iter().try_fold(around, |dynamics, network| {
+            with_residual(&dynamics, network)
+        })
+    }
+
+    /// The equations with the current values, or what stands in their place where the prior is a network; and the
+    /// networks whose outputs are added to their derivative.
+    pub fn parts(&self) -> (Dynamics, Vec<MlpWeights>) {
+        let ModelWeights {
+            prior, residual, ..
+        } = self.weights();
+        let around = match (self.equations(), &prior) {
             (Some(dynamics), _) => dynamics,
             (None, prior) => {
                 let prior = prior.as_ref().expect("a prior is equations or a network");
-                network_dynamics(self.system(), self.joints(), prior)?
+                nothing_but(self.system(), self.joints(), prior.on)
             }
         };
-        match &weights.residual {
-            Some(mlp) => with_residual(&prior, mlp),
-            None => Ok(prior),
-        }
+        (around, prior.into_iter().chain(residual).collect())
     }
 
     /// The declared equations with the current values.

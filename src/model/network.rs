@@ -184,6 +184,29 @@ impl MlpWeights {
         }
     }
 
+    /// The same function with its features scaled otherwise, for data of another spread: the first layer takes up the
+    /// difference.
+    ///
+    /// # Panics
+    /// When `scaling` is of another number of features.
+    #[must_use]
+    #[allow(clippy::cast_possible_truncation)] // every number is an f32
+    pub fn rescaled(&self, scaling: InputScaling) -> Self {
+        let old = &self.scaling;
+        assert_eq!(scaling.mean.len(), old.mean.len(), "the same features");
+        let mut network = self.clone();
+        let first = &mut network.layers[0];
+        for (weights, bias) in first.weight.chunks_mut(first.inputs).zip(&mut first.bias) {
+            for (k, weight) in weights.iter_mut().enumerate() {
+                *bias += *weight * (scaling.mean[k] - old.mean[k]) / old.std[k];
+                *weight = f64::from((*weight * scaling.std[k] / old.std[k]) as f32);
+            }
+            *bias = f64::from(*bias as f32);
+        }
+        network.scaling = scaling;
+        network
+    }
+
     /// Widths from the features to the outputs.
     pub fn widths(&self) -> Vec<usize> {
         let first = self.layers.first().map(|layer| layer.inputs);
@@ -379,26 +402,29 @@ pub fn network_dynamics(
     joints: usize,
     mlp: &MlpWeights,
 ) -> Result<Dynamics, HybridError> {
-    mlp.check(joints)?;
+    with_residual(&nothing_but(name, joints, mlp.on), mlp)
+}
+
+/// The rates that a network is added to where there are no equations: none, or dq/dt = qd where it gives
+/// accelerations alone.
+pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
     let mut graph = Graph::new();
-    let group = |graph: &mut Graph, prefix: &str| -> Vec<Node> {
-        (1..=joints)
-            .map(|joint| graph.input(&format!("{prefix}{joint}")))
-            .collect()
-    };
-    let (q, qd) = (group(&mut graph, "q"), group(&mut graph, "qd"));
-    let tau = group(&mut graph, "tau");
-    graph.input("t");
-    let mut outputs = mlp.write(&mut graph, &q, &qd, &tau);
-    if mlp.on == ResidualOn::Accelerations {
-        outputs.splice(..0, qd);
+    let numbered = |stem: &'static str| (1..=joints).map(move |joint| format!("{stem}{joint}"));
+    let names = ["q", "qd", "tau"]
+        .into_iter()
+        .flat_map(numbered)
+        .chain(["t".to_owned()]);
+    let inputs: Vec<Node> = names.map(|name| graph.input(&name)).collect();
+    let mut rates = vec![graph.constant(0.0); 2 * joints];
+    if on == ResidualOn::Accelerations {
+        rates[..joints].copy_from_slice(&inputs[joints..2 * joints]);
     }
-    Ok(Dynamics {
+    Dynamics {
         name: name.to_owned(),
         joints,
         parameters: Vec::new(),
-        program: graph.finish(&outputs),
+        program: graph.finish(&rates),
         filters: Vec::new(),
         reading: None,
-    })
+    }
 }

@@ -1,15 +1,20 @@
 use crate::expr::Tape;
 use crate::lanes::Row;
-use crate::model::{Dynamics, Integrator, Rollout};
+use crate::model::{Commands, Dynamics, Integrator, Rollout, StepTorque};
 
 /// A model that is stepped as a controlled environment is: a fixed step under a held torque, in f64.
 ///
 /// The steps are those of [`Integrator`], which does the same on tensors: what a model is trained on and
-/// what it is trained through must not differ.
+/// what it is trained through must not differ. A model whose torques are filtered remembers those of all steps
+/// since its beginning, before which they were zero.
 pub struct Environment<'d> {
+    dynamics: &'d Dynamics,
+    values: Vec<f64>,
     method: Method<'d>,
-    joints: usize,
     step_s: f64,
+    past: Past,
+    /// `[part * n + joint]`: the torque that acts in each part of a step, or in all of it.
+    acting: Vec<Row<f64, 1>>,
 }
 
 enum Method<'d> {
@@ -20,31 +25,41 @@ enum Method<'d> {
     },
 }
 
+/// The torques held so far.
+#[derive(Default)]
+struct Past {
+    /// When each began, in s.
+    time: Vec<f64>,
+    /// `[joint][row]`
+    tau: Vec<Vec<f64>>,
+}
+
 impl<'d> Environment<'d> {
     /// `dynamics` with parameters `values`, in its order, in steps of `step_s` seconds.
     ///
     /// # Panics
-    /// When `values` has not one entry a parameter, or `dynamics` filters its torque, for which a step would have
-    /// to know the steps before.
+    /// When `values` has not one entry a parameter.
     pub fn new(
         dynamics: &'d Dynamics,
         values: &[f64],
         integrator: Integrator,
         step_s: f64,
     ) -> Self {
-        assert!(dynamics.filters.is_empty(), "a step has no memory");
         let runge_kutta = |substeps: usize| Method::RungeKutta {
             rollout: Rollout::new(dynamics, values),
             substeps,
         };
         Self {
+            dynamics,
+            values: values.to_vec(),
             method: match integrator {
                 Integrator::SemiImplicitEuler => Method::SemiImplicitEuler(tape(dynamics, values)),
                 Integrator::Rk4 => runge_kutta(1),
                 Integrator::Fine { steps } => runge_kutta(steps.get() as usize),
             },
-            joints: dynamics.joints,
             step_s,
+            past: Past::default(),
+            acting: Vec::new(),
         }
     }
 
@@ -53,19 +68,59 @@ impl<'d> Environment<'d> {
     /// # Panics
     /// When `state` or `tau` is not of the model's size.
     pub fn step(&mut self, state: &mut [f64], tau: &[f64], time_s: f64) {
+        self.hold(tau, time_s);
         match &mut self.method {
             Method::SemiImplicitEuler(tape) => {
-                semi_implicit(tape, self.joints, state, tau, time_s, self.step_s);
+                semi_implicit(tape, state, &self.acting, time_s, self.step_s);
             }
             Method::RungeKutta { rollout, substeps } => {
-                let column = |values: &[f64]| values.iter().map(|x| Row([*x])).collect::<Vec<_>>();
-                let mut lanes = column(state);
+                let mut lanes: Vec<_> = state.iter().map(|x| Row([*x])).collect();
                 let (time, step) = (Row([time_s]), Row([self.step_s]));
-                rollout.advance(&mut lanes, &column(tau), time, step, *substeps);
+                rollout.advance(&mut lanes, &self.acting, time, step, *substeps);
                 for (value, Row([lane])) in state.iter_mut().zip(lanes) {
                     *value = lane;
                 }
             }
+        }
+    }
+
+    /// The torque of each joint that acted at the end of the last step, 0 before the first.
+    pub fn acting(&self) -> Vec<f64> {
+        let n = self.dynamics.joints;
+        match self.acting.len().checked_sub(n) {
+            Some(last) => self.acting[last..].iter().map(|Row([tau])| *tau).collect(),
+            None => vec![0.0; n],
+        }
+    }
+
+    /// What acts while `tau` is held from `time_s` on.
+    fn hold(&mut self, tau: &[f64], time_s: f64) {
+        let held: Vec<_> = tau.iter().map(|tau| Row([*tau])).collect();
+        if self.dynamics.filters.is_empty() {
+            self.acting = held;
+            return;
+        }
+        self.past.push(tau, time_s, self.step_s);
+        let Past { time, tau } = &self.past;
+        let commands = Commands::new(self.dynamics, &self.values, time, tau);
+        let ends = [time_s, time_s + self.step_s].map(|time| Row([time]));
+        let parts = match self.method {
+            Method::SemiImplicitEuler(_) => 1,
+            Method::RungeKutta { substeps, .. } => substeps,
+        };
+        self.acting = StepTorque::new([&commands], &held, ends[0], ends[1], parts).mean;
+    }
+}
+
+impl Past {
+    fn push(&mut self, tau: &[f64], time_s: f64, step_s: f64) {
+        if self.time.is_empty() {
+            self.time.push(time_s - step_s);
+            self.tau = vec![vec![0.0]; tau.len()];
+        }
+        self.time.push(time_s);
+        for (past, tau) in self.tau.iter_mut().zip(tau) {
+            past.push(*tau);
         }
     }
 }
@@ -84,15 +139,16 @@ fn tape<'d>(dynamics: &'d Dynamics, values: &[f64]) -> Tape<'d, f64, 1> {
 /// v' = v + h f_v, q' = q + h (f_q + h f_v)
 fn semi_implicit(
     tape: &mut Tape<f64, 1>,
-    joints: usize,
     state: &mut [f64],
-    tau: &[f64],
+    tau: &[Row<f64, 1>],
     time_s: f64,
     step_s: f64,
 ) {
-    let inputs = state.iter().chain(tau).chain([&time_s]);
+    let joints = tau.len();
+    let states = state.iter().map(|x| Row([*x]));
+    let inputs = states.chain(tau.iter().copied()).chain([Row([time_s])]);
     for (slot, value) in tape.inputs()[..=3 * joints].iter_mut().zip(inputs) {
-        *slot = Row([*value]);
+        *slot = value;
     }
     tape.run();
     for j in 0..joints {

@@ -1,6 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use include_dir::{Dir, include_dir};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -87,17 +88,34 @@ const USUAL_SENSOR: Sensor = Sensor {
     position_step: 0.0,
 };
 
+/// The embedded plants.
+static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/configs/plants");
+
 impl Plant {
-    /// Read a plant file or, for a model file (or the name of an embedded system), the rig that it
-    /// declares with a usual sensor and drive.
+    /// Read a plant file or, where there is no such file, take the embedded plant of that name. For a model file (or
+    /// the name of an embedded system) it is the rig that it declares with a usual sensor and drive.
     ///
     /// # Errors
     /// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
     pub fn read(path: &Path, library: &Library) -> Result<Self, PlantError> {
         match std::fs::read_to_string(path) {
-            Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
-            _ => Ok(Self::of_system(library.system(path)?)),
+            Ok(text) if is_plant(&text) => return Self::from_text(path, &text, library),
+            Ok(_) => return Ok(Self::of_system(library.system(path)?)),
+            Err(_) => {}
         }
+        let embedded = path
+            .to_str()
+            .and_then(|name| BUILT_IN.get_file(format!("{name}.toml")));
+        match embedded.and_then(|file| file.contents_utf8()) {
+            Some(text) => Self::from_text(path, text, library),
+            None => Ok(Self::of_system(library.system(path)?)),
+        }
+    }
+
+    /// Names of the embedded plants.
+    pub fn names() -> Vec<&'static str> {
+        let stem = |file: &include_dir::File<'static>| file.path().file_stem()?.to_str();
+        BUILT_IN.files().filter_map(stem).collect()
     }
 
     /// The plant in `text`; `path` is for messages, and model files are looked for beside it.

@@ -3,10 +3,12 @@
 mod environment;
 mod excitation;
 mod file;
+mod rig;
 mod sampling;
 mod simulate;
 
 pub use environment::Environment;
 pub use excitation::Excitation;
 pub use file::{Plant, PlantError, Sensor};
+pub use rig::{Noise, Rig};
 pub use sampling::{Sampling, Starts};

@@ -3,7 +3,6 @@ use serde::{Deserialize, Serialize};
 
 use super::Environment;
 use super::file::{Plant, PlantError};
-use crate::closeloop::joined;
 use crate::data::Trajectory;
 use crate::model::Integrator;
 
@@ -66,7 +65,7 @@ impl Plant {
                     .into(),
             ));
         }
-        let values = joined(&self.parameters, &self.effects);
+        let values = self.values();
         let mut environment =
             Environment::new(&dynamics, &values, sampling.integrator, sampling.step_s);
         let draws = sampling.draws(rng);

@@ -28,7 +28,7 @@ impl Plant {
         let n = self.system.joints;
         let tones = self.excitation.draw(rng);
         let dynamics = self.dynamics();
-        let values = joined(&self.parameters, &self.effects);
+        let values = self.values();
         let mut rollout = Rollout::<f64, 1>::new(&dynamics, &values);
         let dt = 1.0 / self.sensor.rate_hz;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -37,7 +37,11 @@ impl Plant {
             (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1,
             ((dt / STEP_S).ceil() as usize).max(1),
         );
-        let mut state: Vec<Row<f64, 1>> = self.start().iter().map(|value| Row([*value])).collect();
+        let mut state: Vec<Row<f64, 1>> = self
+            .as_read(&self.recording.start)
+            .iter()
+            .map(|value| Row([*value]))
+            .collect();
         let mut log = Log::empty(n);
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
@@ -65,9 +69,14 @@ impl Plant {
         Ok(log)
     }
 
-    /// The state at the start as the sensors read it: the plant file gives the true one.
-    fn start(&self) -> Vec<f64> {
-        let mut start = self.recording.start.clone();
+    /// Values of the declared parameters, then of the effects: what [`Plant::dynamics`] takes.
+    pub fn values(&self) -> Vec<f64> {
+        joined(&self.parameters, &self.effects)
+    }
+
+    /// A true state as the sensors read it, which is what the equations are about.
+    pub fn as_read(&self, state: &[f64]) -> Vec<f64> {
+        let mut start = state.to_vec();
         let sensors = self.effects.iter().filter(|e| e.effect.is_of_sensor());
         for effect in sensors {
             let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();

@@ -81,7 +81,7 @@ impl Training {
                 settings.error_scale.as_deref(),
                 model.joints(),
             )?,
-            optimizer: Stepper::new(model.frame(), &settings.learning_rates),
+            optimizer: Stepper::new(model.frame(), &settings),
             epoch: 0,
             penalty_weight: settings.penalty.initial(),
             history: Vec::new(),

@@ -1,7 +1,7 @@
 use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-use super::LearningRates;
+use super::FitSettings;
 use crate::model::Frame;
 
 // PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
@@ -13,6 +13,8 @@ const ADAM_EPSILON: f32 = 1e-8;
 pub(super) struct Stepper<const D: usize> {
     adam: Adam,
     rates: [f64; 2],
+    /// By this factor they shrink before each step.
+    shrink: [f64; 2],
     /// Of the prior and of the residual; none before their first step.
     moments: [Option<AdamState<D>>; 2],
 }
@@ -28,14 +30,16 @@ pub(super) struct Moments {
 }
 
 impl<const D: usize> Stepper<D> {
-    pub(super) fn new(frame: &Frame, rates: &LearningRates) -> Self {
-        let prior = match frame.equations {
-            Some(_) => rates.physics,
-            None => rates.prior,
+    pub(super) fn new(frame: &Frame, settings: &FitSettings) -> Self {
+        let (rates, decay) = (&settings.learning_rates, settings.weight_decay);
+        let (prior, of_prior) = match frame.equations {
+            Some(_) => (rates.physics, 0.0),
+            None => (rates.prior, decay),
         };
         Self {
             adam: AdamConfig::new().with_epsilon(ADAM_EPSILON).build(),
             rates: [prior, rates.residual],
+            shrink: [1.0 - prior * of_prior, 1.0 - rates.residual * decay],
             moments: [None, None],
         }
     }
@@ -46,13 +50,20 @@ impl<const D: usize> Stepper<D> {
         mut tensors: [Option<Tensor<D>>; 2],
         mut gradients: Gradients,
     ) -> [Option<Tensor<D>>; 2] {
-        let each = tensors.iter_mut().zip(self.rates).zip(&mut self.moments);
-        for ((tensor, rate), moments) in each {
+        let each = tensors
+            .iter_mut()
+            .zip(self.rates)
+            .zip(self.shrink)
+            .zip(&mut self.moments);
+        for (((tensor, rate), shrink), moments) in each {
             let Some(numbers) = tensor.take() else {
                 continue;
             };
             if let Some(gradient) = numbers.grad_remove(&mut gradients) {
-                let plain = numbers.inner();
+                let plain = match shrink {
+                    1.0 => numbers.inner(),
+                    shrink => numbers.inner() * shrink,
+                };
                 let (stepped, after) = self.adam.step(rate, plain, gradient, moments.take());
                 *moments = after.map(without_subnormals);
                 *tensor = Some(Tensor::from_inner(stepped));

@@ -11,6 +11,10 @@ use crate::model::Integrator;
 pub struct FitSettings {
     pub epochs: usize,
     pub learning_rates: LearningRates,
+    /// By this share of its learning rate every number of a network shrinks at each step (decoupled weight decay,
+    /// Loshchilov and Hutter 2019, arXiv:1711.05101). It keeps a network that has seen few data near to nothing where
+    /// there are none. Physical parameters do not shrink.
+    pub weight_decay: f64,
     pub batching: Batching,
     pub penalty: Penalty,
     pub integrator: Integrator,
@@ -48,6 +52,7 @@ impl Default for FitSettings {
         Self {
             epochs: 4000,
             learning_rates: LearningRates::default(),
+            weight_decay: 0.0,
             batching: Batching::default(),
             penalty: Penalty::default(),
             integrator: Integrator::default(),
@@ -78,6 +83,7 @@ impl FitSettings {
             ("learning_rates.physics", physics),
             ("learning_rates.prior", prior),
             ("learning_rates.residual", residual),
+            ("weight_decay", self.weight_decay),
         ];
         for (name, value) in rates {
             if !(value.is_finite() && value >= 0.0) {

@@ -95,7 +95,7 @@ impl Sweep {
         let weights = [(); 2].map(|()| Tensor::zeros([networks.len()], &stack.device()));
         let mut sweep = Self {
             alive: weights[0].clone().inner().is_finite(),
-            optimizer: Stepper::new(model.frame(), &settings.learning_rates),
+            optimizer: Stepper::new(model.frame(), &settings),
             weights,
             stack,
             orders,

@@ -1,0 +1,100 @@
+use std::collections::VecDeque;
+
+use rand::{Rng, RngExt};
+
+use super::Task;
+use crate::batch::Block;
+use crate::plan::{Planner, Start};
+
+/// What decides the torque of each step.
+pub trait Policy {
+    /// The torque to be held from `time_s` on, when the sensors show `measured` (positions, then velocities).
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
+}
+
+/// Model-predictive control with a receding horizon: the first steps of the best plan are carried out, then the rest of
+/// it starts the search for the next.
+pub struct Controller<'p, 'r> {
+    planner: &'p Planner<Block<'r>>,
+    replan: usize,
+    plan: VecDeque<Vec<f64>>,
+    /// The torques held so far, as many as the model remembers.
+    past: VecDeque<Vec<f64>>,
+    memory: usize,
+    decisions: usize,
+    diverged: usize,
+}
+
+impl<'p, 'r> Controller<'p, 'r> {
+    /// With the first `replan` steps of each plan; the model remembers `memory` torques.
+    pub fn new(planner: &'p Planner<Block<'r>>, replan: usize, memory: usize) -> Self {
+        planner.forget();
+        Self {
+            planner,
+            replan,
+            plan: VecDeque::new(),
+            past: VecDeque::new(),
+            memory,
+            decisions: 0,
+            diverged: 0,
+        }
+    }
+
+    /// Plans made.
+    pub fn decisions(&self) -> usize {
+        self.decisions
+    }
+
+    /// Candidates of all plans whose rollout diverged.
+    pub fn diverged(&self) -> usize {
+        self.diverged
+    }
+
+    fn decide(&mut self, measured: &[f64], time_s: f64) {
+        if self.decisions > 0 {
+            self.planner.shift(self.replan);
+        }
+        let start = Start::after(measured, time_s, self.past.make_contiguous());
+        let plan = self.planner.plan(start);
+        self.plan = plan.inputs.into_iter().take(self.replan).collect();
+        self.decisions += 1;
+        self.diverged += plan.diverged;
+    }
+}
+
+impl Policy for Controller<'_, '_> {
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64> {
+        if self.plan.is_empty() {
+            self.decide(measured, time_s);
+        }
+        let torque = self.plan.pop_front().expect("a plan has steps");
+        self.past.push_back(torque.clone());
+        if self.past.len() > self.memory {
+            self.past.pop_front();
+        }
+        torque
+    }
+}
+
+/// Torques drawn from their ranges, a new one for each step.
+pub struct RandomTorque<'t, R> {
+    ranges: &'t [[f64; 2]],
+    rng: R,
+}
+
+impl<'t, R: Rng> RandomTorque<'t, R> {
+    /// Within the bounds of a task.
+    pub fn new(task: &'t Task, rng: R) -> Self {
+        Self {
+            ranges: &task.torque,
+            rng,
+        }
+    }
+}
+
+impl<R: Rng> Policy for RandomTorque<'_, R> {
+    fn torque(&mut self, _: &[f64], _: f64) -> Vec<f64> {
+        let draw = |[low, high]: &[f64; 2]| self.rng.random_range(*low..=*high);
+        self.ranges.iter().map(draw).collect()
+    }
+}

@@ -1,0 +1,109 @@
+use rand::Rng;
+
+use super::{Meter, Policy, Task};
+use crate::data::Log;
+use crate::plant::{PlantError, Rig};
+
+/// Some steps of a rig under a policy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// What the sensors gave and what was commanded: one row a step, and one for where the last step led.
+    pub log: Log,
+    /// The true state of each row: positions, then velocities.
+    pub states: Vec<Vec<f64>>,
+}
+
+/// A whole episode of a task.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Episode {
+    pub stretch: Stretch,
+    /// Of each step.
+    pub rewards: Vec<f64>,
+    /// Whether the goal held until the end.
+    pub success: bool,
+}
+
+/// Let `policy` drive the rig for `steps` steps.
+///
+/// # Errors
+/// A rig that diverges.
+pub fn drive(
+    rig: &mut Rig<'_>,
+    policy: &mut dyn Policy,
+    steps: usize,
+    rng: &mut impl Rng,
+) -> Result<Stretch, PlantError> {
+    let mut stretch = Stretch {
+        log: Log::empty(rig.state().len() / 2),
+        states: Vec::new(),
+    };
+    for _ in 0..steps {
+        let (measured, time_s) = (rig.measure(rng), rig.time_s());
+        let tau = policy.torque(&measured, time_s);
+        stretch.push(rig, &measured, &tau);
+        rig.step(&tau)?;
+    }
+    // Nothing is commanded any more at the last row.
+    let (measured, idle) = (rig.measure(rng), vec![0.0; stretch.log.joints()]);
+    stretch.push(rig, &measured, &idle);
+    Ok(stretch)
+}
+
+/// A whole episode of `task` from where the rig is.
+///
+/// # Errors
+/// A rig that diverges.
+pub fn episode(
+    task: &Task,
+    rig: &mut Rig<'_>,
+    policy: &mut dyn Policy,
+    rng: &mut impl Rng,
+) -> Result<Episode, PlantError> {
+    let stretch = drive(rig, policy, task.steps, rng)?;
+    let read = |meter: &Meter| stretch.read(meter);
+    let rewards = read(&Meter::of(&task.objective()));
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
+    let held = (task.goal.hold_s / task.step_s).round() as usize;
+    let goal = read(&task.goal_meter());
+    let last = &goal[goal.len().saturating_sub(held)..];
+    Ok(Episode {
+        success: last.iter().all(|value| *value >= task.goal.at_least),
+        rewards,
+        stretch,
+    })
+}
+
+impl Stretch {
+    fn push(&mut self, rig: &Rig<'_>, measured: &[f64], tau: &[f64]) {
+        let Log {
+            time,
+            q,
+            qd,
+            tau: held,
+            ..
+        } = &mut self.log;
+        time.push(rig.time_s());
+        let channels = q.iter_mut().chain(qd).chain(held);
+        for (channel, value) in channels.zip(measured.iter().chain(tau)) {
+            channel.push(*value);
+        }
+        self.states.push(rig.state().to_vec());
+    }
+
+    /// The values of a formula after each step.
+    fn read(&self, meter: &Meter) -> Vec<f64> {
+        let steps = self.states.iter().enumerate().skip(1);
+        let after = |(row, state): (usize, &Vec<f64>)| {
+            let held: Vec<f64> = self.log.tau.iter().map(|tau| tau[row - 1]).collect();
+            meter.read(state, &held, self.log.time[row])
+        };
+        steps.map(after).collect()
+    }
+}
+
+impl Episode {
+    /// The sum of rewards.
+    pub fn total(&self) -> f64 {
+        self.rewards.iter().sum()
+    }
+}

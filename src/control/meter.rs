@@ -1,0 +1,34 @@
+use crate::expr::{FormulaError, Program};
+use crate::plan::Objective;
+
+/// A formula of state, torque and time, read off one point after the other in f64.
+#[derive(Debug, Clone)]
+pub struct Meter {
+    program: Program,
+}
+
+impl Meter {
+    /// The names that it knows are those of an [`Objective`] of so many joints.
+    ///
+    /// # Errors
+    /// What is no formula, or a name that it does not know.
+    pub fn new(formula: &str, joints: usize) -> Result<Self, FormulaError> {
+        Ok(Self::of(&Objective::new(formula, joints)?))
+    }
+
+    /// The reward.
+    pub fn of(objective: &Objective) -> Self {
+        Self {
+            program: objective.program().clone(),
+        }
+    }
+
+    /// Its value at `state` (positions, then velocities) after `tau` was held, at `time_s`.
+    ///
+    /// # Panics
+    /// When `state` or `tau` has another number of joints.
+    pub fn read(&self, state: &[f64], tau: &[f64], time_s: f64) -> f64 {
+        let inputs = [state, tau, &[time_s]].concat();
+        self.program.eval(&inputs)[0]
+    }
+}

@@ -1,0 +1,16 @@
+//! Model-predictive control of a simulated plant: what it is to do, the controller that plans with a model, and the
+//! episodes that come of it.
+
+mod controller;
+mod episode;
+mod meter;
+mod predictor;
+mod session;
+mod task;
+
+pub use controller::{Controller, Policy, RandomTorque};
+pub use episode::{Episode, Stretch, drive, episode};
+pub use meter::Meter;
+pub use predictor::Predictor;
+pub use session::with_controller;
+pub use task::{Goal, PlantSettings, Task, TaskError};

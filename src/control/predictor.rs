@@ -1,0 +1,62 @@
+use crate::batch::Rollouts;
+use crate::model::{Dynamics, HybridModel, Integrator, MlpWeights};
+use crate::plan::Objective;
+
+/// A model as a planner takes it: equations with their values, networks whose outputs are added to their derivative,
+/// and how both become steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Predictor {
+    equations: Dynamics,
+    networks: Vec<MlpWeights>,
+    integrator: Integrator,
+}
+
+impl Predictor {
+    /// A model of equations alone.
+    pub fn of_equations(equations: Dynamics, integrator: Integrator) -> Self {
+        Self {
+            equations,
+            networks: Vec::new(),
+            integrator,
+        }
+    }
+
+    /// A trained model; `integrator` is the one that it was trained through.
+    pub fn of_model(model: &HybridModel, integrator: Integrator) -> Self {
+        let (equations, networks) = model.parts();
+        Self {
+            equations,
+            networks,
+            integrator,
+        }
+    }
+
+    /// Name of the system.
+    pub fn system(&self) -> &str {
+        &self.equations.name
+    }
+
+    /// Number of joints.
+    pub fn joints(&self) -> usize {
+        self.equations.joints
+    }
+
+    /// The model under this objective, in steps of `step_s` seconds.
+    ///
+    /// # Panics
+    /// When the objective is of another number of joints.
+    pub fn rollouts(&self, objective: &Objective, step_s: f64) -> Rollouts {
+        let Self {
+            equations,
+            networks,
+            integrator,
+        } = self;
+        Rollouts::new(
+            equations,
+            networks,
+            objective.program(),
+            *integrator,
+            step_s,
+        )
+    }
+}

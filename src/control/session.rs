@@ -1,0 +1,21 @@
+use rand_chacha::ChaCha8Rng;
+
+use super::{Controller, Predictor, Task};
+use crate::plan::Planner;
+
+/// Let `lead` act through a controller that plans with `predictor` for `task`, new after `replan` steps, with all cores
+/// ready for it. `rng` draws the candidates.
+///
+/// # Panics
+/// When `predictor` has not the joints of the task.
+pub fn with_controller<R>(
+    predictor: &Predictor,
+    task: &Task,
+    replan: usize,
+    rng: &ChaCha8Rng,
+    lead: impl FnOnce(&mut Controller<'_, '_>) -> R,
+) -> R {
+    let rollouts = predictor.rollouts(&task.objective(), task.step_s);
+    let planner = Planner::new(&task.planner, &task.torque, || rollouts.block(), rng);
+    planner.helped(|| lead(&mut Controller::new(&planner, replan, rollouts.memory())))
+}

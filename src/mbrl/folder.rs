@@ -1,0 +1,117 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::{Experience, Progress, Round, Run, RunError};
+use crate::data::{Columns, Log};
+use crate::model::Dynamics;
+use crate::report::write_whole;
+use crate::train::{Checkpoint, Origin, Training, save};
+
+const ROUNDS: &str = "rounds.jsonl";
+const CHECKPOINT: &str = "checkpoint";
+
+/// Where a run is kept: `stretch-000.csv` and on, what was seen of the plant; `rounds.jsonl`, a line for each round; and
+/// `checkpoint`, the last model. A run goes on from what lies there, and ends with the same numbers.
+pub struct Folder {
+    dir: PathBuf,
+    rounds: Vec<Round>,
+}
+
+impl Folder {
+    /// What lies in `dir`; it is made where it is missing.
+    ///
+    /// # Errors
+    /// A folder that cannot be made, or a damaged file.
+    pub fn open(dir: &Path) -> Result<Self, RunError> {
+        let saved = |path: &Path| {
+            let path = path.to_owned();
+            move |message| RunError::Saved { path, message }
+        };
+        fs::create_dir_all(dir).map_err(|error| saved(dir)(error.to_string()))?;
+        let path = dir.join(ROUNDS);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) => return Err(saved(&path)(error.to_string())),
+        };
+        let read = |(number, line): (usize, &str)| {
+            serde_json::from_str(line).map_err(|error| {
+                saved(&path)(format!(
+                    "line {}: {error}; remove {}",
+                    number + 1,
+                    dir.display()
+                ))
+            })
+        };
+        Ok(Self {
+            rounds: text
+                .lines()
+                .enumerate()
+                .map(read)
+                .collect::<Result<_, _>>()?,
+            dir: dir.to_owned(),
+        })
+    }
+
+    /// The rounds done so far.
+    pub fn rounds(&self) -> &[Round] {
+        &self.rounds
+    }
+
+    /// Where the last model is.
+    pub fn checkpoint(&self) -> PathBuf {
+        self.dir.join(CHECKPOINT)
+    }
+
+    /// The run as it was left, or begun. `dynamics` is what its model file says.
+    ///
+    /// # Errors
+    /// A damaged file, or a plant that diverges.
+    pub fn progress(&self, run: &Run<'_>, dynamics: &Dynamics) -> Result<Progress, RunError> {
+        let done = self.rounds.len();
+        if done == 0 {
+            let progress = run.begin()?;
+            self.write_stretch(&progress.experience.logs[0], 0)?;
+            return Ok(progress);
+        }
+        let columns = Columns::default();
+        let read = |number| Log::read(self.stretch(number), run.task.joints(), &columns);
+        let device = run.learner.backend.device();
+        let checkpoint = Checkpoint::load(&self.checkpoint())?;
+        Ok(Progress {
+            experience: Experience {
+                logs: (0..=done).map(read).collect::<Result<_, _>>()?,
+            },
+            model: Some(checkpoint.model(dynamics, &device)?),
+            rounds: done,
+        })
+    }
+
+    /// Keep what a round brought. Its line comes last: without it the round is done again.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn keep(
+        &mut self,
+        round: Round,
+        progress: &Progress,
+        training: &Training,
+        origin: &Origin,
+    ) -> Result<(), RunError> {
+        let logs = &progress.experience.logs;
+        self.write_stretch(&logs[logs.len() - 1], logs.len() - 1)?;
+        save(&self.checkpoint(), training, origin)?;
+        self.rounds.push(round);
+        let line = |round| serde_json::to_string(round).expect("numbers and texts") + "\n";
+        let lines: String = self.rounds.iter().map(line).collect();
+        Ok(write_whole(&self.dir.join(ROUNDS), lines.as_bytes())?)
+    }
+
+    fn stretch(&self, number: usize) -> PathBuf {
+        self.dir.join(format!("stretch-{number:03}.csv"))
+    }
+
+    fn write_stretch(&self, log: &Log, number: usize) -> Result<(), RunError> {
+        Ok(log.write(self.stretch(number))?)
+    }
+}

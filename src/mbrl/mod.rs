@@ -1,0 +1,16 @@
+//! Model-based reinforcement learning: train a model on what is known of a plant, control the plant with it, add what
+//! that showed to what is known, and again.
+
+mod error;
+mod experience;
+mod folder;
+mod learner;
+mod run;
+mod streams;
+
+pub use error::RunError;
+pub use experience::Experience;
+pub use folder::Folder;
+pub use learner::{Learner, Prior};
+pub use run::{Judged, Progress, Round, Run, Schedule};
+pub use streams::{Purpose, stream};

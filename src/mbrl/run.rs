@@ -1,0 +1,201 @@
+use serde::{Deserialize, Serialize};
+
+use super::{Experience, Learner, Purpose, RunError, stream};
+use crate::control::{Episode, Predictor, RandomTorque, Task, drive, episode, with_controller};
+use crate::data::Log;
+use crate::model::{Dynamics, HybridModel};
+use crate::plant::{Plant, Rig};
+use crate::train::Training;
+
+/// How much is gathered when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Schedule {
+    /// Transitions under random torques, before there is a model.
+    pub random: usize,
+    /// Transitions under control between two trainings: T. An episode of the task is a whole number of them.
+    pub gather: usize,
+    /// Trainings.
+    pub rounds: usize,
+}
+
+/// One run of the loop on one plant, with all that decides how it goes.
+pub struct Run<'a> {
+    pub task: &'a Task,
+    pub plant: &'a Plant,
+    pub learner: &'a Learner,
+    pub schedule: Schedule,
+    pub seed: u64,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Default)]
+pub struct Progress {
+    pub experience: Experience,
+    /// The model after the last round; none before the first.
+    pub model: Option<HybridModel>,
+    /// Rounds done.
+    pub rounds: usize,
+}
+
+/// What a round found: one line of its record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Round {
+    /// Counted from 0.
+    pub round: usize,
+    /// Real transitions that the model was trained on.
+    pub transitions: usize,
+    #[serde(flatten)]
+    pub judged: Judged,
+    /// Prediction error on them after training: mean of ||s' - s_hat'||^2.
+    pub error: f64,
+    /// ||F_r||
+    pub residual_norm: f64,
+    /// Name and value of the physical parameters.
+    pub parameters: Vec<(String, f64)>,
+}
+
+/// How an episode went that is not learnt from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judged {
+    /// The sum of rewards.
+    #[serde(rename = "return")]
+    pub total: f64,
+    /// Whether the goal held until the end.
+    pub success: bool,
+    /// Candidates of all plans whose rollout diverged.
+    pub diverged: usize,
+}
+
+impl Run<'_> {
+    /// Random data, before the first round.
+    ///
+    /// # Errors
+    /// A plant that diverges.
+    pub fn begin(&self) -> Result<Progress, RunError> {
+        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
+        let mut rig = self.rig(&dynamics, &values, 0);
+        let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random, 0));
+        let mut noise = stream(self.seed, Purpose::Gather, 0);
+        let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
+        Ok(Progress {
+            experience: Experience {
+                logs: vec![stretch.log],
+            },
+            ..Progress::default()
+        })
+    }
+
+    /// Train, judge and gather.
+    ///
+    /// # Errors
+    /// A loss that is no longer finite, or a plant that diverges.
+    pub fn round(&self, progress: &mut Progress) -> Result<(Round, Training), RunError> {
+        let (round, seed) = (progress.rounds, self.seed);
+        let segments = progress.experience.segments(self.task.joints())?;
+        let previous = progress.model.as_ref();
+        let training = self.learner.learn(&segments, previous, seed, round)?;
+        let model = training.result()?;
+        let predictor = Predictor::of_model(&model, self.learner.fit.integrator);
+        let judged = self.judge(&predictor, self.task.replan)?;
+        let last = training.history().last().expect("a run records its end");
+        let record = Round {
+            round,
+            transitions: segments.len(),
+            judged,
+            error: last.error,
+            residual_norm: last.residual_norm,
+            parameters: model.parameters(),
+        };
+        let gathered = self.gather(&predictor, progress)?;
+        progress.experience.logs.push(gathered);
+        progress.model = Some(model);
+        progress.rounds += 1;
+        Ok((record, training))
+    }
+
+    /// An episode that is not learnt from. It has the same start, noise and draws of candidates for every model, so that
+    /// models alone make the difference.
+    ///
+    /// # Errors
+    /// A plant that diverges.
+    pub fn judge(&self, predictor: &Predictor, replan: usize) -> Result<Judged, RunError> {
+        let (episode, diverged) = self.episode(predictor, replan)?;
+        Ok(Judged {
+            total: episode.total(),
+            success: episode.success,
+            diverged,
+        })
+    }
+
+    /// The same in full, and how many candidates diverged.
+    ///
+    /// # Errors
+    /// A plant that diverges.
+    pub fn episode(
+        &self,
+        predictor: &Predictor,
+        replan: usize,
+    ) -> Result<(Episode, usize), RunError> {
+        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
+        let mut rng = stream(self.seed, Purpose::Judge, 0);
+        let start = self.task.draw_start(&mut rng);
+        let mut rig = self.rig_from(&dynamics, &values, &start);
+        let draws = stream(self.seed, Purpose::JudgePlan, 0);
+        with_controller(predictor, self.task, replan, &draws, |controller| {
+            let episode = episode(self.task, &mut rig, controller, &mut rng)?;
+            Ok((episode, controller.diverged()))
+        })
+    }
+
+    fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
+        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
+        let mut rig = self.rig_now(&dynamics, &values, progress)?;
+        let of_round = |purpose| stream(self.seed, purpose, progress.rounds + 1);
+        let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
+        let steps = self.schedule.gather;
+        let stretch = with_controller(predictor, self.task, self.task.replan, &draws, |policy| {
+            drive(&mut rig, policy, steps, &mut noise)
+        })?;
+        Ok(stretch.log)
+    }
+
+    /// The plant where the last stretch under control left it: the torques held since the start of the episode bring it
+    /// there again. At the end of an episode it starts anew.
+    fn rig_now<'d>(
+        &self,
+        dynamics: &'d Dynamics,
+        values: &[f64],
+        progress: &Progress,
+    ) -> Result<Rig<'d>, RunError> {
+        let of_episode = self.task.steps / self.schedule.gather;
+        let (episode, begun) = (progress.rounds / of_episode, progress.rounds % of_episode);
+        let mut rig = self.rig(dynamics, values, 1 + episode);
+        let controlled = &progress.experience.logs[1..];
+        for log in &controlled[controlled.len() - begun..] {
+            for row in 0..log.rows() - 1 {
+                let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();
+                rig.step(&held)?;
+            }
+        }
+        Ok(rig)
+    }
+
+    fn rig<'d>(&self, dynamics: &'d Dynamics, values: &[f64], number: usize) -> Rig<'d> {
+        let mut rng = stream(self.seed, Purpose::Start, number);
+        self.rig_from(dynamics, values, &self.task.draw_start(&mut rng))
+    }
+
+    fn rig_from<'d>(&self, dynamics: &'d Dynamics, values: &[f64], start: &[f64]) -> Rig<'d> {
+        let (task, start) = (self.task, self.plant.as_read(start));
+        let settings = &task.plant;
+        Rig::new(
+            dynamics,
+            values,
+            &start,
+            settings.integrator,
+            task.step_s,
+            settings.noise,
+        )
+    }
+}

@@ -1,0 +1,107 @@
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::{Environment, PlantError};
+use crate::lanes::Row;
+use crate::model::{Dynamics, Integrator, Sensors};
+
+/// A plant under control: a torque is held for a step, then its state is measured.
+///
+/// How it moves within a step is its own affair: its integrator may be far finer than that of the model which plans
+/// for it.
+pub struct Rig<'d> {
+    environment: Environment<'d>,
+    sensors: Sensors<'d, 1>,
+    noise: Noise,
+    joints: usize,
+    state: Vec<f64>,
+    step_s: f64,
+    steps: u32,
+}
+
+/// Standard deviations of what is added to each measured number; white noise.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Noise {
+    /// In rad (or m).
+    pub position: f64,
+    /// In rad/s (or m/s).
+    pub velocity: f64,
+}
+
+impl<'d> Rig<'d> {
+    /// `dynamics` with parameters `values`, in its order, from `start` (positions, then velocities) in steps of
+    /// `step_s` seconds.
+    ///
+    /// # Panics
+    /// When `values` or `start` is not of the plant's size.
+    pub fn new(
+        dynamics: &'d Dynamics,
+        values: &[f64],
+        start: &[f64],
+        integrator: Integrator,
+        step_s: f64,
+        noise: Noise,
+    ) -> Self {
+        assert_eq!(start.len(), dynamics.states(), "one value for each state");
+        Self {
+            environment: Environment::new(dynamics, values, integrator, step_s),
+            sensors: Sensors::new(dynamics, values),
+            noise,
+            joints: dynamics.joints,
+            state: start.to_vec(),
+            step_s,
+            steps: 0,
+        }
+    }
+
+    /// The true state: positions, then velocities.
+    pub fn state(&self) -> &[f64] {
+        &self.state
+    }
+
+    /// Seconds since the start.
+    pub fn time_s(&self) -> f64 {
+        f64::from(self.steps) * self.step_s
+    }
+
+    /// Steps since the start.
+    pub fn steps(&self) -> usize {
+        self.steps as usize
+    }
+
+    /// What the sensors give for the state.
+    pub fn measure(&mut self, rng: &mut impl Rng) -> Vec<f64> {
+        let state: Vec<_> = self.state.iter().map(|x| Row([*x])).collect();
+        let acting = || self.environment.acting().into_iter().map(|x| Row([x]));
+        let time = Row([f64::from(self.steps) * self.step_s]);
+        let shown = self.sensors.show(&state, || acting().collect(), time);
+        let angles = shown
+            .iter()
+            .map(|Row([angle])| (*angle, self.noise.position));
+        let velocities = self.state[self.joints..].iter();
+        angles
+            .chain(velocities.map(|velocity| (*velocity, self.noise.velocity)))
+            .map(|(value, deviation)| {
+                let normal: f64 = StandardNormal.sample(rng);
+                value + deviation * normal
+            })
+            .collect()
+    }
+
+    /// Hold `tau` for a step.
+    ///
+    /// # Errors
+    /// A plant that diverges.
+    pub fn step(&mut self, tau: &[f64]) -> Result<(), PlantError> {
+        let from = self.time_s();
+        self.environment.step(&mut self.state, tau, from);
+        self.steps += 1;
+        if self.state.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        let time_s = self.time_s();
+        Err(PlantError::Diverged { time_s })
+    }
+}
