@@ -45,6 +45,7 @@ pub mod closeloop;
 pub mod control;
 pub mod data;
 pub mod evaluate;
+pub mod experiment;
 pub mod expr;
 pub mod identify;
 pub mod lanes;

@@ -9,7 +9,6 @@ use super::{Answer, Common, inputs};
 use crate::data::{LeaveOut, Log};
 use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
 use crate::model::{Dynamics, System};
-use crate::train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]
@@ -132,16 +131,8 @@ fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
         .checkpoint
         .as_ref()
         .expect("clap asks for one of both");
-    let checkpoint = Checkpoint::load(dir)?;
-    let system = System::from_text(
-        &dir.join("model.toml"),
-        &checkpoint.model_toml,
-        library.effects(),
-    )?;
-    let physics = system.dynamics(&system.sign());
-    let dynamics = checkpoint
-        .model(&physics, &arguments.common.device.device())?
-        .to_dynamics()?;
+    let (_, system, model) = inputs::checkpoint(dir, &library, arguments.common.device)?;
+    let dynamics = model.to_dynamics()?;
     Ok((system, dynamics))
 }
 

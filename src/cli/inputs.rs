@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 
 use crate::data::{LeaveOut, Log, leave_out};
-use crate::model::{Library, System};
+use crate::model::{HybridModel, Library, System};
+use crate::train::{Backend, Checkpoint};
 
 /// The built-in effects and those of the user's folders.
 pub(super) fn library(folders: &[PathBuf]) -> Result<Library> {
@@ -15,6 +16,20 @@ pub(super) fn library(folders: &[PathBuf]) -> Result<Library> {
         library = library.with_folder(folder)?;
     }
     Ok(library)
+}
+
+/// A checkpoint, the system that it belongs to, and its model.
+pub(super) fn checkpoint(
+    dir: &Path,
+    library: &Library,
+    backend: Backend,
+) -> Result<(Checkpoint, System, HybridModel)> {
+    let checkpoint = Checkpoint::load(dir)?;
+    let file = dir.join("model.toml");
+    let system = System::from_text(&file, &checkpoint.model_toml, library.effects())?;
+    let physics = system.dynamics(&system.sign());
+    let model = checkpoint.model(&physics, &backend.device())?;
+    Ok((checkpoint, system, model))
 }
 
 /// Read logs for a system and leave out what the user asks for; notes go to standard error.

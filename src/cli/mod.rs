@@ -3,7 +3,9 @@
 mod audit;
 mod bench;
 mod closeloop;
+mod control;
 mod evaluate;
+mod experiment;
 mod fitting;
 mod inputs;
 mod list;
@@ -40,6 +42,8 @@ enum Command {
     Tune(tune::Arguments),
     Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
+    Control(control::Arguments),
+    Experiment(experiment::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
@@ -75,6 +79,8 @@ pub fn main() -> ExitCode {
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Control(arguments) => control::run(&arguments),
+        Command::Experiment(arguments) => experiment::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),

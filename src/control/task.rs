@@ -164,6 +164,25 @@ impl Task {
             .collect()
     }
 
+    /// Whether it makes sense, for a plant of `joints` joints.
+    ///
+    /// # Errors
+    /// What does not, and the remedy.
+    pub fn check_for(&self, joints: usize) -> Result<(), TaskError> {
+        let sizes = match self.joints() {
+            found if found == joints => Ok(()),
+            found => Err(format!(
+                "`torque` needs a range for each of {joints} joints, found {found}"
+            )),
+        };
+        sizes
+            .and_then(|()| self.check())
+            .map_err(|message| TaskError {
+                path: self.path.clone(),
+                message,
+            })
+    }
+
     fn check(&self) -> Result<(), String> {
         let n = self.joints();
         if n == 0 {

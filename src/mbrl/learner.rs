@@ -1,6 +1,7 @@
 use std::ops::ControlFlow;
 
-use super::{Purpose, RunError, stream};
+use super::RunError;
+use crate::control::{Purpose, stream};
 use crate::model::{Dynamics, HybridModel, InputScaling, LastLayer, MlpSettings, MlpWeights};
 use crate::train::{Backend, FitSettings, Segments, Training};
 

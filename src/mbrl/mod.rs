@@ -6,11 +6,9 @@ mod experience;
 mod folder;
 mod learner;
 mod run;
-mod streams;
 
 pub use error::RunError;
 pub use experience::Experience;
 pub use folder::Folder;
 pub use learner::{Learner, Prior};
 pub use run::{Judged, Progress, Round, Run, Schedule};
-pub use streams::{Purpose, stream};

@@ -1,7 +1,9 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, Purpose, RunError, stream};
-use crate::control::{Episode, Predictor, RandomTorque, Task, drive, episode, with_controller};
+use super::{Experience, Learner, RunError};
+use crate::control::{
+    Episode, Predictor, Purpose, RandomTorque, Task, drive, episode, stream, with_controller,
+};
 use crate::data::Log;
 use crate::model::{Dynamics, HybridModel};
 use crate::plant::{Plant, Rig};

@@ -1,7 +1,7 @@
 use serde_json::Value;
 
 /// The first place within `place`, in order of keys, where two configurations differ, in words.
-pub(super) fn first_difference(place: &str, saved: &Value, mine: &Value) -> Option<String> {
+pub(crate) fn first_difference(place: &str, saved: &Value, mine: &Value) -> Option<String> {
     if let (Value::Object(saved), Value::Object(mine)) = (saved, mine) {
         let keys = saved.keys().chain(mine.keys());
         return keys

@@ -13,6 +13,7 @@ mod swept;
 mod tune;
 
 pub use data::{Data, Logged, Simulated};
+pub(crate) use difference::first_difference;
 pub use error::RecipeError;
 pub use file::{Kind, Recipe};
 pub use job::Job;

@@ -1,6 +1,7 @@
 //! What closing the loop found, for people and for programs.
 
 mod calibration;
+mod film;
 mod folder;
 mod json;
 mod model_file;
@@ -10,6 +11,7 @@ mod summary;
 mod tensorboard;
 mod text;
 
+pub use film::film;
 pub use folder::{WriteError, write, write_whole};
 pub use json::Report;
 pub use model_file::model_file;

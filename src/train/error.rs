@@ -26,6 +26,8 @@ pub enum TrainError {
     ErrorScale { states: usize, scale: Vec<f64> },
     #[error("setting `{name}` is {value}; it must be finite and not negative")]
     Setting { name: &'static str, value: f64 },
+    #[error("setting `anneal` is {0}; it is a share of the learning rates, above 0 and at most 1")]
+    Anneal(f64),
     #[error(
         "the loss became {loss} in epoch {epoch}, with {parameters}; look for outliers or wrong units \
          in the data, lower the learning rates, or take shorter segments or a finer integrator"

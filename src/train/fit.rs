@@ -128,6 +128,7 @@ impl Training {
             self.record(material)?;
         }
         while self.epoch < self.settings.epochs {
+            self.optimizer.anneal(self.settings.share_in(self.epoch));
             let Epoch { loss, error } = self.run_epoch(material)?;
             self.epoch += 1;
             self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);

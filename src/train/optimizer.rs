@@ -13,8 +13,10 @@ const ADAM_EPSILON: f32 = 1e-8;
 pub(super) struct Stepper<const D: usize> {
     adam: Adam,
     rates: [f64; 2],
-    /// By this factor they shrink before each step.
-    shrink: [f64; 2],
+    /// Each weight decays by this share of its learning rate.
+    decays: [f64; 2],
+    /// What is left of the learning rates.
+    share: f64,
     /// Of the prior and of the residual; none before their first step.
     moments: [Option<AdamState<D>>; 2],
 }
@@ -39,9 +41,15 @@ impl<const D: usize> Stepper<D> {
         Self {
             adam: AdamConfig::new().with_epsilon(ADAM_EPSILON).build(),
             rates: [prior, rates.residual],
-            shrink: [1.0 - prior * of_prior, 1.0 - rates.residual * decay],
+            decays: [of_prior, decay],
+            share: 1.0,
             moments: [None, None],
         }
+    }
+
+    /// Take the next steps at this share of the learning rates.
+    pub(super) fn anneal(&mut self, share: f64) {
+        self.share = share;
     }
 
     /// The tensors of prior and residual after a step against these gradients.
@@ -53,23 +61,29 @@ impl<const D: usize> Stepper<D> {
         let each = tensors
             .iter_mut()
             .zip(self.rates)
-            .zip(self.shrink)
+            .zip(self.decays)
             .zip(&mut self.moments);
-        for (((tensor, rate), shrink), moments) in each {
+        for (((tensor, rate), decay), moments) in each {
             let Some(numbers) = tensor.take() else {
                 continue;
             };
             if let Some(gradient) = numbers.grad_remove(&mut gradients) {
-                let plain = match shrink {
-                    1.0 => numbers.inner(),
-                    shrink => numbers.inner() * shrink,
-                };
+                let rate = rate * self.share;
+                let plain = decayed(numbers.inner(), rate * decay);
                 let (stepped, after) = self.adam.step(rate, plain, gradient, moments.take());
                 *moments = after.map(without_subnormals);
                 *tensor = Some(Tensor::from_inner(stepped));
             }
         }
         tensors
+    }
+}
+
+fn decayed<const D: usize>(numbers: Tensor<D>, share: f64) -> Tensor<D> {
+    if share > 0.0 {
+        numbers * (1.0 - share)
+    } else {
+        numbers
     }
 }
 

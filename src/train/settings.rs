@@ -11,6 +11,8 @@ use crate::model::Integrator;
 pub struct FitSettings {
     pub epochs: usize,
     pub learning_rates: LearningRates,
+    /// Share of the learning rates that is left in the last epoch; they fall by the same factor in each. 1 keeps them.
+    pub anneal: f64,
     /// By this share of its learning rate every number of a network shrinks at each step (decoupled weight decay,
     /// Loshchilov and Hutter 2019, arXiv:1711.05101). It keeps a network that has seen few data near to nothing where
     /// there are none. Physical parameters do not shrink.
@@ -52,6 +54,7 @@ impl Default for FitSettings {
         Self {
             epochs: 4000,
             learning_rates: LearningRates::default(),
+            anneal: 1.0,
             weight_decay: 0.0,
             batching: Batching::default(),
             penalty: Penalty::default(),
@@ -90,6 +93,15 @@ impl FitSettings {
                 return Err(TrainError::Setting { name, value });
             }
         }
+        if !(self.anneal > 0.0 && self.anneal <= 1.0) {
+            return Err(TrainError::Anneal(self.anneal));
+        }
         self.penalty.check()
+    }
+
+    /// The share of the learning rates in an epoch, counted from 0.
+    pub(super) fn share_in(&self, epoch: usize) -> f64 {
+        let last = self.epochs.saturating_sub(1).max(1);
+        self.anneal.powf(epoch as f64 / last as f64)
     }
 }

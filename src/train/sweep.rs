@@ -120,6 +120,7 @@ impl Sweep {
         let whole = self.columns(segments, &self.in_order(segments), 0..segments.len());
         let mut diverged = 0;
         for epoch in 1..=self.settings.epochs {
+            self.optimizer.anneal(self.settings.share_in(epoch - 1));
             let steps = self.run_epoch(segments, &whole);
             self.reweigh(steps);
             // Only now and then, since it waits for the device.

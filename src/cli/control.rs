@@ -1,0 +1,341 @@
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use serde::Serialize;
+
+use super::{Answer, Common, inputs, progress};
+use crate::control::{
+    Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
+};
+use crate::model::{Integrator, Library};
+use crate::plant::{Noise, Plant, Rig};
+use crate::report::{film, write_whole};
+
+/// Model-predictive control of a simulated plant by any model
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  residyn control --model pendulum --plant pendulum-real --episodes 3 --out episodes\n  \
+                  residyn control --checkpoint checkpoints/pendulum-sim --plant pendulum-sim"
+)]
+pub(super) struct Arguments {
+    /// Checkpoint of the model to plan with
+    #[arg(
+        long,
+        value_name = "DIR",
+        required_unless_present = "model",
+        conflicts_with = "model"
+    )]
+    checkpoint: Option<PathBuf>,
+    /// Model file to plan with, or the name of a built-in system
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Plant file, model file, or the name of a built-in plant or system
+    #[arg(long, value_name = "NAME")]
+    plant: PathBuf,
+    /// Task file, or the name of a built-in task; by default a built-in one of the plant's system
+    #[arg(long, value_name = "FILE")]
+    task: Option<PathBuf>,
+    #[arg(long, default_value_t = 1)]
+    episodes: usize,
+    /// Steps of a plan that are carried out before the next, instead of the task's
+    #[arg(long, value_name = "STEPS")]
+    replan: Option<usize>,
+    /// Positions, then velocities at the start, instead of the task's
+    #[arg(long, num_args = 1.., value_name = "NUMBER", allow_negative_numbers = true)]
+    start: Option<Vec<f64>>,
+    /// Largest torque of each joint in N m, instead of the task's bounds
+    #[arg(long, num_args = 1.., value_name = "NUMBER")]
+    torque: Option<Vec<f64>>,
+    /// Standard deviations of the sensors' noise: position and velocity
+    #[arg(long, num_args = 2, value_name = "NUMBER")]
+    noise: Option<Vec<f64>>,
+    /// Folder for each episode as a log and, where the task has a figure, as a film (SVG)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed {
+    schema: u32,
+    version: &'static str,
+    seed: u64,
+    plant: PathBuf,
+    task_name: String,
+    /// As resolved.
+    task: Task,
+    episodes: Vec<Entry>,
+    return_mean: f64,
+    /// Over episodes; 0 for one of them.
+    return_std: f64,
+    /// Episodes in which the goal held until the end.
+    successes: usize,
+}
+
+#[derive(Serialize)]
+struct Entry {
+    #[serde(rename = "return")]
+    total: f64,
+    success: bool,
+    decisions: usize,
+    ms_per_decision: f64,
+    /// Candidates of all plans whose rollout diverged.
+    diverged: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    film: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let library = inputs::library(&arguments.effects)?;
+    let plant = Plant::read(&arguments.plant, &library)?;
+    let task = task(arguments, &plant)?;
+    let predictor = predictor(arguments, &library, &task)?;
+    if predictor.joints() != task.joints() {
+        bail!(
+            "the model {} has {} joints, but the plant {} has {}; plan with a model of the plant's system",
+            predictor.system(),
+            predictor.joints(),
+            plant.system.name,
+            task.joints()
+        );
+    }
+    if let Some(out) = &arguments.out {
+        inputs::check_writable(out)?;
+        std::fs::create_dir_all(out)
+            .with_context(|| format!("{} cannot be made", out.display()))?;
+    }
+    let bar = progress::bar(arguments.episodes);
+    let mut entries = Vec::new();
+    for number in 0..arguments.episodes {
+        entries.push(one(arguments, &plant, &task, &predictor, number)?);
+        bar.inc(1);
+        bar.set_message("episodes");
+    }
+    bar.finish_and_clear();
+    let printed = Printed::new(arguments, task, entries);
+    let json = serde_json::to_string_pretty(&printed)? + "\n";
+    inputs::print(&if arguments.common.json {
+        json
+    } else {
+        table(&printed)
+    })?;
+    Ok(Answer::Yes)
+}
+
+/// The task, with what the command line says of it.
+fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
+    let system = &plant.system.name;
+    let mut task = match &arguments.task {
+        Some(path) => Task::read(path)?,
+        None => Task::of_system(system).with_context(|| {
+            let known = Task::names().join(", ");
+            format!("no built-in task is for {system}; give --task FILE (built in: {known})")
+        })?,
+    };
+    if task.system != *system || task.joints() != plant.system.joints {
+        bail!(
+            "the task {} is for {}, but the plant is {system}; give a --task for it",
+            task.name(),
+            task.system
+        );
+    }
+    let Arguments {
+        replan,
+        start,
+        torque,
+        noise,
+        ..
+    } = arguments;
+    if let Some(replan) = replan {
+        task.replan = *replan;
+    }
+    if let Some(start) = start {
+        task.start.clone_from(start);
+    }
+    if let Some(torque) = torque {
+        task.torque = torque.iter().map(|most| [-most, *most]).collect();
+    }
+    if let Some([position, velocity]) = noise.as_deref() {
+        task.plant.noise = Noise {
+            position: *position,
+            velocity: *velocity,
+        };
+    }
+    task.check_for(plant.system.joints)?;
+    Ok(task)
+}
+
+fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Predictor> {
+    if let Some(dir) = &arguments.checkpoint {
+        let device = arguments.common.device;
+        let (checkpoint, _, model) = inputs::checkpoint(dir, library, device)?;
+        return Ok(Predictor::of_model(
+            &model,
+            checkpoint.manifest.settings.integrator,
+        ));
+    }
+    let file = arguments.model.as_ref().expect("clap asks for one of both");
+    let system = library.system(file)?;
+    let integrator: Integrator = task.integrator;
+    Ok(Predictor::of_equations(
+        system.dynamics(&system.sign()),
+        integrator,
+    ))
+}
+
+fn one(
+    arguments: &Arguments,
+    plant: &Plant,
+    task: &Task,
+    predictor: &Predictor,
+    number: usize,
+) -> Result<Entry> {
+    let seed = arguments.common.seed;
+    let mut rng = stream(seed, Purpose::Judge, number);
+    let (dynamics, values) = (plant.dynamics(), plant.values());
+    let start = plant.as_read(&task.draw_start(&mut rng));
+    let settings = &task.plant;
+    let mut rig = Rig::new(
+        &dynamics,
+        &values,
+        &start,
+        settings.integrator,
+        task.step_s,
+        settings.noise,
+    );
+    let draws = stream(seed, Purpose::JudgePlan, number);
+    let (episode, timed) = with_controller(predictor, task, task.replan, &draws, |controller| {
+        let mut timed = Timed::new(controller);
+        let episode = episode(task, &mut rig, &mut timed, &mut rng)?;
+        Ok::<_, anyhow::Error>((episode, timed.effort()))
+    })?;
+    let (log, film) = written(arguments, task, &episode, number)?;
+    Ok(Entry {
+        total: episode.total(),
+        success: episode.success,
+        log,
+        film,
+        ..timed
+    })
+}
+
+/// Write the episode where it is asked for; the names of its files.
+fn written(
+    arguments: &Arguments,
+    task: &Task,
+    episode: &Episode,
+    number: usize,
+) -> Result<(Option<PathBuf>, Option<PathBuf>)> {
+    let Some(out) = &arguments.out else {
+        return Ok((None, None));
+    };
+    let name = |ending: &str| out.join(format!("episode-{number:03}.{ending}"));
+    let log = name("csv");
+    episode.stretch.log.write(&log)?;
+    let title = format!(
+        "{} on {}: return {:.1}",
+        task.name(),
+        arguments.plant.display(),
+        episode.total()
+    );
+    let Some(picture) = film(task, episode, &title)? else {
+        return Ok((Some(log), None));
+    };
+    let film = name("svg");
+    write_whole(&film, picture.as_bytes())?;
+    Ok((Some(log), Some(film)))
+}
+
+/// A controller and the time that its decisions take.
+struct Timed<'c, 'p, 'r> {
+    controller: &'c mut Controller<'p, 'r>,
+    deciding: Duration,
+}
+
+impl<'c, 'p, 'r> Timed<'c, 'p, 'r> {
+    fn new(controller: &'c mut Controller<'p, 'r>) -> Self {
+        Self {
+            controller,
+            deciding: Duration::ZERO,
+        }
+    }
+
+    /// An entry with what it took.
+    fn effort(&self) -> Entry {
+        let decisions = self.controller.decisions();
+        Entry {
+            total: 0.0,
+            success: false,
+            decisions,
+            ms_per_decision: 1e3 * self.deciding.as_secs_f64() / decisions as f64,
+            diverged: self.controller.diverged(),
+            log: None,
+            film: None,
+        }
+    }
+}
+
+impl Policy for Timed<'_, '_, '_> {
+    fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64> {
+        let began = Instant::now();
+        let torque = self.controller.torque(measured, time_s);
+        self.deciding += began.elapsed();
+        torque
+    }
+}
+
+impl Printed {
+    fn new(arguments: &Arguments, task: Task, episodes: Vec<Entry>) -> Self {
+        let count = episodes.len() as f64;
+        let mean = episodes.iter().map(|e| e.total).sum::<f64>() / count;
+        let squares = episodes.iter().map(|e| (e.total - mean).powi(2));
+        Self {
+            schema: 1,
+            version: env!("CARGO_PKG_VERSION"),
+            seed: arguments.common.seed,
+            plant: arguments.plant.clone(),
+            task_name: task.name(),
+            task,
+            return_mean: mean,
+            return_std: (squares.sum::<f64>() / (count - 1.0).max(1.0)).sqrt(),
+            successes: episodes.iter().filter(|e| e.success).count(),
+            episodes,
+        }
+    }
+}
+
+fn table(printed: &Printed) -> String {
+    let mut out = String::from("episode      return  success  decisions  ms/decision  diverged\n");
+    for (number, e) in printed.episodes.iter().enumerate() {
+        let success = if e.success { "yes" } else { "no" };
+        let _ = writeln!(
+            out,
+            "{number:>7}  {:>10.2}  {success:>7}  {:>9}  {:>11.2}  {:>8}",
+            e.total, e.decisions, e.ms_per_decision, e.diverged
+        );
+    }
+    let count = printed.episodes.len();
+    if count > 1 {
+        let _ = writeln!(
+            out,
+            "return {:.2}, standard deviation {:.2}; {} of {count} episodes succeed",
+            printed.return_mean, printed.return_std, printed.successes
+        );
+    }
+    for e in &printed.episodes {
+        for file in e.log.iter().chain(&e.film) {
+            let _ = writeln!(out, "{}", file.display());
+        }
+    }
+    out
+}

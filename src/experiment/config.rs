@@ -1,0 +1,126 @@
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::ExperimentError;
+use crate::model::MlpSettings;
+use crate::train::FitSettings;
+
+/// What an experiment compares, on which task and plant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// A task file as seen from here, or the name of a built-in one.
+    pub task: PathBuf,
+    /// A plant file as seen from here, or the name of a built-in one.
+    pub plant: PathBuf,
+    /// Each method is repeated with the seeds 0, 1, ... up to this number, this not included.
+    pub seeds: u64,
+    /// Transitions under random torques, before there is a model.
+    pub random: usize,
+    /// Transitions under control between two trainings: T.
+    pub gather: usize,
+    /// Receding horizons to be compared.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub replan: Vec<usize>,
+    /// The methods that learn.
+    pub method: Vec<MethodConfig>,
+    /// Where it was read from.
+    #[serde(skip)]
+    pub path: PathBuf,
+}
+
+/// A method that learns from the plant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MethodConfig {
+    pub name: String,
+    /// Its prior, where that is equations: a model file as seen from here, or the name of a built-in system.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<PathBuf>,
+    /// Its prior, where that is a trained model: a checkpoint as seen from here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoint: Option<PathBuf>,
+    /// Trainings.
+    pub rounds: usize,
+    /// The network that is added to the prior, or stands alone.
+    pub network: MlpSettings,
+    #[serde(default)]
+    pub fit: FitSettings,
+}
+
+impl Config {
+    /// Read a configuration.
+    ///
+    /// # Errors
+    /// Unreadable file, unknown key, numbers that make no sense: with place and remedy.
+    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ExperimentError::Open {
+            path: path.to_owned(),
+            source,
+        })?;
+        let wrong = |message| ExperimentError::File {
+            path: path.to_owned(),
+            message,
+        };
+        let mut config: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        path.clone_into(&mut config.path);
+        config.check().map_err(wrong)?;
+        Ok(config)
+    }
+
+    /// A file that it names or, where there is none, the name as it is: that of something built in.
+    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
+        let beside = self.path.parent().unwrap_or(Path::new("")).join(file);
+        if beside.exists() {
+            beside
+        } else {
+            file.to_owned()
+        }
+    }
+
+    pub(super) fn wrong(&self, message: String) -> ExperimentError {
+        ExperimentError::File {
+            path: self.path.clone(),
+            message,
+        }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let counts = [
+            ("seeds", self.seeds == 0),
+            ("random", self.random == 0),
+            ("gather", self.gather == 0),
+            ("[[method]]", self.method.is_empty()),
+            (
+                "rounds",
+                self.method.iter().any(|method| method.rounds == 0),
+            ),
+        ];
+        if let Some((name, _)) = counts.iter().find(|(_, none)| *none) {
+            return Err(format!("`{name}` must be at least 1"));
+        }
+        for (k, method) in self.method.iter().enumerate() {
+            let name = &method.name;
+            let sound = |c: char| c.is_ascii_alphanumeric() || c == '_';
+            if name.is_empty() || !name.chars().all(sound) {
+                return Err(format!(
+                    "the method {name:?} names a folder; write it in letters, digits and _"
+                ));
+            }
+            if [super::PRIOR, super::PERFECT].contains(&name.as_str())
+                || self.method[..k].iter().any(|other| other.name == *name)
+            {
+                return Err(format!(
+                    "the name `{name}` of a method is taken; choose another"
+                ));
+            }
+            if method.model.is_some() && method.checkpoint.is_some() {
+                return Err(format!(
+                    "method `{name}` has both `model` and `checkpoint`; its prior is one of them"
+                ));
+            }
+        }
+        Ok(())
+    }
+}

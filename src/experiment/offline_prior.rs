@@ -1,0 +1,20 @@
+//! Experiment 2: the prior is a network that was trained on a simulated plant, which lacks the friction of the real one.
+
+use super::Session;
+use crate::mbrl::Prior;
+
+pub(super) const NAME: &str = "offline-prior";
+
+pub(super) fn check(session: &Session) -> Result<(), String> {
+    let trained = |prior: &Prior| matches!(prior, Prior::Trained(_));
+    if session
+        .methods
+        .iter()
+        .any(|method| trained(&method.learner.prior))
+    {
+        return Ok(());
+    }
+    Err(format!(
+        "{NAME} needs a method whose prior is a trained model; give it a `checkpoint`"
+    ))
+}

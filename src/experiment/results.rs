@@ -1,0 +1,200 @@
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::mbrl::Judged;
+
+/// The name of the plant's own equations among the methods.
+pub const PERFECT: &str = "perfect";
+/// The name of the prior that does not learn.
+pub const PRIOR: &str = "prior";
+
+/// The share of the perfect model's return that counts as reached.
+const REACHED: f64 = 0.9;
+
+/// What came of an experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Results {
+    pub schema: u32,
+    pub experiment: String,
+    pub task: String,
+    pub seeds: Vec<u64>,
+    /// What entries of the methods stand for, where that is not their transitions: steps carried out of each plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub receding_horizon: Option<Vec<usize>>,
+    pub methods: BTreeMap<String, Course>,
+    /// What is read off the courses of the methods that learn.
+    pub reached: BTreeMap<String, Reached>,
+    /// The whole configuration, as resolved.
+    pub config: Value,
+    pub version: String,
+    /// Of all sessions that it took, in s; whoever keeps a clock fills it in.
+    pub wall_s: f64,
+    pub command: String,
+}
+
+/// A method's return, one entry for each amount of data or each receding horizon.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Course {
+    /// Real transitions that its model was trained on.
+    pub transitions: Vec<usize>,
+    pub return_mean: Vec<f64>,
+    /// Over seeds, of the sample.
+    pub return_std: Vec<f64>,
+    /// `[entry][seed]`
+    pub returns: Vec<Vec<f64>>,
+    /// Whether the goal of the task held until the end: `[entry][seed]`.
+    pub success: Vec<Vec<bool>>,
+}
+
+/// How far a method came.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reached {
+    /// Fewest real transitions with a mean return of 90 % of the perfect model's; none where it was not reached.
+    pub transitions_to_90_percent: Option<usize>,
+    /// Its mean return at the end over the perfect model's.
+    pub final_share_of_perfect: f64,
+    /// Seeds whose last episode is a success.
+    pub final_successes: usize,
+    /// Seeds with a higher return at the end than the prior without learning; none where there is no prior.
+    pub seeds_above_prior: Option<usize>,
+}
+
+impl Results {
+    pub(super) fn new(experiment: &str, task: &str, seeds: Vec<u64>, config: Value) -> Self {
+        Self {
+            schema: 1,
+            experiment: experiment.to_owned(),
+            task: task.to_owned(),
+            seeds,
+            receding_horizon: None,
+            methods: BTreeMap::new(),
+            reached: BTreeMap::new(),
+            config,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            wall_s: 0.0,
+            command: String::new(),
+        }
+    }
+
+    /// Fill in what is read off the courses; `command` took `wall_s` seconds.
+    #[must_use]
+    pub fn finished(mut self, command: String, wall_s: f64) -> Self {
+        let learnt = self
+            .methods
+            .iter()
+            .filter(|(name, _)| ![PRIOR, PERFECT].contains(&name.as_str()));
+        self.reached = learnt
+            .map(|(name, course)| (name.clone(), self.reached(course)))
+            .collect();
+        self.command = command;
+        self.wall_s = wall_s;
+        self
+    }
+
+    fn reached(&self, course: &Course) -> Reached {
+        let perfect = self.methods[PERFECT].return_mean[0];
+        let entries = course.transitions.iter().zip(&course.return_mean);
+        let mut enough = entries.filter(|(_, mean)| **mean >= REACHED * perfect);
+        let last = course.returns.len() - 1;
+        let above = |prior: &Course| {
+            let pairs = course.returns[last].iter().zip(&prior.returns[0]);
+            pairs.filter(|(mine, prior)| mine > prior).count()
+        };
+        Reached {
+            transitions_to_90_percent: match self.receding_horizon {
+                Some(_) => None,
+                None => enough.next().map(|(transitions, _)| *transitions),
+            },
+            final_share_of_perfect: course.return_mean[last] / perfect,
+            final_successes: course.success[last]
+                .iter()
+                .filter(|success| **success)
+                .count(),
+            seeds_above_prior: self.methods.get(PRIOR).map(above),
+        }
+    }
+
+    /// The results for people.
+    pub fn text(&self) -> String {
+        let mut out = format!(
+            "{}, {}, {} seeds\n",
+            self.experiment,
+            self.task,
+            self.seeds.len()
+        );
+        match &self.receding_horizon {
+            Some(horizons) => self.table_of_horizons(horizons, &mut out),
+            None => self.table_of_learning(&mut out),
+        }
+        let _ = writeln!(out, "{:.0} s: {}", self.wall_s, self.command);
+        out
+    }
+
+    fn table_of_learning(&self, out: &mut String) {
+        out.push_str(
+            "method                  return at the end   upright   of perfect   90 % of it after\n",
+        );
+        for (name, course) in &self.methods {
+            let last = course.returns.len() - 1;
+            let _ = write!(out, "{name:<22}  {}", course.entry(last));
+            if let Some(reached) = self.reached.get(name) {
+                let after = match reached.transitions_to_90_percent {
+                    Some(transitions) => format!("{transitions} transitions"),
+                    None => format!("not within {}", course.transitions[last]),
+                };
+                let _ = write!(out, "   {:>10.3}   {after}", reached.final_share_of_perfect);
+            }
+            out.push('\n');
+        }
+    }
+
+    fn table_of_horizons(&self, horizons: &[usize], out: &mut String) {
+        for (name, course) in &self.methods {
+            let _ = writeln!(out, "{name}, after {} transitions", course.transitions[0]);
+            for (entry, horizon) in horizons.iter().enumerate() {
+                let _ = writeln!(out, "  RH {horizon:>4}  {}", course.entry(entry));
+            }
+        }
+    }
+}
+
+impl Course {
+    fn entry(&self, entry: usize) -> String {
+        let upright = self.success[entry]
+            .iter()
+            .filter(|success| **success)
+            .count();
+        let seeds = self.success[entry].len();
+        let (mean, std) = (self.return_mean[entry], self.return_std[entry]);
+        format!("{mean:>9.1} +- {std:>6.1}   {upright:>3}/{seeds:<3}")
+    }
+}
+
+/// Entries one after the other: transitions, and how the episode of each seed went.
+impl FromIterator<(usize, Vec<Judged>)> for Course {
+    fn from_iter<I: IntoIterator<Item = (usize, Vec<Judged>)>>(entries: I) -> Self {
+        let mut course = Self::default();
+        for (transitions, judged) in entries {
+            let returns: Vec<f64> = judged.iter().map(|judged| judged.total).collect();
+            let count = returns.len() as f64;
+            let mean = returns.iter().sum::<f64>() / count;
+            let squares = returns
+                .iter()
+                .map(|total| (total - mean).powi(2))
+                .sum::<f64>();
+            course.transitions.push(transitions);
+            course.return_mean.push(mean);
+            course
+                .return_std
+                .push((squares / (count - 1.0).max(1.0)).sqrt());
+            course.returns.push(returns);
+            course
+                .success
+                .push(judged.iter().map(|judged| judged.success).collect());
+        }
+        course
+    }
+}
