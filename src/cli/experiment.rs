@@ -60,21 +60,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     inputs::check_writable(out)?;
     let library = inputs::library(effects)?;
     let experiment = Experiment::from(*name);
-    let session = Session::open(
-        experiment,
-        Config::read(config)?,
-        out,
-        &library,
-        common.device,
-    )?;
+    let session = Session::open(Config::read(config)?, &library, common.device)?;
     let clock = Clock::open(out, began)?;
     let bar = progress::bar(session.rounds());
-    let results = session.run(&|step: &Step<'_>| {
+    let results = session.carry_out(experiment, out, &|step: &Step<'_>| {
         bar.inc(1);
-        bar.set_message(format!(
-            "rounds; {} seed {}: {} transitions, return {:.1}",
-            step.method, step.seed, step.round.transitions, step.round.judged.total
-        ));
+        bar.set_message(message(step));
         if !step.found {
             clock.save();
         }
@@ -97,6 +88,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         text(&results, out)
     })?;
     Ok(Answer::Yes)
+}
+
+/// For the progress bar.
+pub(super) fn message(step: &Step<'_>) -> String {
+    let Step {
+        method,
+        seed,
+        round,
+        ..
+    } = step;
+    let (transitions, total) = (round.transitions, round.judged.total);
+    format!("rounds; {method} seed {seed}: {transitions} transitions, return {total:.1}")
 }
 
 fn text(results: &Results, out: &Path) -> String {

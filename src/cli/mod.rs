@@ -9,6 +9,7 @@ mod experiment;
 mod fitting;
 mod inputs;
 mod list;
+mod mbrl;
 mod progress;
 mod simulate;
 mod sweep;
@@ -43,6 +44,7 @@ enum Command {
     Sweep(sweep::Arguments),
     Evaluate(evaluate::Arguments),
     Control(control::Arguments),
+    Mbrl(mbrl::Arguments),
     Experiment(experiment::Arguments),
     Simulate(simulate::Arguments),
     List(list::Arguments),
@@ -80,6 +82,7 @@ pub fn main() -> ExitCode {
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Control(arguments) => control::run(&arguments),
+        Command::Mbrl(arguments) => mbrl::run(&arguments),
         Command::Experiment(arguments) => experiment::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::List(arguments) => list::run(&arguments),

@@ -1,8 +1,8 @@
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::session::equations;
+use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
@@ -95,8 +95,7 @@ impl Method {
         &self,
         run: &Run<'_>,
         dir: &Path,
-        resolved: &Value,
-        observer: &(dyn Fn(&Step<'_>) + Sync),
+        observer: Observer<'_>,
     ) -> Result<Learnt, RunError> {
         let mut folder = Folder::open(dir)?;
         let told = |round: &Round, found: bool| {
@@ -114,7 +113,13 @@ impl Method {
         while progress.rounds < self.config.rounds {
             let (round, training) = run.round(&mut progress)?;
             let origin = Origin {
-                config: json!({"method": self.config, "of": resolved, "round": round.round}),
+                config: json!({
+                    "command": "mbrl",
+                    "method": self.config,
+                    "task": run.task,
+                    "schedule": run.schedule,
+                    "round": round.round,
+                }),
                 seed: run.seed,
                 model_toml: self.model_toml.clone(),
             };

@@ -16,4 +16,4 @@ pub use error::ExperimentError;
 pub use learning::Step;
 pub use picture::picture;
 pub use results::{Course, PERFECT, PRIOR, Reached, Results};
-pub use session::{Experiment, Session};
+pub use session::{Experiment, Observer, Session};

@@ -1,6 +1,6 @@
 //! The ablation: models that have seen the same plant, under plans that are followed for longer and longer.
 
-use super::learning::Step;
+use super::learning::Learnt;
 use super::results::{Course, Results};
 use super::{ExperimentError, Session};
 use crate::control::Predictor;
@@ -20,19 +20,19 @@ pub(super) fn check(session: &Session) -> Result<(), String> {
     }
 }
 
-pub(super) fn run(
+/// Let what was learnt be judged under every receding horizon.
+pub(super) fn compare(
     session: &Session,
-    observer: &(dyn Fn(&Step<'_>) + Sync),
-) -> Result<Results, ExperimentError> {
-    let learnt = session.learn(observer)?;
-    let mut results = session.results();
+    learnt: &[Vec<Learnt>],
+    results: &mut Results,
+) -> Result<(), ExperimentError> {
     results.receding_horizon = Some(session.config.replan.clone());
     let over_horizons = |predictor: &(dyn Fn(usize) -> Predictor + Sync), seen, name: &str| {
         let each = session.config.replan.iter();
         each.map(|replan| Ok((seen, session.judge_all(predictor, *replan, name)?)))
             .collect::<Result<Course, ExperimentError>>()
     };
-    for (method, runs) in session.methods.iter().zip(&learnt) {
+    for (method, runs) in session.methods.iter().zip(learnt) {
         let name = &method.config.name;
         let seen = runs[0].rounds.last().map_or(0, |round| round.transitions);
         let course = over_horizons(&|seed| method.predictor(&runs[seed].model), seen, name)?;
@@ -42,5 +42,5 @@ pub(super) fn run(
         let course = over_horizons(&|_| predictor.clone(), 0, name)?;
         results.methods.insert(name.to_owned(), course);
     }
-    Ok(results)
+    Ok(())
 }

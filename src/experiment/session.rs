@@ -1,4 +1,4 @@
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -22,17 +22,17 @@ pub enum Experiment {
     RecedingHorizon,
 }
 
-/// An experiment with all that it names read: ready to be carried out, or to go on.
+/// A configuration with all that it names read.
 pub struct Session {
-    pub experiment: Experiment,
     pub config: Config,
     pub(super) task: Task,
     pub(super) plant: Plant,
     pub(super) methods: Vec<Method>,
-    out: PathBuf,
-    /// As resolved.
-    resolved: Value,
+    backend: Backend,
 }
+
+/// Who is told of every round, those found done included.
+pub type Observer<'o> = &'o (dyn Fn(&Step<'_>) + Sync);
 
 const CONFIG: &str = "experiment.json";
 
@@ -62,14 +62,12 @@ impl Experiment {
 }
 
 impl Session {
-    /// Read what `config` names, and look into `out` for what is there already.
+    /// Read what `config` names.
     ///
     /// # Errors
-    /// Files that cannot be read or do not belong together, or an `out` with another experiment.
+    /// Files that cannot be read or do not belong together.
     pub fn open(
-        experiment: Experiment,
         config: Config,
-        out: &Path,
         library: &Library,
         backend: Backend,
     ) -> Result<Self, ExperimentError> {
@@ -94,53 +92,106 @@ impl Session {
         let methods = (config.method.iter())
             .map(|method| Method::read(method, &config, &plant.system, library, backend))
             .collect::<Result<_, _>>()?;
-        let resolved = json!({
-            "experiment": experiment.name(),
-            "config": config,
-            "task": task,
-            "device": backend.name(),
-        });
-        let session = Self {
-            experiment,
+        Ok(Self {
             config,
             task,
             plant,
             methods,
-            out: out.to_owned(),
-            resolved,
-        };
-        experiment
-            .check(&session)
-            .map_err(|message| session.config.wrong(message))?;
-        session.claim()?;
-        Ok(session)
+            backend,
+        })
     }
 
     /// Trainings of all methods and seeds.
     pub fn rounds(&self) -> usize {
         let each = self.methods.iter().map(|method| method.config.rounds);
-        self.seeds().count() * each.sum::<usize>()
+        self.seeds().len() * each.sum::<usize>()
     }
 
-    /// Carry it out, or go on with it; `observer` is told of every round, those found done included.
+    /// Trainings of one run of a method; 0 where it is unknown.
+    pub fn rounds_of(&self, method: &str) -> usize {
+        let mut methods = self.methods.iter();
+        methods
+            .find(|known| known.config.name == method)
+            .map_or(0, |known| known.config.rounds)
+    }
+
+    /// Carry out an experiment in the folder `out`, or go on with it.
     ///
     /// # Errors
-    /// A run that diverges, or files that cannot be read or written.
-    pub fn run(&self, observer: &(dyn Fn(&Step<'_>) + Sync)) -> Result<Results, ExperimentError> {
-        match self.experiment {
-            Experiment::PhysicsPrior | Experiment::OfflinePrior => self.learning_curves(observer),
-            Experiment::RecedingHorizon => receding_horizon::run(self, observer),
+    /// A configuration that is not one of this experiment, an `out` that holds another one, a run that diverges, or
+    /// files that cannot be read or written.
+    pub fn carry_out(
+        &self,
+        experiment: Experiment,
+        out: &Path,
+        observer: Observer<'_>,
+    ) -> Result<Results, ExperimentError> {
+        experiment
+            .check(self)
+            .map_err(|message| self.config.wrong(message))?;
+        let resolved = self.resolved(experiment.name());
+        claim(out, &resolved)?;
+        let learnt = self.learn(out, observer)?;
+        let mut results =
+            Results::new(experiment.name(), &self.task.name(), self.seeds(), resolved);
+        match experiment {
+            Experiment::PhysicsPrior | Experiment::OfflinePrior => {
+                self.learning_curves(&learnt, &mut results)?;
+            }
+            Experiment::RecedingHorizon => receding_horizon::compare(self, &learnt, &mut results)?,
         }
+        Ok(results)
+    }
+
+    /// One run of the loop, with the method of this name, in the folder `dir`; or what is left of it.
+    ///
+    /// # Errors
+    /// An unknown method, a `dir` that holds another run, or as [`Session::carry_out`].
+    pub fn run_alone(
+        &self,
+        method: &str,
+        seed: u64,
+        dir: &Path,
+        observer: Observer<'_>,
+    ) -> Result<(), ExperimentError> {
+        let Some(method) = self
+            .methods
+            .iter()
+            .find(|known| known.config.name == method)
+        else {
+            let known: Vec<&str> = self
+                .methods
+                .iter()
+                .map(|m| m.config.name.as_str())
+                .collect();
+            return Err(self.config.wrong(format!(
+                "it has no method `{method}`; choose from {}",
+                known.join(", ")
+            )));
+        };
+        let mut resolved = self.resolved("none");
+        resolved["seed"] = json!(seed);
+        resolved["method"] = json!(method.config.name);
+        claim(dir, &resolved)?;
+        self.learn_one(method, seed, dir, observer).map(drop)
+    }
+
+    fn resolved(&self, experiment: &str) -> Value {
+        json!({
+            "experiment": experiment,
+            "config": self.config,
+            "task": self.task,
+            "device": self.backend.name(),
+        })
     }
 
     /// The return of every method against the real transitions that it has seen.
     fn learning_curves(
         &self,
-        observer: &(dyn Fn(&Step<'_>) + Sync),
-    ) -> Result<Results, ExperimentError> {
-        let learnt = self.learn(observer)?;
-        let mut results = self.results();
-        for (method, runs) in self.methods.iter().zip(&learnt) {
+        learnt: &[Vec<Learnt>],
+        results: &mut Results,
+    ) -> Result<(), ExperimentError> {
+        for (method, runs) in self.methods.iter().zip(learnt) {
             let rounds = (0..method.config.rounds).map(|round| {
                 let judged = runs
                     .iter()
@@ -159,18 +210,29 @@ impl Session {
                 .methods
                 .insert(name.to_owned(), Course::from_iter([(0, judged)]));
         }
-        Ok(results)
+        Ok(())
     }
 
     /// Train every method with every seed: `[method][seed]`.
-    pub(super) fn learn(
+    fn learn(
         &self,
-        observer: &(dyn Fn(&Step<'_>) + Sync),
+        out: &Path,
+        observer: Observer<'_>,
     ) -> Result<Vec<Vec<Learnt>>, ExperimentError> {
-        let of_seed = |seed| self.methods.iter().map(move |method| (method, seed));
-        let units: Vec<(&Method, u64)> = self.seeds().flat_map(of_seed).collect();
-        let learnt: Vec<Learnt> = (units.into_par_iter().with_max_len(1))
-            .map(|(method, seed)| self.learn_one(method, seed, observer))
+        let seeds = self.seeds().into_iter();
+        let units: Vec<(&Method, u64)> = seeds
+            .flat_map(|seed| self.methods.iter().map(move |method| (method, seed)))
+            .collect();
+        let learn = |(method, seed): (&Method, u64)| {
+            let dir = out
+                .join("runs")
+                .join(format!("{}-{seed:02}", method.config.name));
+            self.learn_one(method, seed, &dir, observer)
+        };
+        let learnt: Vec<Learnt> = units
+            .into_par_iter()
+            .with_max_len(1)
+            .map(learn)
             .collect::<Result<_, _>>()?;
         let mut by_method: Vec<Vec<Learnt>> = self.methods.iter().map(|_| Vec::new()).collect();
         for (unit, run) in learnt.into_iter().enumerate() {
@@ -183,13 +245,10 @@ impl Session {
         &self,
         method: &Method,
         seed: u64,
-        observer: &(dyn Fn(&Step<'_>) + Sync),
+        dir: &Path,
+        observer: Observer<'_>,
     ) -> Result<Learnt, ExperimentError> {
-        let dir = self
-            .out
-            .join("runs")
-            .join(format!("{}-{seed:02}", method.config.name));
-        let learnt = method.learn(&self.run_of(method, seed), &dir, &self.resolved, observer);
+        let learnt = method.learn(&self.run_of(method, seed), dir, observer);
         learnt.map_err(|source| ExperimentError::Run {
             method: method.config.name.clone(),
             seed,
@@ -204,7 +263,6 @@ impl Session {
         replan: usize,
         method: &str,
     ) -> Result<Vec<Judged>, ExperimentError> {
-        let seeds: Vec<u64> = self.seeds().collect();
         let judge = |seed: u64| {
             let run = self.run_of(&self.methods[0], seed);
             #[allow(clippy::cast_possible_truncation)] // few seeds
@@ -215,7 +273,11 @@ impl Session {
                 source,
             })
         };
-        seeds.into_par_iter().with_max_len(1).map(judge).collect()
+        self.seeds()
+            .into_par_iter()
+            .with_max_len(1)
+            .map(judge)
+            .collect()
     }
 
     /// The methods that do not learn.
@@ -239,20 +301,11 @@ impl Session {
         Predictor::of_equations(dynamics, self.task.integrator)
     }
 
-    pub(super) fn results(&self) -> Results {
-        Results::new(
-            self.experiment.name(),
-            &self.task.name(),
-            self.seeds().collect(),
-            self.resolved.clone(),
-        )
+    fn seeds(&self) -> Vec<u64> {
+        (0..self.config.seeds).collect()
     }
 
-    fn seeds(&self) -> std::ops::Range<u64> {
-        0..self.config.seeds
-    }
-
-    pub(super) fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {
+    fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {
         Run {
             task: &self.task,
             plant: &self.plant,
@@ -265,31 +318,27 @@ impl Session {
             seed,
         }
     }
+}
 
-    /// Say in `out` what is done there, or find that it is this.
-    fn claim(&self) -> Result<(), ExperimentError> {
-        let path = self.out.join(CONFIG);
-        let failed = |error: std::io::Error| ExperimentError::File {
-            path: path.clone(),
-            message: error.to_string(),
-        };
-        std::fs::create_dir_all(&self.out).map_err(failed)?;
-        match std::fs::read_to_string(&path) {
-            Ok(text) => {
-                let saved: Value = serde_json::from_str(&text).map_err(|e| failed(e.into()))?;
-                match first_difference("experiment", &saved, &self.resolved) {
-                    Some(difference) => Err(ExperimentError::Other {
-                        dir: self.out.clone(),
-                        difference,
-                    }),
-                    None => Ok(()),
-                }
-            }
-            Err(_) => {
-                let text = serde_json::to_string_pretty(&self.resolved).expect("a JSON value");
-                Ok(write_whole(&path, (text + "\n").as_bytes())?)
-            }
-        }
+/// Say in `dir` what is done there, or find that it is this.
+fn claim(dir: &Path, resolved: &Value) -> Result<(), ExperimentError> {
+    let path = dir.join(CONFIG);
+    let failed = |error: std::io::Error| ExperimentError::File {
+        path: path.clone(),
+        message: error.to_string(),
+    };
+    std::fs::create_dir_all(dir).map_err(failed)?;
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        let text = serde_json::to_string_pretty(resolved).expect("a JSON value");
+        return Ok(write_whole(&path, (text + "\n").as_bytes())?);
+    };
+    let saved: Value = serde_json::from_str(&text).map_err(|error| failed(error.into()))?;
+    match first_difference("experiment", &saved, resolved) {
+        Some(difference) => Err(ExperimentError::Other {
+            dir: dir.to_owned(),
+            difference,
+        }),
+        None => Ok(()),
     }
 }
 

@@ -36,6 +36,8 @@ impl<const D: usize> Stepper<D> {
         let (rates, decay) = (&settings.learning_rates, settings.weight_decay);
         let (prior, of_prior) = match frame.equations {
             Some(_) => (rates.physics, 0.0),
+            // Below a residual it knows from elsewhere what it must not forget.
+            None if frame.has_residual => (rates.prior, 0.0),
             None => (rates.prior, decay),
         };
         Self {

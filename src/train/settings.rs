@@ -13,9 +13,9 @@ pub struct FitSettings {
     pub learning_rates: LearningRates,
     /// Share of the learning rates that is left in the last epoch; they fall by the same factor in each. 1 keeps them.
     pub anneal: f64,
-    /// By this share of its learning rate every number of a network shrinks at each step (decoupled weight decay,
-    /// Loshchilov and Hutter 2019, arXiv:1711.05101). It keeps a network that has seen few data near to nothing where
-    /// there are none. Physical parameters do not shrink.
+    /// By this share of the learning rate every number of the residual or, in a model without one, of the network that
+    /// is the model shrinks at each step (decoupled weight decay, Loshchilov and Hutter 2019, arXiv:1711.05101). It keeps
+    /// a network near to nothing where there are no data.
     pub weight_decay: f64,
     pub batching: Batching,
     pub penalty: Penalty,

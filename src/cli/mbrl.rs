@@ -1,0 +1,122 @@
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use anyhow::Result;
+use clap::Args;
+use serde_json::json;
+
+use super::experiment::message;
+use super::{Answer, Common, inputs, progress};
+use crate::experiment::{Config, Session, Step};
+use crate::mbrl::Round;
+use crate::report::EventFile;
+
+/// Model-based reinforcement learning: train, control, add what was seen, and again
+///
+/// One run of one method of an experiment's configuration, with --seed. The same command goes on with a run that was
+/// interrupted, and ends with the same numbers.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  residyn mbrl --config configs/physics-prior/pendulum.toml --method hybrid --out run --seed 1"
+)]
+pub(super) struct Arguments {
+    /// An experiment's configuration
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Which of its methods
+    #[arg(long, value_name = "NAME", default_value = "hybrid")]
+    method: String,
+    /// Folder for rounds.jsonl, the stretches of motion as logs, and the last checkpoint
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Folder for an event file of the rounds done now, for TensorBoard
+    #[arg(long, value_name = "DIR")]
+    tensorboard: Option<PathBuf>,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let Arguments {
+        config,
+        method,
+        out,
+        tensorboard,
+        effects,
+        common,
+    } = arguments;
+    inputs::check_writable(out)?;
+    let library = inputs::library(effects)?;
+    let session = Session::open(Config::read(config)?, &library, common.device)?;
+    let events = match tensorboard {
+        Some(folder) => Some(Mutex::new(EventFile::create(folder, now_s())?)),
+        None => None,
+    };
+    let rounds = Mutex::new(Vec::new());
+    let failed = Mutex::new(None);
+    let bar = progress::bar(session.rounds_of(method));
+    let ended = session.run_alone(method, common.seed, out, &|step: &Step<'_>| {
+        bar.inc(1);
+        bar.set_message(message(step));
+        locked(&rounds).push(step.round.clone());
+        if let (Some(events), false) = (&events, step.found)
+            && let Err(error) = tell(&mut locked(events), step.round)
+        {
+            *locked(&failed) = Some(error);
+        }
+    });
+    bar.finish_and_clear();
+    ended?;
+    if let Some(error) = locked(&failed).take() {
+        return Err(error);
+    }
+    let rounds = locked(&rounds);
+    if common.json {
+        let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
+        inputs::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
+    } else {
+        inputs::print(&table(&rounds, out))?;
+    }
+    Ok(Answer::Yes)
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// Seconds since 1970, as event files have it.
+fn now_s() -> f64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0.0, |since| since.as_secs_f64())
+}
+
+fn tell(events: &mut EventFile, round: &Round) -> Result<()> {
+    let step = i64::try_from(round.transitions)?;
+    let mut scalar = |tag: &str, value: f64| events.scalar(tag, step, now_s(), value);
+    scalar("return", round.judged.total)?;
+    scalar("success", f64::from(u8::from(round.judged.success)))?;
+    scalar("prediction error", round.error)?;
+    scalar("residual norm", round.residual_norm)?;
+    for (name, value) in &round.parameters {
+        scalar(&format!("parameter/{name}"), *value)?;
+    }
+    Ok(())
+}
+
+fn table(rounds: &[Round], out: &Path) -> String {
+    let mut text = String::from("transitions      return  success  prediction error   ||F_r||\n");
+    for round in rounds {
+        let success = if round.judged.success { "yes" } else { "no" };
+        text += &format!(
+            "{:>11}  {:>10.2}  {success:>7}  {:>16.3e}  {:>8.4}\n",
+            round.transitions, round.judged.total, round.error, round.residual_norm
+        );
+    }
+    text + &format!("checkpoint: {}\n", out.join("checkpoint").display())
+}
