@@ -34,7 +34,7 @@ fn demo() -> &'static Path {
 }
 
 /// Run one of the scripts in `tests/clients`; without an interpreter, say so where nobody misses it.
-fn client(script: &str, arguments: &[&Path]) {
+pub fn client(script: &str, arguments: &[&Path]) {
     let Some(python) = std::env::var_os("RESIDYN_PYTHON") else {
         let note = format!("SKIPPED {script}: RESIDYN_PYTHON is not set; run tests/run\n");
         // Not eprintln!, which the test harness swallows.

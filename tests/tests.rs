@@ -8,6 +8,7 @@ mod bad_input;
 mod bench;
 mod clients;
 mod common;
+mod control;
 mod demo;
 mod effects;
 mod experiments;

@@ -11,6 +11,7 @@ use crate::control::{
     Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
 };
 use crate::model::{Integrator, Library};
+use crate::plan::Method;
 use crate::plant::{Noise, Plant, Rig};
 use crate::report::{film, write_whole};
 
@@ -43,6 +44,9 @@ pub(super) struct Arguments {
     /// Steps of a plan that are carried out before the next, instead of the task's
     #[arg(long, value_name = "STEPS")]
     replan: Option<usize>,
+    /// How plans are searched for, instead of the task's method; with that method's usual settings
+    #[arg(long, value_name = "METHOD", value_parser = Method::NAMES)]
+    method: Option<String>,
     /// Positions, then velocities at the start, instead of the task's
     #[arg(long, num_args = 1.., value_name = "NUMBER", allow_negative_numbers = true)]
     start: Option<Vec<f64>>,
@@ -151,6 +155,7 @@ fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
     }
     let Arguments {
         replan,
+        method,
         start,
         torque,
         noise,
@@ -158,6 +163,10 @@ fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
     } = arguments;
     if let Some(replan) = replan {
         task.replan = *replan;
+    }
+    if let Some(method) = method {
+        let usual = Method::usual(method, task.planner.population);
+        task.planner.method = usual.expect("clap knows the names");
     }
     if let Some(start) = start {
         task.start.clone_from(start);

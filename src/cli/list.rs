@@ -6,9 +6,11 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
+use crate::control::Task;
 use crate::model::{Effect, Library, System};
+use crate::plant::Plant;
 
-/// What there is: systems, effects or formats
+/// What there is: systems, effects, plants, tasks or formats
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn list effects")]
 pub(super) struct Arguments {
@@ -24,6 +26,8 @@ pub(super) struct Arguments {
 enum What {
     Systems,
     Effects,
+    Plants,
+    Tasks,
     Formats,
 }
 
@@ -32,12 +36,14 @@ const FORMATS: &[(&str, &str)] = &[
     ("csv", "logs, in and out"),
     (
         "toml",
-        "models, effects, plants and recipes, in; fitted models, out",
+        "models, effects, plants, tasks and recipes, in; fitted models, out",
     ),
     ("safetensors", "weights of checkpoints, in and out"),
     ("json", "reports and results, out"),
     ("markdown", "reports, out"),
-    ("svg", "plots, out"),
+    ("svg", "plots and films of episodes, out"),
+    ("jsonl", "rounds of the learning loop, in and out"),
+    ("tfevents", "scalars for TensorBoard, out"),
 ];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
@@ -45,6 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (text, value) = match arguments.what {
         What::Systems => systems(&library)?,
         What::Effects => effects(library.effects()),
+        What::Plants => plants(&library)?,
+        What::Tasks => tasks()?,
         What::Formats => formats(),
     };
     let json = serde_json::to_string_pretty(&value)? + "\n";
@@ -89,6 +97,38 @@ fn effects(effects: &[Effect]) -> (String, serde_json::Value) {
         }));
     }
     (text, values.into())
+}
+
+fn plants(library: &Library) -> Result<(String, serde_json::Value)> {
+    let (mut text, mut values) = (String::new(), Vec::new());
+    for name in Plant::names() {
+        let plant = Plant::read(Path::new(name), library)?;
+        let effects: Vec<String> = (plant.effects.iter())
+            .map(|e| format!("{} on joint {}", e.effect.name, e.joint + 1))
+            .collect();
+        let with = if effects.is_empty() {
+            "no effects".to_owned()
+        } else {
+            effects.join(", ")
+        };
+        let _ = writeln!(text, "{name}: {} with {with}", plant.system.name);
+        values.push(json!({"name": name, "system": plant.system.name, "effects": effects}));
+    }
+    Ok((text, values.into()))
+}
+
+fn tasks() -> Result<(String, serde_json::Value)> {
+    let (mut text, mut values) = (String::new(), Vec::new());
+    for name in Task::names() {
+        let task = Task::read(Path::new(name))?;
+        let _ = writeln!(
+            text,
+            "{name}: {}\n    maximises {}",
+            task.about, task.objective
+        );
+        values.push(json!({"name": name, "system": task.system, "about": task.about, "objective": task.objective}));
+    }
+    Ok((text, values.into()))
 }
 
 fn formats() -> (String, serde_json::Value) {

@@ -7,6 +7,9 @@ mod folder;
 mod learner;
 mod run;
 
+#[cfg(test)]
+mod tests;
+
 pub use error::RunError;
 pub use experience::Experience;
 pub use folder::Folder;

@@ -428,3 +428,35 @@ pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
         reading: None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{InputScaling, LastLayer, MlpSettings, MlpWeights, network_dynamics};
+
+    #[test]
+    fn a_network_with_other_scaling_is_the_same_function() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let settings = MlpSettings::for_joints(1);
+        let scaling = InputScaling {
+            mean: vec![0.3, -1.0, 0.1],
+            std: vec![0.2, 2.0, 0.7],
+        };
+        let network = MlpWeights::new(1, &settings, scaling, LastLayer::Random, &mut rng);
+        let other = InputScaling {
+            mean: vec![-0.5, 2.0, 0.0],
+            std: vec![3.0, 5.0, 1.5],
+        };
+        let rescaled = network.rescaled(other.clone());
+        assert_eq!(rescaled.scaling, other);
+        let rates = |network| {
+            let dynamics = network_dynamics("pendulum", 1, network).unwrap();
+            dynamics.program.eval(&[0.7, -1.5, 0.4, 0.0])
+        };
+        for (a, b) in rates(&network).into_iter().zip(rates(&rescaled)) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+    }
+}

@@ -54,6 +54,21 @@ impl Settings {
 }
 
 impl Method {
+    /// The names that files and the command line know.
+    pub const NAMES: [&str; 3] = ["cem", "icem", "mppi"];
+
+    /// A method with its usual settings; methods that have an elite take the share that is published for the
+    /// cross-entropy method here, 20 of 300.
+    pub fn usual(name: &str, population: usize) -> Option<Self> {
+        let elite = (population / 15).max(1);
+        match name {
+            "cem" => Some(Self::Cem(Cem { elite })),
+            "icem" => Some(Self::Icem(Icem::new(elite))),
+            "mppi" => Some(Self::Mppi(Mppi::default())),
+            _ => None,
+        }
+    }
+
     pub(super) fn search(&self) -> &dyn Search {
         match self {
             Self::Cem(cem) => cem,

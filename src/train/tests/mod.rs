@@ -6,6 +6,7 @@ mod gradients;
 mod parity;
 mod recovery;
 mod resume;
+mod shrinking;
 mod sweep;
 
 use rand::{RngExt, SeedableRng};

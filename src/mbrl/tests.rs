@@ -1,0 +1,133 @@
+use std::path::Path;
+
+use serde_json::json;
+
+use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
+use crate::control::Task;
+use crate::expr::SignForm;
+use crate::model::{Angles, Dynamics, Library, MlpSettings};
+use crate::plant::{Noise, Plant};
+use crate::train::{Backend, FitSettings, Origin, Penalty};
+
+struct Setting {
+    task: Task,
+    plant: Plant,
+    learner: Learner,
+    dynamics: Dynamics,
+}
+
+/// The pendulum with friction, noise and, as an effect with memory, a delay.
+fn setting() -> Setting {
+    let library = Library::built_in();
+    let mut task = Task::read(Path::new("pendulum")).unwrap();
+    task.steps = 60;
+    task.replan = 10;
+    task.planner.horizon = 20;
+    task.planner.iterations = 2;
+    task.start_spread = vec![0.2, 0.1];
+    task.plant.noise = Noise {
+        position: 1e-3,
+        velocity: 1e-2,
+    };
+    let mut plant = Plant::read(Path::new("pendulum-real"), &library).unwrap();
+    plant
+        .add_effect(&library, "actuator_delay", 1, &[("d".to_owned(), 0.03)])
+        .unwrap();
+    let dynamics = plant.system.dynamics(&[SignForm::DEFAULT]);
+    let network = MlpSettings {
+        hidden: vec![4],
+        angles: Angles::SinCos,
+        ..MlpSettings::for_joints(1)
+    };
+    let fit = FitSettings {
+        epochs: 20,
+        penalty: Penalty::Fixed { alpha: 1e-6 },
+        ..FitSettings::default()
+    };
+    let learner = Learner {
+        system: "pendulum".to_owned(),
+        joints: 1,
+        prior: Prior::Equations(Box::new(dynamics.clone())),
+        network,
+        fit,
+        backend: Backend::Flex,
+    };
+    Setting {
+        task,
+        plant,
+        learner,
+        dynamics,
+    }
+}
+
+impl Setting {
+    fn run(&self) -> Run<'_> {
+        Run {
+            task: &self.task,
+            plant: &self.plant,
+            learner: &self.learner,
+            schedule: Schedule {
+                random: 15,
+                gather: 20,
+                rounds: 5,
+            },
+            seed: 4,
+        }
+    }
+
+    fn rounds(&self, progress: &mut Progress, folder: &mut Folder, until: usize) {
+        let run = self.run();
+        let origin = Origin {
+            config: json!({}),
+            seed: 4,
+            model_toml: self.plant.system.declaration.clone(),
+        };
+        while progress.rounds < until {
+            let (round, training) = run.round(progress).unwrap();
+            folder.keep(round, progress, &training, &origin).unwrap();
+        }
+    }
+
+    fn in_sessions(&self, ends: &[usize]) -> (Vec<Round>, Vec<f64>) {
+        let dir = tempfile::tempdir().unwrap();
+        for end in ends {
+            let mut folder = Folder::open(dir.path()).unwrap();
+            let mut progress = folder.progress(&self.run(), &self.dynamics).unwrap();
+            self.rounds(&mut progress, &mut folder, *end);
+        }
+        let folder = Folder::open(dir.path()).unwrap();
+        let progress = folder.progress(&self.run(), &self.dynamics).unwrap();
+        let logs = progress.experience.logs;
+        (
+            folder.rounds().to_vec(),
+            logs.into_iter().flat_map(|log| log.q[0].clone()).collect(),
+        )
+    }
+}
+
+#[test]
+fn a_run_in_sessions_is_the_run_in_one() {
+    let setting = setting();
+    let (rounds, angles) = setting.in_sessions(&[5]);
+    // Session ends within an episode of three stretches and at its end.
+    assert_eq!(
+        setting.in_sessions(&[1, 3, 5]),
+        (rounds.clone(), angles.clone())
+    );
+    let seen: Vec<usize> = rounds.iter().map(|round| round.transitions).collect();
+    assert_eq!(seen, [15, 35, 55, 75, 95]);
+    assert_eq!(angles.len(), 15 + 5 * 20 + 6);
+}
+
+#[test]
+fn a_stretch_begins_where_the_last_one_ended() {
+    let mut setting = setting();
+    setting.task.plant.noise = Noise::default();
+    let (_, angles) = setting.in_sessions(&[5]);
+    let stretch = |k: usize| &angles[16 + 21 * k..][..21];
+    assert_eq!(stretch(0)[20], stretch(1)[0]);
+    assert_eq!(stretch(1)[20], stretch(2)[0]);
+    // Three stretches are an episode; the next one starts anew.
+    assert_ne!(stretch(2)[20], stretch(3)[0]);
+    assert!((stretch(3)[0] - std::f64::consts::PI).abs() < 0.2);
+}
