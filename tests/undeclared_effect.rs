@@ -61,7 +61,9 @@ fn friction_is_named_after_an_episode_and_the_return_comes_back() {
     );
     lab.experiment.fit.epochs += 1;
     let refused = lab.run(dir.path(), &|_| {}).unwrap_err().to_string();
-    assert!(refused.contains("is of another experiment; remove it"));
+    assert!(
+        refused.contains("holds another experiment: its `trial.fit.epochs` is 20, here it is 21")
+    );
 }
 
 #[test]

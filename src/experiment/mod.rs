@@ -10,6 +10,7 @@ mod picture;
 mod receding_horizon;
 mod results;
 mod session;
+mod statistics;
 pub mod undeclared_effect;
 
 pub use config::{Config, MethodConfig};
@@ -18,3 +19,4 @@ pub use learning::Step;
 pub use picture::picture;
 pub use results::{Course, PERFECT, PRIOR, Reached, Results};
 pub use session::{Experiment, Observer, Session};
+pub use statistics::Interval;

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::ExperimentError;
+use crate::experiment::{ExperimentError, config};
 use crate::model::MlpSettings;
 use crate::plant::HiddenEffect;
 use crate::train::FitSettings;
@@ -88,11 +88,6 @@ impl Experiment {
 
     /// A file that is named here or, where there is none, the name as it is: that of something built in.
     pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        let beside = self.path.parent().unwrap_or(Path::new("")).join(file);
-        if beside.is_file() {
-            beside
-        } else {
-            file.to_owned()
-        }
+        config::beside_or_named(&self.path, file)
     }
 }

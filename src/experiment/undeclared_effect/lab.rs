@@ -3,8 +3,9 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::runs::Runs;
-use super::{Case, Experiment, ExperimentError, Outcome, Trial};
+use super::{Case, Experiment, Outcome, Trial};
 use crate::control::Task;
+use crate::experiment::ExperimentError;
 use crate::model::{Library, System};
 use crate::plant::Plant;
 use crate::train::Backend;

@@ -4,17 +4,13 @@
 //! The same planner drives the plant by the declared model, by that model with what closing the loop found, by the hybrid of
 //! that model and a network, and by the plant's own equations.
 
-mod compared;
-mod error;
 mod file;
 mod lab;
 mod outcome;
 mod runs;
 mod trial;
 
-pub use compared::{Interval, WonBack};
-pub use error::ExperimentError;
 pub use file::{Case, Experiment};
 pub use lab::Lab;
-pub use outcome::{Compared, Outcome, OutcomeOfCase, TARGET};
+pub use outcome::{Compared, Outcome, OutcomeOfCase, TARGET, WonBack};
 pub use trial::{Closed, Contestant, Named, Score, Trial};

@@ -2,9 +2,9 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::compared::{Interval, WonBack, bootstrap, deviation, mean};
 use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
-use crate::mbrl::{Purpose, stream};
+use crate::control::{Purpose, stream};
+use crate::experiment::statistics::{Interval, bootstrap, deviation, mean};
 
 /// Of the return that the declared model loses, this share is to come back after the first number of episodes.
 pub const TARGET: f64 = 0.9;
@@ -50,6 +50,14 @@ pub struct Compared {
     pub successes: usize,
     /// None of the declared and the true model, nor where nothing is lost.
     pub won_back: Option<WonBack>,
+}
+
+/// The share of a lost return that comes back with a model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WonBack {
+    /// Of the mean returns; 1 where all of it does.
+    pub share: f64,
+    pub ci95: Interval,
 }
 
 impl Outcome {

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{ExperimentError, Lab, Trial};
+use super::{Lab, Trial};
+use crate::experiment::ExperimentError;
+use crate::recipe::first_difference;
 use crate::report::write_whole;
 
 /// Where trials are kept: `runs/CASE-SEED.json`.
@@ -53,10 +55,13 @@ fn read(path: &Path, config: &Value) -> Result<Trial, ExperimentError> {
     let unreadable = |error: String| wrong(path, format!("{error}; {remedy}"));
     let text = fs::read_to_string(path).map_err(|error| unreadable(error.to_string()))?;
     let kept: Kept = serde_json::from_str(&text).map_err(|error| unreadable(error.to_string()))?;
-    if kept.config != *config {
-        return Err(wrong(path, format!("is of another experiment; {remedy}")));
+    match first_difference("trial", &kept.config, config) {
+        Some(difference) => Err(ExperimentError::Other {
+            dir: path.to_owned(),
+            difference,
+        }),
+        None => Ok(kept.trial),
     }
-    Ok(kept.trial)
 }
 
 /// All that decides a trial beside its seed.

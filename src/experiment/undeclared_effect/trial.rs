@@ -1,11 +1,12 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::{ExperimentError, Lab};
+use super::Lab;
 use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, close_loop};
-use crate::control::Predictor;
+use crate::control::{Predictor, Purpose, stream};
 use crate::data::Log;
-use crate::mbrl::{Experience, Judged, Learner, Prior, Purpose, Run, RunError, Schedule, stream};
+use crate::experiment::ExperimentError;
+use crate::mbrl::{Experience, Judged, Learner, Prior, Run, RunError, Schedule};
 use crate::model::Dynamics;
 
 /// One plant under control by every model, all from the same start, under the same noise and with the same draws of
@@ -107,9 +108,9 @@ impl Lab {
     pub fn trial(&self, case: usize, seed: u64) -> Result<Trial, ExperimentError> {
         let name = || self.experiment.cases[case].name.clone();
         let failed = |source: RunError| ExperimentError::Run {
-            case: name(),
+            method: name(),
             seed,
-            source: source.into(),
+            source,
         };
         let learner = self.learner();
         let run = self.on(case, &learner, seed);
@@ -122,8 +123,7 @@ impl Lab {
             })
         };
         let declared = self.predictor(self.declared());
-        let plant = &self.plants[case];
-        let truth = self.predictor(plant.dynamics().with_values(plant.values()));
+        let truth = self.predictor(self.plants[case].true_dynamics());
         let mut scores = vec![score(Contestant::Declared, 0, &declared)?];
         let mut closed = Vec::new();
         let mut logs = Vec::new();
@@ -137,7 +137,7 @@ impl Lab {
                 .map_err(|source| ExperimentError::Study {
                     case: name(),
                     seed,
-                    source: source.into(),
+                    source,
                 })?;
             closed.push(Closed::new(episodes, &outcome));
             best = self.predictor(fitted(&outcome));
