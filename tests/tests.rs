@@ -29,4 +29,5 @@ mod shift;
 mod support;
 mod sweep;
 mod train;
+mod undeclared_effect;
 mod unexplained;

@@ -44,11 +44,8 @@ pub fn learn_residual(
     };
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
     let (declared, effects) = absorbed(&model.declared, &model.effects);
-    let mut dynamics = study.system.dynamics_with(&effects, &study.sign);
-    let values = joined(&declared, &effects);
-    for (parameter, value) in dynamics.parameters.iter_mut().zip(values) {
-        parameter.value = value;
-    }
+    let dynamics = (study.system.dynamics_with(&effects, &study.sign))
+        .with_values(joined(&declared, &effects));
     let settings = MlpSettings {
         hidden: study.system.hidden.clone(),
         on: ResidualOn::Accelerations,

@@ -71,12 +71,7 @@ impl Config {
 
     /// A file that it names or, where there is none, the name as it is: that of something built in.
     pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        let beside = self.path.parent().unwrap_or(Path::new("")).join(file);
-        if beside.exists() {
-            beside
-        } else {
-            file.to_owned()
-        }
+        beside_or_named(&self.path, file)
     }
 
     pub(super) fn wrong(&self, message: String) -> ExperimentError {
@@ -122,5 +117,15 @@ impl Config {
             }
         }
         Ok(())
+    }
+}
+
+/// A file that the one at `path` names or, where there is none, the name as it is: that of something built in.
+pub(super) fn beside_or_named(path: &Path, file: &Path) -> PathBuf {
+    let beside = path.parent().unwrap_or(Path::new("")).join(file);
+    if beside.exists() {
+        beside
+    } else {
+        file.to_owned()
     }
 }

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::closeloop::StudyError;
 use crate::control::TaskError;
 use crate::mbrl::RunError;
 use crate::model::{FileError, HybridError};
@@ -30,6 +31,12 @@ pub enum ExperimentError {
         method: String,
         seed: u64,
         source: RunError,
+    },
+    #[error("{case}, seed {seed}: {source}")]
+    Study {
+        case: String,
+        seed: u64,
+        source: StudyError,
     },
     #[error(transparent)]
     Learner(#[from] RunError),

@@ -1,5 +1,5 @@
 //! The published experiments: what a model must see of a plant before planning with it is worth as much as planning
-//! with the plant's own equations.
+//! with the plant's own equations; and one more, [`undeclared_effect`]: what of that the closed loop finds by itself.
 
 mod config;
 mod error;
@@ -10,6 +10,8 @@ mod picture;
 mod receding_horizon;
 mod results;
 mod session;
+mod statistics;
+pub mod undeclared_effect;
 
 pub use config::{Config, MethodConfig};
 pub use error::ExperimentError;
@@ -17,3 +19,4 @@ pub use learning::Step;
 pub use picture::picture;
 pub use results::{Course, PERFECT, PRIOR, Reached, Results};
 pub use session::{Experiment, Observer, Session};
+pub use statistics::Interval;

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::statistics::{deviation, mean};
 use crate::mbrl::Judged;
 
 /// The name of the plant's own equations among the methods.
@@ -179,17 +180,9 @@ impl FromIterator<(usize, Vec<Judged>)> for Course {
         let mut course = Self::default();
         for (transitions, judged) in entries {
             let returns: Vec<f64> = judged.iter().map(|judged| judged.total).collect();
-            let count = returns.len() as f64;
-            let mean = returns.iter().sum::<f64>() / count;
-            let squares = returns
-                .iter()
-                .map(|total| (total - mean).powi(2))
-                .sum::<f64>();
             course.transitions.push(transitions);
-            course.return_mean.push(mean);
-            course
-                .return_std
-                .push((squares / (count - 1.0).max(1.0)).sqrt());
+            course.return_mean.push(mean(&returns));
+            course.return_std.push(deviation(&returns));
             course.returns.push(returns);
             course
                 .success

@@ -294,11 +294,7 @@ impl Session {
 
     /// The plant's own equations, stepped as models are.
     fn perfect(&self) -> Predictor {
-        let mut dynamics = self.plant.dynamics();
-        for (parameter, value) in dynamics.parameters.iter_mut().zip(self.plant.values()) {
-            parameter.value = value;
-        }
-        Predictor::of_equations(dynamics, self.task.integrator)
+        Predictor::of_equations(self.plant.true_dynamics(), self.task.integrator)
     }
 
     fn seeds(&self) -> Vec<u64> {

@@ -49,6 +49,15 @@ impl Dynamics {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
+    /// The same with other values of the parameters, in their order.
+    #[must_use]
+    pub fn with_values(mut self, values: impl IntoIterator<Item = f64>) -> Self {
+        for (parameter, value) in self.parameters.iter_mut().zip(values) {
+            parameter.value = value;
+        }
+        self
+    }
+
     /// Number of states, 2n.
     pub fn states(&self) -> usize {
         2 * self.joints

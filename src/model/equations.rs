@@ -28,13 +28,9 @@ pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, 
 
 /// The equations with these values; fixed ones as declared, to the last bit.
 pub(super) fn current(declared: &Dynamics, scaled: Tensor<1>) -> Dynamics {
-    let mut dynamics = declared.clone();
     let scaled = to_f64(scaled);
     let values = values(&declared.parameters, &scaled);
-    for (parameter, value) in dynamics.parameters.iter_mut().zip(values) {
-        parameter.value = value;
-    }
-    dynamics
+    declared.clone().with_values(values)
 }
 
 /// The value of every parameter in its unit; of fixed ones as declared, to the last bit.

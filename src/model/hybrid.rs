@@ -191,11 +191,8 @@ impl HybridModel {
         let device = self.device();
         let prior = match (&self.frame.equations, &weights.prior) {
             (Some(equations), None) if equations.parameters.len() == weights.parameters.len() => {
-                let mut dynamics = equations.clone();
-                for (parameter, value) in dynamics.parameters.iter_mut().zip(&weights.parameters) {
-                    parameter.value = *value;
-                }
-                Self::physics(&dynamics, &device)?
+                let values = weights.parameters.iter().copied();
+                Self::physics(&equations.clone().with_values(values), &device)?
             }
             (None, Some(mlp)) if weights.parameters.is_empty() => {
                 Self::network(self.system(), self.joints(), mlp, &device)?

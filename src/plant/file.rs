@@ -67,18 +67,21 @@ struct File {
     #[serde(default)]
     parameters: BTreeMap<String, f64>,
     #[serde(default)]
-    effect: Vec<EffectEntry>,
+    effect: Vec<HiddenEffect>,
     sensor: Sensor,
     excitation: Excitation,
     recording: Recording,
 }
 
-#[derive(Debug, Deserialize)]
-struct EffectEntry {
-    name: String,
-    joint: usize,
+/// An effect of a rig: `{ name = "coulomb_friction", joint = 1, F_c = 0.4 }`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HiddenEffect {
+    pub name: String,
+    /// Counted from 1.
+    pub joint: usize,
+    /// Of its parameters; those that are not given are at their typical value.
     #[serde(flatten)]
-    values: BTreeMap<String, f64>,
+    pub values: BTreeMap<String, f64>,
 }
 
 /// Rates, torques and times of a desk-sized rig, for a plant that is given as a model file alone.
@@ -135,21 +138,8 @@ impl Plant {
             &file.model
         };
         let mut plant = Self::of_system(library.system(model)?);
-        for (name, value) in &file.parameters {
-            let known = &plant.system.parameters;
-            let Some(k) = known.iter().position(|p| p.name == *name) else {
-                let near = suggestion(name, known.iter().map(|p| p.name.as_str()));
-                return Err(wrong(format!(
-                    "unknown parameter `{name}` of {}{near}",
-                    plant.system.name
-                )));
-            };
-            plant.parameters[k] = *value;
-        }
-        for entry in file.effect {
-            let values: Vec<(String, f64)> = entry.values.into_iter().collect();
-            plant.add_effect(library, &entry.name, entry.joint, &values)?;
-        }
+        plant.set_parameters(&file.parameters).map_err(wrong)?;
+        plant.hide(library, &file.effect)?;
         plant.sensor = file.sensor;
         plant.excitation = file.excitation;
         plant.recording = file.recording;
@@ -196,6 +186,35 @@ impl Plant {
             return Err(
                 "`sensor.rate_hz` times `recording.duration_s` must give at least two rows".into(),
             );
+        }
+        Ok(())
+    }
+
+    /// Give declared parameters their true values.
+    ///
+    /// # Errors
+    /// Unknown parameter, with what is like it.
+    pub fn set_parameters(&mut self, values: &BTreeMap<String, f64>) -> Result<(), String> {
+        let known = &self.system.parameters;
+        for (name, value) in values {
+            let Some(k) = known.iter().position(|p| p.name == *name) else {
+                let near = suggestion(name, known.iter().map(|p| p.name.as_str()));
+                let system = &self.system.name;
+                return Err(format!("unknown parameter `{name}` of {system}{near}"));
+            };
+            self.parameters[k] = *value;
+        }
+        Ok(())
+    }
+
+    /// Let effects act.
+    ///
+    /// # Errors
+    /// As [`Plant::add_effect`].
+    pub fn hide(&mut self, library: &Library, effects: &[HiddenEffect]) -> Result<(), PlantError> {
+        for effect in effects {
+            let values: Vec<(String, f64)> = effect.values.clone().into_iter().collect();
+            self.add_effect(library, &effect.name, effect.joint, &values)?;
         }
         Ok(())
     }

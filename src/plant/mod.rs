@@ -9,6 +9,6 @@ mod simulate;
 
 pub use environment::Environment;
 pub use excitation::Excitation;
-pub use file::{Plant, PlantError, Sensor};
+pub use file::{HiddenEffect, Plant, PlantError, Sensor};
 pub use rig::{Noise, Rig};
 pub use sampling::{Sampling, Starts};

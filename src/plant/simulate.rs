@@ -20,6 +20,11 @@ impl Plant {
         self.system.dynamics_with(&self.effects, &sign)
     }
 
+    /// The same with their true values.
+    pub fn true_dynamics(&self) -> Dynamics {
+        self.dynamics().with_values(self.values())
+    }
+
     /// Record one log. Velocities are backward differences of the measured angles, as on many rigs.
     ///
     /// # Errors

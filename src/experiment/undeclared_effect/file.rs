@@ -1,0 +1,93 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::experiment::{ExperimentError, config};
+use crate::model::MlpSettings;
+use crate::plant::HiddenEffect;
+use crate::train::FitSettings;
+
+/// What is compared, and on which plants.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// The declared model: a model file, as seen from here, or the name of a built-in system.
+    pub model: PathBuf,
+    /// What the plants are to do: a task file, as seen from here, or the name of a built-in task.
+    pub task: PathBuf,
+    /// So many starts, draws of noise and draws of candidates in each case.
+    pub seeds: u64,
+    /// Models are closed and trained on the first of so many episodes.
+    pub episodes: Vec<usize>,
+    /// How much is lost with the declared model, and won back with others.
+    #[serde(rename = "case")]
+    pub cases: Vec<Case>,
+    /// The residual network of the hybrid.
+    pub network: MlpSettings,
+    /// Training of the hybrid.
+    pub fit: FitSettings,
+    /// Where it was read from.
+    #[serde(skip)]
+    pub path: PathBuf,
+}
+
+/// What a plant has that the declared model has not.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Part of a file's name.
+    pub name: String,
+    /// True values of declared parameters, where they differ.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<HiddenEffect>,
+}
+
+impl Experiment {
+    /// Read an experiment.
+    ///
+    /// # Errors
+    /// Unreadable file, unknown key, or numbers that make no sense: with line and remedy.
+    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        let wrong = |message: String| ExperimentError::File {
+            path: path.to_owned(),
+            message,
+        };
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| wrong(format!("{error}; give an experiment with --config")))?;
+        let mut experiment: Self =
+            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        path.clone_into(&mut experiment.path);
+        experiment.check().map_err(wrong)?;
+        Ok(experiment)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.seeds == 0 || self.cases.is_empty() {
+            return Err("`seeds` and `case` need at least one each".into());
+        }
+        let rising = self.episodes.is_sorted_by(|a, b| a < b);
+        if !rising || self.episodes.first().is_none_or(|first| *first == 0) {
+            return Err("`episodes` are rising numbers above zero, for instance [1, 3]".into());
+        }
+        for (k, Case { name, .. }) in self.cases.iter().enumerate() {
+            let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+            if name.is_empty() || !name.chars().all(plain) {
+                return Err(format!(
+                    "the case `{name}` names files; use letters, digits, - and _"
+                ));
+            }
+            if self.cases[..k].iter().any(|other| other.name == *name) {
+                return Err(format!("two cases are called `{name}`; rename one"));
+            }
+        }
+        Ok(())
+    }
+
+    /// A file that is named here or, where there is none, the name as it is: that of something built in.
+    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
+        config::beside_or_named(&self.path, file)
+    }
+}

@@ -1,0 +1,234 @@
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
+use crate::control::{Purpose, stream};
+use crate::experiment::statistics::{Interval, bootstrap, deviation, mean};
+
+/// Of the return that the declared model loses, this share is to come back after the first number of episodes.
+pub const TARGET: f64 = 0.9;
+
+/// What came of an experiment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    pub schema: u32,
+    /// The program that wrote it.
+    pub residyn: String,
+    pub config: Experiment,
+    pub target: f64,
+    /// Whether it is reached in every case in which something is lost.
+    pub reached: bool,
+    pub cases: Vec<OutcomeOfCase>,
+}
+
+/// What came of one plant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutcomeOfCase {
+    pub case: Case,
+    /// What the true model returns more than the declared one, mean over the seeds.
+    pub loss: f64,
+    pub loss_ci95: Interval,
+    /// Whether the loss stands out of its scatter. Where it does not, there is nothing to win back.
+    pub is_lost: bool,
+    pub models: Vec<Compared>,
+    /// What closing the loop found: `[seed][number of episodes]`.
+    pub closed: Vec<Vec<Closed>>,
+}
+
+/// The returns of a model.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    pub model: Contestant,
+    /// Of data that it has seen.
+    pub episodes: usize,
+    /// One for each seed.
+    pub returns: Vec<f64>,
+    pub mean: f64,
+    pub deviation: f64,
+    /// Episodes in which the goal held until the end.
+    pub successes: usize,
+    /// None of the declared and the true model, nor where nothing is lost.
+    pub won_back: Option<WonBack>,
+}
+
+/// The share of a lost return that comes back with a model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct WonBack {
+    /// Of the mean returns; 1 where all of it does.
+    pub share: f64,
+    pub ci95: Interval,
+}
+
+impl Outcome {
+    pub(super) fn new(lab: &Lab, trials: &[Trial]) -> Self {
+        let of_case = |case: &Case| {
+            let own: Vec<&Trial> = trials.iter().filter(|t| t.case == case.name).collect();
+            OutcomeOfCase::new(case, &own)
+        };
+        let cases: Vec<OutcomeOfCase> = lab.experiment.cases.iter().map(of_case).collect();
+        let first = lab.experiment.episodes[0];
+        Self {
+            schema: 1,
+            residyn: env!("CARGO_PKG_VERSION").to_owned(),
+            config: lab.experiment.clone(),
+            target: TARGET,
+            reached: cases
+                .iter()
+                .filter_map(|case| case.share(first))
+                .all(|share| share >= TARGET),
+            cases,
+        }
+    }
+
+    /// The outcome for people.
+    pub fn text(&self) -> String {
+        let mut out = String::new();
+        for case in &self.cases {
+            case.write(&mut out);
+        }
+        let verdict = if self.reached { "reached" } else { "missed" };
+        let _ = writeln!(
+            out,
+            "target: {:.0} % of the lost return won back after {} episode(s) in every case: {verdict}",
+            100.0 * TARGET,
+            self.config.episodes[0]
+        );
+        out
+    }
+}
+
+impl OutcomeOfCase {
+    fn new(case: &Case, trials: &[&Trial]) -> Self {
+        let mut models: Vec<Compared> = (0..trials[0].scores.len())
+            .map(|k| Compared::new(trials, k))
+            .collect();
+        let declared = models[0].returns.clone();
+        let truth = models[models.len() - 1].returns.clone();
+        let of = |returns: &[f64], drawn: &[usize]| -> f64 {
+            drawn
+                .iter()
+                .map(|&seed| returns[seed] - declared[seed])
+                .sum()
+        };
+        let mut rng = stream(0, Purpose::Other, 0);
+        let (seeds, all) = (trials.len(), (0..trials.len()).collect::<Vec<_>>());
+        let per_seed = 1.0 / seeds as f64;
+        let loss_ci95 = bootstrap(seeds, &mut rng, |drawn| per_seed * of(&truth, drawn));
+        let is_lost = loss_ci95[0] > 0.0;
+        let learnt = models
+            .iter_mut()
+            .filter(|model| is_lost && model.episodes > 0);
+        for model in learnt {
+            let share = |drawn: &[usize]| of(&model.returns, drawn) / of(&truth, drawn);
+            model.won_back = Some(WonBack {
+                share: share(&all),
+                ci95: bootstrap(seeds, &mut rng, share),
+            });
+        }
+        Self {
+            case: case.clone(),
+            loss: per_seed * of(&truth, &all),
+            loss_ci95,
+            is_lost,
+            models,
+            closed: trials.iter().map(|trial| trial.closed.clone()).collect(),
+        }
+    }
+
+    /// What the closed model wins back after so many episodes; none where nothing is lost.
+    fn share(&self, episodes: usize) -> Option<f64> {
+        let is_it = |m: &&Compared| m.model == Contestant::Closed && m.episodes == episodes;
+        let model = self.models.iter().find(is_it)?;
+        model.won_back.map(|won| won.share)
+    }
+
+    fn write(&self, out: &mut String) {
+        let [low, high] = self.loss_ci95;
+        let lost = if self.is_lost {
+            ""
+        } else {
+            ", which is none: nothing to win back"
+        };
+        let _ = writeln!(
+            out,
+            "{}: the declared model loses {:.1} ({low:.1} to {high:.1}){lost}",
+            self.case.name, self.loss
+        );
+        for model in &self.models {
+            model.write(out);
+        }
+        for (seed, closed) in self.closed.iter().enumerate() {
+            for found in closed {
+                found.write(out, seed);
+            }
+        }
+        out.push('\n');
+    }
+}
+
+impl Compared {
+    /// The k-th model of every trial.
+    fn new(trials: &[&Trial], k: usize) -> Self {
+        let scores = || trials.iter().map(|trial| &trial.scores[k]);
+        let returns: Vec<f64> = scores().map(|score| score.judged.total).collect();
+        let first = &trials[0].scores[k];
+        Self {
+            model: first.model,
+            episodes: first.episodes,
+            mean: mean(&returns),
+            deviation: deviation(&returns),
+            successes: scores().filter(|score| score.judged.success).count(),
+            won_back: None,
+            returns,
+        }
+    }
+
+    fn write(&self, out: &mut String) {
+        let data = match self.episodes {
+            0 => String::new(),
+            episodes => format!(", {episodes} episode(s)"),
+        };
+        let _ = write!(
+            out,
+            "  {:<24}{:>8.1} +- {:<6.1} goal held in {} of {}",
+            format!("{}{data}", self.model.name()),
+            self.mean,
+            self.deviation,
+            self.successes,
+            self.returns.len()
+        );
+        if let Some(WonBack { share, ci95 }) = self.won_back {
+            let [share, low, high] = [share, ci95[0], ci95[1]].map(|x| 100.0 * x);
+            let _ = write!(out, ", won back {share:.0} % ({low:.0} to {high:.0})");
+        }
+        out.push('\n');
+    }
+}
+
+impl Closed {
+    fn write(&self, out: &mut String, seed: usize) {
+        let values = |values: &[(String, f64)]| {
+            let each = values
+                .iter()
+                .map(|(name, value)| format!("{name} {value:.4}"));
+            each.collect::<Vec<_>>().join(", ")
+        };
+        let named = self.effects.iter().map(|effect| {
+            let (name, joint) = (&effect.name, effect.joint);
+            format!("{name}@{joint} ({})", values(&effect.parameters))
+        });
+        let named: Vec<String> = named.collect();
+        let named = if named.is_empty() {
+            "no effect".to_owned()
+        } else {
+            named.join(", ")
+        };
+        let _ = writeln!(
+            out,
+            "  seed {seed}, {} episode(s): {named}; {}",
+            self.episodes,
+            values(&self.parameters)
+        );
+    }
+}

@@ -1,0 +1,227 @@
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+use super::Lab;
+use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, close_loop};
+use crate::control::{Predictor, Purpose, stream};
+use crate::data::Log;
+use crate::experiment::ExperimentError;
+use crate::mbrl::{Experience, Judged, Learner, Prior, Run, RunError, Schedule};
+use crate::model::Dynamics;
+
+/// One plant under control by every model, all from the same start, under the same noise and with the same draws of
+/// candidates.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    pub case: String,
+    pub seed: u64,
+    pub scores: Vec<Score>,
+    /// What closing the loop found, one for each number of episodes.
+    pub closed: Vec<Closed>,
+}
+
+/// How an episode went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    pub model: Contestant,
+    /// Of data that the model has seen.
+    pub episodes: usize,
+    #[serde(flatten)]
+    pub judged: Judged,
+}
+
+/// A model to plan with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Contestant {
+    /// As it is in its file.
+    Declared,
+    /// With the parameters and effects that closing the loop found.
+    Closed,
+    /// With learnt parameters and a residual network.
+    Hybrid,
+    /// The plant's own equations.
+    True,
+}
+
+/// What closing the loop found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Closed {
+    pub episodes: usize,
+    pub verdict: Verdict,
+    pub effects: Vec<Named>,
+    /// Declared parameters and their fitted values.
+    pub parameters: Vec<(String, f64)>,
+}
+
+/// An effect that was named.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Named {
+    pub name: String,
+    /// Counted from 1.
+    pub joint: usize,
+    pub parameters: Vec<(String, f64)>,
+}
+
+/// The windows of a second fit into the end of a log of a few seconds.
+const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
+
+impl Contestant {
+    /// The name in results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Declared => "declared",
+            Self::Closed => "closed",
+            Self::Hybrid => "hybrid",
+            Self::True => "true",
+        }
+    }
+}
+
+impl Closed {
+    fn new(episodes: usize, outcome: &Outcome) -> Self {
+        let parameter = |p: &crate::model::Parameter| (p.name.clone(), p.value);
+        let named = |finding: &Finding| Named {
+            name: finding.effect.title(),
+            joint: finding.effect.joint + 1,
+            parameters: finding.parameters.iter().map(parameter).collect(),
+        };
+        let declared = outcome.after.declared.len();
+        Self {
+            episodes,
+            verdict: outcome.verdict,
+            effects: outcome.findings.iter().map(named).collect(),
+            parameters: outcome.parameters[..declared]
+                .iter()
+                .map(parameter)
+                .collect(),
+        }
+    }
+}
+
+impl Lab {
+    /// Drive the plant of a case with every model. The first episode of data is gathered with the declared model, the
+    /// next ones with what was closed on the first.
+    ///
+    /// # Errors
+    /// A plant that diverges, a loss that is no longer finite, or logs that cannot be studied.
+    pub fn trial(&self, case: usize, seed: u64) -> Result<Trial, ExperimentError> {
+        let name = || self.experiment.cases[case].name.clone();
+        let failed = |source: RunError| ExperimentError::Run {
+            method: name(),
+            seed,
+            source,
+        };
+        let learner = self.learner();
+        let run = self.on(case, &learner, seed);
+        let score = |model, episodes, predictor: &Predictor| -> Result<Score, ExperimentError> {
+            let judged = run.judge(predictor, self.task.replan).map_err(failed)?;
+            Ok(Score {
+                model,
+                episodes,
+                judged,
+            })
+        };
+        let declared = self.predictor(self.declared());
+        let truth = self.predictor(self.plants[case].true_dynamics());
+        let mut scores = vec![score(Contestant::Declared, 0, &declared)?];
+        let mut closed = Vec::new();
+        let mut logs = Vec::new();
+        let mut best = declared;
+        for &episodes in &self.experiment.episodes {
+            while logs.len() < episodes {
+                logs.push(self.gather(&run, &best, logs.len()).map_err(failed)?);
+            }
+            let outcome = self
+                .close(&logs, seed)
+                .map_err(|source| ExperimentError::Study {
+                    case: name(),
+                    seed,
+                    source,
+                })?;
+            closed.push(Closed::new(episodes, &outcome));
+            best = self.predictor(fitted(&outcome));
+            scores.push(score(Contestant::Closed, episodes, &best)?);
+            let hybrid = self.hybrid(&learner, &logs, seed).map_err(failed)?;
+            scores.push(score(Contestant::Hybrid, episodes, &hybrid)?);
+        }
+        scores.push(score(Contestant::True, 0, &truth)?);
+        Ok(Trial {
+            case: name(),
+            seed,
+            scores,
+            closed,
+        })
+    }
+
+    fn declared(&self) -> Dynamics {
+        self.declared.dynamics(&self.declared.sign())
+    }
+
+    fn predictor(&self, dynamics: Dynamics) -> Predictor {
+        Predictor::of_equations(dynamics, self.task.integrator)
+    }
+
+    fn learner(&self) -> Learner {
+        Learner {
+            system: self.declared.name.clone(),
+            joints: self.declared.joints,
+            prior: Prior::Equations(Box::new(self.declared())),
+            network: self.experiment.network.clone(),
+            fit: self.experiment.fit.clone(),
+            backend: self.backend,
+        }
+    }
+
+    fn on<'a>(&'a self, case: usize, learner: &'a Learner, seed: u64) -> Run<'a> {
+        Run {
+            task: &self.task,
+            plant: &self.plants[case],
+            learner,
+            schedule: Schedule {
+                random: 0,
+                gather: self.task.steps,
+                rounds: 1,
+            },
+            seed,
+        }
+    }
+
+    /// The log of an episode with a start, noise and candidates of its own.
+    fn gather(&self, run: &Run<'_>, model: &Predictor, number: usize) -> Result<Log, RunError> {
+        let seed = stream(run.seed, Purpose::Gather, number).next_u64();
+        let (episode, _) = Run { seed, ..*run }.episode(model, self.task.replan)?;
+        let mut log = episode.stretch.log;
+        log.path = format!("episode{}.csv", number + 1).into();
+        Ok(log)
+    }
+
+    fn close(&self, logs: &[Log], seed: u64) -> Result<Outcome, StudyError> {
+        let request = Request {
+            system: &self.declared,
+            library: &self.library,
+            split: Split::of(logs.to_vec()),
+            against: Vec::new(),
+            horizons_s: HORIZONS_S,
+            backend: None,
+        };
+        let mut rng = stream(seed, Purpose::Other, logs.len());
+        close_loop(request, &mut rng, &mut |_| {})
+    }
+
+    fn hybrid(&self, learner: &Learner, logs: &[Log], seed: u64) -> Result<Predictor, RunError> {
+        let experience = Experience {
+            logs: logs.to_vec(),
+        };
+        let segments = experience.segments(learner.joints)?;
+        let training = learner.learn(&segments, None, seed, logs.len())?;
+        let model = training.result()?;
+        Ok(Predictor::of_model(&model, learner.fit.integrator))
+    }
+}
+
+/// What closing the loop ended with.
+fn fitted(outcome: &Outcome) -> Dynamics {
+    let values = outcome.after.fit.values.iter().copied();
+    outcome.after.dynamics.clone().with_values(values)
+}

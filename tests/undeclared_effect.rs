@@ -1,0 +1,110 @@
+//! The loop closed on control: what an undeclared effect costs comes back.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use residyn::experiment::undeclared_effect::{Contestant, Experiment, Lab};
+use residyn::model::Library;
+use residyn::train::Backend;
+
+use crate::train::configs;
+
+fn lab(path: &Path) -> Lab {
+    let experiment = Experiment::read(path).unwrap();
+    Lab::new(experiment, Library::built_in(), Backend::Flex).unwrap()
+}
+
+fn smoke() -> PathBuf {
+    configs().join("smoke/undeclared-effect.toml")
+}
+
+#[test]
+fn every_experiment_is_sound() {
+    for name in ["pendulum", "acrobot"] {
+        let path = configs().join(format!("undeclared-effect/{name}.toml"));
+        assert!(lab(&path).experiment.seeds >= 10);
+    }
+}
+
+#[test]
+fn friction_is_named_after_an_episode_and_the_return_comes_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut lab = lab(&smoke());
+    let count = AtomicUsize::new(0);
+    let outcome = lab
+        .run(dir.path(), &|_| {
+            count.fetch_add(1, Ordering::Relaxed);
+        })
+        .unwrap();
+    assert_eq!(count.into_inner(), 1);
+    let case = &outcome.cases[0];
+    let found = &case.closed[0][0].effects;
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].name, "coulomb_friction");
+    assert!((found[0].parameters[0].1 - 0.7).abs() < 0.05, "{found:?}");
+    let won = |model: Contestant| {
+        let mut models = case.models.iter().filter(|m| m.model == model);
+        models.next().unwrap().won_back.unwrap().share
+    };
+    assert!(case.is_lost && case.loss > 50.0, "{}", case.loss);
+    assert!(won(Contestant::Closed) > 0.9);
+    assert!(outcome.reached);
+    assert!(outcome.text().contains("coulomb_friction@1"));
+
+    // What is done is not done again, and what another experiment left is not taken for it.
+    let kept = dir.path().join("runs/coulomb_friction-0.json");
+    let written = std::fs::metadata(&kept).unwrap().modified().unwrap();
+    assert_eq!(lab.run(dir.path(), &|_| {}).unwrap(), outcome);
+    assert_eq!(
+        std::fs::metadata(&kept).unwrap().modified().unwrap(),
+        written
+    );
+    lab.experiment.fit.epochs += 1;
+    let refused = lab.run(dir.path(), &|_| {}).unwrap_err().to_string();
+    assert!(
+        refused.contains("holds another experiment: its `trial.fit.epochs` is 20, here it is 21")
+    );
+}
+
+#[test]
+fn bad_experiments_are_refused_with_their_remedy() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("e.toml");
+    let text = std::fs::read_to_string(smoke()).unwrap();
+    let message = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        let read = Experiment::read(&path);
+        let lab = read.and_then(|e| Lab::new(e, Library::built_in(), Backend::Flex));
+        lab.err().unwrap().to_string()
+    };
+    let cases = [
+        (
+            "episodes = [1]",
+            "episodes = [3, 1]",
+            "rising numbers above zero",
+        ),
+        ("seeds = 1", "seeds = 0", "at least one each"),
+        (
+            "name = \"coulomb_friction\"\n",
+            "name = \"a/b\"\n",
+            "use letters",
+        ),
+        (
+            "F_c = 0.7",
+            "F_d = 0.7",
+            "has no parameter `F_d`; did you mean `F_c`",
+        ),
+        (
+            "\"pendulum-rig\"",
+            "\"acrobot-rig\"",
+            "the task is for acrobot",
+        ),
+        ("seeds = 1", "seed = 1", "unknown field `seed`"),
+    ];
+    for (from, to, expected) in cases {
+        let found = message(from, to);
+        assert!(found.contains(expected), "{found}");
+        assert!(found.starts_with(path.to_str().unwrap()), "{found}");
+    }
+}
