@@ -5,10 +5,11 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 
 use super::{Answer, Common, inputs, progress};
-use crate::experiment::{Config, Experiment, Results, Session, Step, picture};
+use crate::experiment::undeclared_effect::{self, Lab, Trial};
+use crate::experiment::{Config, Experiment, Session, Step, picture};
 use crate::report::write_whole;
 
-/// The published experiments: return against real transitions, and against the receding horizon
+/// Experiments: return against real transitions, against the receding horizon, and with effects that nobody declared
 ///
 /// The same command goes on with an experiment that was interrupted, and ends with the same numbers.
 #[derive(Debug, Args)]
@@ -21,7 +22,7 @@ pub(super) struct Arguments {
     /// What is compared, on which task and plant
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Folder for results.json, results.svg and all runs
+    /// Folder for the results and all runs
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folders of your own effect files
@@ -36,32 +37,44 @@ enum Name {
     PhysicsPrior,
     OfflinePrior,
     RecedingHorizon,
+    UndeclaredEffect,
 }
 
-impl From<Name> for Experiment {
-    fn from(name: Name) -> Self {
-        match name {
-            Name::PhysicsPrior => Self::PhysicsPrior,
-            Name::OfflinePrior => Self::OfflinePrior,
-            Name::RecedingHorizon => Self::RecedingHorizon,
-        }
-    }
+/// What there is to say of an experiment.
+struct Finished {
+    json: String,
+    text: String,
+    /// Whether what it aims at was reached.
+    answer: Answer,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let began = Instant::now();
+    let out = &arguments.out;
+    inputs::check_writable(out)?;
+    let clock = Clock::open(out)?;
+    let finished = match arguments.name {
+        Name::PhysicsPrior => published(arguments, Experiment::PhysicsPrior, &clock),
+        Name::OfflinePrior => published(arguments, Experiment::OfflinePrior, &clock),
+        Name::RecedingHorizon => published(arguments, Experiment::RecedingHorizon, &clock),
+        Name::UndeclaredEffect => undeclared_effect(arguments, &clock),
+    }?;
+    clock.save();
+    write_whole(&out.join("results.json"), finished.json.as_bytes())?;
+    let json = arguments.common.json;
+    inputs::print(if json { &finished.json } else { &finished.text })?;
+    Ok(finished.answer)
+}
+
+fn published(arguments: &Arguments, experiment: Experiment, clock: &Clock) -> Result<Finished> {
     let Arguments {
-        name,
         config,
         out,
         effects,
         common,
+        ..
     } = arguments;
-    inputs::check_writable(out)?;
     let library = inputs::library(effects)?;
-    let experiment = Experiment::from(*name);
     let session = Session::open(Config::read(config)?, &library, common.device)?;
-    let clock = Clock::open(out, began)?;
     let bar = progress::bar(session.rounds());
     let results = session.carry_out(experiment, out, &|step: &Step<'_>| {
         bar.inc(1);
@@ -71,23 +84,68 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     });
     bar.finish_and_clear();
-    let command = format!(
-        "residyn experiment {} --config {} --out {}",
-        experiment.name(),
+    let results = results?.finished(command(arguments, experiment.name()), clock.wall_s());
+    write_whole(&out.join("results.svg"), picture(&results)?.as_bytes())?;
+    Ok(Finished {
+        json: serde_json::to_string_pretty(&results)? + "\n",
+        text: format!(
+            "{}{}",
+            results.text(),
+            files(out, &["results.json", "results.svg"])
+        ),
+        answer: Answer::Yes,
+    })
+}
+
+fn undeclared_effect(arguments: &Arguments, clock: &Clock) -> Result<Finished> {
+    let Arguments {
+        config,
+        out,
+        effects,
+        common,
+        ..
+    } = arguments;
+    let library = inputs::library(effects)?;
+    let experiment = undeclared_effect::Experiment::read(config)?;
+    let lab = Lab::new(experiment, library, common.device)?;
+    let trials = lab.experiment.seeds * lab.plants.len() as u64;
+    let bar = progress::bar(usize::try_from(trials)?);
+    let outcome = lab.run(out, &|trial: &Trial| {
+        bar.inc(1);
+        bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
+        clock.save();
+    });
+    bar.finish_and_clear();
+    let outcome = outcome?;
+    let mut value = serde_json::to_value(&outcome)?;
+    value["experiment"] = "undeclared-effect".into();
+    value["command"] = command(arguments, "undeclared-effect").into();
+    value["wall_s"] = clock.wall_s().into();
+    Ok(Finished {
+        json: serde_json::to_string_pretty(&value)? + "\n",
+        text: format!("{}{}", outcome.text(), files(out, &["results.json"])),
+        answer: if outcome.reached {
+            Answer::Yes
+        } else {
+            Answer::No
+        },
+    })
+}
+
+fn command(arguments: &Arguments, name: &str) -> String {
+    let Arguments { config, out, .. } = arguments;
+    format!(
+        "residyn experiment {name} --config {} --out {}",
         config.display(),
         out.display()
-    );
-    let results = results?.finished(command, clock.wall_s());
-    let json = serde_json::to_string_pretty(&results)? + "\n";
-    write_whole(&out.join("results.json"), json.as_bytes())?;
-    write_whole(&out.join("results.svg"), picture(&results)?.as_bytes())?;
-    clock.save();
-    inputs::print(&if common.json {
-        json
-    } else {
-        text(&results, out)
-    })?;
-    Ok(Answer::Yes)
+    )
+}
+
+fn files(out: &Path, names: &[&str]) -> String {
+    names
+        .iter()
+        .map(|name| format!("{}\n", out.join(name).display()))
+        .collect()
 }
 
 /// For the progress bar.
@@ -102,11 +160,6 @@ pub(super) fn message(step: &Step<'_>) -> String {
     format!("rounds; {method} seed {seed}: {transitions} transitions, return {total:.1}")
 }
 
-fn text(results: &Results, out: &Path) -> String {
-    let files = ["results.json", "results.svg"].map(|name| out.join(name).display().to_string());
-    format!("{}{}\n", results.text(), files.join("\n"))
-}
-
 /// The time that all sessions of an experiment took.
 struct Clock {
     began: Instant,
@@ -115,7 +168,8 @@ struct Clock {
 }
 
 impl Clock {
-    fn open(out: &Path, began: Instant) -> Result<Self> {
+    fn open(out: &Path) -> Result<Self> {
+        let began = Instant::now();
         let path = out.join("wall_s");
         let before_s = match std::fs::read_to_string(&path) {
             Ok(text) => text
