@@ -73,7 +73,7 @@ fn a_model_swings_up_its_own_plant_and_the_episode_is_written() {
         let film =
             fs::read_to_string(dir.path().join(format!("e/episode-{number:03}.svg"))).unwrap();
         assert!(
-            film.contains("<animate") && film.contains("dur=\"10s\""),
+            film.contains("<animate") && film.contains("dur=\"10.000s\""),
             "{film:.300}"
         );
     }
@@ -418,7 +418,7 @@ fn one_run_tells_of_its_rounds() {
         "events.py",
         &[&dir.path().join("t"), &path, Path::new("return")],
     );
-    let again = json(dir.path(), &command[..5]);
+    let again = json(dir.path(), &[&command[..5], &command[7..]].concat());
     assert_eq!(again["rounds"], found["rounds"], "nothing is left to do");
     let unknown = refused(
         dir.path(),

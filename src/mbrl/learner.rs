@@ -39,7 +39,9 @@ impl Learner {
             Prior::Equations(dynamics) => {
                 Some(HybridModel::physics(dynamics, &self.backend.device())?)
             }
-            Prior::Trained(model) => Some(HybridModel::clone(model)),
+            // With tensors of its own: runs on several threads that share one can block each other for ever, since the
+            // autodiff backend keeps what hangs together in one graph and takes its locks in either order.
+            Prior::Trained(model) => Some(model.with_weights(&model.weights())?),
         })
     }
 

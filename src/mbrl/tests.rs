@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
@@ -130,4 +131,27 @@ fn a_stretch_begins_where_the_last_one_ended() {
     // Three stretches are an episode; the next one starts anew.
     assert_ne!(stretch(2)[20], stretch(3)[0]);
     assert!((stretch(3)[0] - std::f64::consts::PI).abs() < 0.2);
+}
+
+#[test]
+fn runs_of_one_trained_prior_do_not_block_each_other() {
+    let mut setting = setting();
+    let begun = setting.run().begin().unwrap();
+    let segments = begun.experience.segments(1).unwrap();
+    let trained = setting.learner.learn(&segments, None, 0, 0).unwrap();
+    setting.learner.prior = Prior::Trained(Box::new(trained.result().unwrap()));
+    setting.learner.fit.epochs = 500;
+    let learn = |seed| {
+        setting
+            .learner
+            .learn(&segments, None, seed, 0)
+            .unwrap()
+            .epoch()
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(4)
+        .build()
+        .unwrap();
+    let epochs: Vec<usize> = pool.install(|| (0..8).into_par_iter().map(learn).collect());
+    assert_eq!(epochs, [500; 8]);
 }
