@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -12,29 +12,7 @@ use residyn::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
 
-use super::train::{configs, refused};
-
-fn residyn(dir: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
-    command.current_dir(dir).args(arguments);
-    command
-}
-
-fn run(dir: &Path, arguments: &[&str]) -> Output {
-    let output = residyn(dir, arguments).output().unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    output
-}
-
-fn json(dir: &Path, arguments: &[&str]) -> Value {
-    let output = run(dir, &[arguments, &["--json"]].concat());
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn config(name: &str) -> String {
-    configs().join(name).display().to_string()
-}
+use super::train::{config, configs, json, refused, residyn};
 
 fn shipped(name: &str) -> String {
     let checkpoints = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints");

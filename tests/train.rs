@@ -15,22 +15,22 @@ pub fn configs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")
 }
 
-fn config(name: &str) -> String {
+pub fn config(name: &str) -> String {
     configs().join(name).display().to_string()
 }
 
-fn residyn(dir: &Path, arguments: &[&str]) -> Command {
+pub fn residyn(dir: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
     command.current_dir(dir).args(arguments);
     command
 }
 
-fn run(dir: &Path, arguments: &[&str]) -> Output {
+pub fn run(dir: &Path, arguments: &[&str]) -> Output {
     residyn(dir, arguments).output().unwrap()
 }
 
 /// The JSON of a run that must succeed.
-fn json(dir: &Path, arguments: &[&str]) -> Value {
+pub fn json(dir: &Path, arguments: &[&str]) -> Value {
     let output = run(dir, &[arguments, &["--json"]].concat());
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments:?}: {errors}");

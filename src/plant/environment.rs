@@ -167,6 +167,7 @@ mod tests {
     use super::Environment;
     use crate::expr::SignForm;
     use crate::model::{HybridModel, Integrator, Library};
+    use crate::plant::Plant;
     use crate::train::Backend;
 
     #[test]
@@ -193,6 +194,36 @@ mod tests {
                     (mine - trained).abs() < 1e-5,
                     "{mine} {trained} {integrator:?}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn a_delay_of_whole_steps_is_the_torque_of_so_many_steps_before() {
+        let library = Library::built_in();
+        let mut plant = Plant::read(Path::new("pendulum"), &library).unwrap();
+        let plain = plant.dynamics();
+        let torques = [1.0, -2.0, 3.0, 0.5, -1.5, 2.0];
+        let delay = ("d".to_owned(), 0.04);
+        plant
+            .add_effect(&library, "actuator_delay", 1, &[delay])
+            .unwrap();
+        let (late, values) = (plant.dynamics(), plant.values());
+        let steps = 4.try_into().unwrap();
+        for integrator in [Integrator::SemiImplicitEuler, Integrator::Fine { steps }] {
+            let mut delayed = Environment::new(&late, &values, integrator, 0.02);
+            let mut shifted = Environment::new(&plain, &plain.values(), integrator, 0.02);
+            let (mut a, mut b) = ([3.0, 0.1], [3.0, 0.1]);
+            for k in 0..torques.len() {
+                let time_s = 0.02 * k as f64;
+                let before = k.checked_sub(2).map_or(0.0, |k| torques[k]);
+                delayed.step(&mut a, &[torques[k]], time_s);
+                shifted.step(&mut b, &[before], time_s);
+                assert!(
+                    (0..2).all(|i| (a[i] - b[i]).abs() < 1e-9),
+                    "{k}: {a:?} {b:?}"
+                );
+                assert!((delayed.acting()[0] - before).abs() < 1e-9);
             }
         }
     }

@@ -58,7 +58,7 @@ fn alone(model: &HybridModel, settings: &FitSettings, start: &Start, on: &Segmen
     let all: Vec<usize> = (0..on.len()).collect();
     let batch = Batch::Columns(on.columns(&all, &model.device()));
     let objective = Objective::new(settings.integrator, None, model.joints()).unwrap();
-    let mut optimizer = Stepper::new(model.frame(), &settings);
+    let mut optimizer = Stepper::new(model.frame(), settings);
     let has_residual = model.frame().has_residual;
     let weights = settings.penalty.weights(start.penalty_weight, has_residual);
     for _ in 0..settings.epochs {
