@@ -7,6 +7,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use residyn::data::{Columns, Log};
+use residyn::experiment::{Config, Session};
 use residyn::model::Library;
 use residyn::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
@@ -230,6 +231,26 @@ fn kill_after(dir: &Path, arguments: &[&str], file: &Path) {
         None,
         "it was over before it was killed"
     );
+}
+
+#[test]
+fn every_experiment_is_sound() {
+    let library = Library::built_in();
+    let mut count = 0;
+    for name in ["physics-prior", "offline-prior", "receding-horizon"] {
+        for entry in fs::read_dir(configs().join(name)).unwrap() {
+            let config = Config::read(&entry.unwrap().path()).unwrap();
+            assert!(config.seeds >= 10, "{}", config.path.display());
+            assert!(
+                Session::open(config, &library, Backend::Flex)
+                    .unwrap()
+                    .rounds()
+                    > 0
+            );
+            count += 1;
+        }
+    }
+    assert!(count >= 8);
 }
 
 #[test]
