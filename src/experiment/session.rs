@@ -8,7 +8,7 @@ use super::results::{Course, PERFECT, PRIOR, Results};
 use super::{Config, ExperimentError, offline_prior, physics_prior, receding_horizon};
 use crate::control::{Predictor, Task};
 use crate::mbrl::{Judged, Run, Schedule};
-use crate::model::{Library, System};
+use crate::model::{FittedEffect, Library, System};
 use crate::plant::Plant;
 use crate::recipe::first_difference;
 use crate::report::write_whole;
@@ -181,6 +181,11 @@ impl Session {
             "experiment": experiment,
             "config": self.config,
             "task": self.task,
+            "plant": {
+                "model": self.plant.system.declaration,
+                "parameters": self.plant.parameters,
+                "effects": self.plant.effects.iter().map(effect).collect::<Vec<_>>(),
+            },
             "device": self.backend.name(),
         })
     }
@@ -314,6 +319,12 @@ impl Session {
             seed,
         }
     }
+}
+
+/// An effect of a plant: name, joint counted from 1, values.
+fn effect(effect: &FittedEffect) -> Value {
+    let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
+    json!([effect.effect.name, effect.joint + 1, values])
 }
 
 /// Say in `dir` what is done there, or find that it is this.
