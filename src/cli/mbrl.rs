@@ -9,7 +9,7 @@ use serde_json::json;
 use super::experiment::message;
 use super::{Answer, Common, inputs, progress};
 use crate::experiment::{Config, Session, Step};
-use crate::mbrl::Round;
+use crate::mbrl::{Folder, Round};
 use crate::report::EventFile;
 
 /// Model-based reinforcement learning: train, control, add what was seen, and again
@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     /// Which of its methods
     #[arg(long, value_name = "NAME", default_value = "hybrid")]
     method: String,
-    /// Folder for rounds.jsonl, the stretches of motion as logs, and the last checkpoint
+    /// Folder for rounds.jsonl, the stretches of motion as logs, and the last model as a checkpoint
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Folder for an event file of the rounds done now, for TensorBoard
@@ -79,7 +79,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
         inputs::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
-        inputs::print(&table(&rounds, out))?;
+        let checkpoint = Folder::open(out)?.checkpoint();
+        inputs::print(&table(&rounds, &checkpoint))?;
     }
     Ok(Answer::Yes)
 }
@@ -109,7 +110,7 @@ fn tell(events: &mut EventFile, round: &Round) -> Result<()> {
     Ok(())
 }
 
-fn table(rounds: &[Round], out: &Path) -> String {
+fn table(rounds: &[Round], checkpoint: &Path) -> String {
     let mut text = String::from("transitions      return  success  prediction error   ||F_r||\n");
     for round in rounds {
         let success = if round.judged.success { "yes" } else { "no" };
@@ -118,5 +119,5 @@ fn table(rounds: &[Round], out: &Path) -> String {
             round.transitions, round.judged.total, round.error, round.residual_norm
         );
     }
-    text + &format!("checkpoint: {}\n", out.join("checkpoint").display())
+    text + &format!("checkpoint: {}\n", checkpoint.display())
 }

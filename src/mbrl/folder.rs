@@ -8,10 +8,10 @@ use crate::report::write_whole;
 use crate::train::{Checkpoint, Origin, Training, save};
 
 const ROUNDS: &str = "rounds.jsonl";
-const CHECKPOINT: &str = "checkpoint";
 
 /// Where a run is kept: `stretch-000.csv` and on, what was seen of the plant; `rounds.jsonl`, a line for each round; and
-/// `checkpoint`, the last model. A run goes on from what lies there, and ends with the same numbers.
+/// `checkpoint-001` or later, the model after the last one. A run goes on from what lies there, and ends with the same
+/// numbers.
 pub struct Folder {
     dir: PathBuf,
     rounds: Vec<Round>,
@@ -58,9 +58,13 @@ impl Folder {
         &self.rounds
     }
 
-    /// Where the last model is.
+    /// Where the model after the last round is.
     pub fn checkpoint(&self) -> PathBuf {
-        self.dir.join(CHECKPOINT)
+        self.checkpoint_after(self.rounds.len())
+    }
+
+    fn checkpoint_after(&self, rounds: usize) -> PathBuf {
+        self.dir.join(format!("checkpoint-{rounds:03}"))
     }
 
     /// The run as it was left, or begun. `dynamics` is what its model file says.
@@ -87,7 +91,8 @@ impl Folder {
         })
     }
 
-    /// Keep what a round brought. Its line comes last: without it the round is done again.
+    /// Keep what a round brought. Its line comes last: without it the round is done again, from the model before it,
+    /// which therefore goes only then.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -100,11 +105,23 @@ impl Folder {
     ) -> Result<(), RunError> {
         let logs = &progress.experience.logs;
         self.write_stretch(&logs[logs.len() - 1], logs.len() - 1)?;
-        save(&self.checkpoint(), training, origin)?;
         self.rounds.push(round);
+        save(&self.checkpoint(), training, origin)?;
         let line = |round| serde_json::to_string(round).expect("numbers and texts") + "\n";
         let lines: String = self.rounds.iter().map(line).collect();
-        Ok(write_whole(&self.dir.join(ROUNDS), lines.as_bytes())?)
+        write_whole(&self.dir.join(ROUNDS), lines.as_bytes())?;
+        self.forget_earlier()
+    }
+
+    fn forget_earlier(&self) -> Result<(), RunError> {
+        let earlier = (1..self.rounds.len()).map(|rounds| self.checkpoint_after(rounds));
+        for path in earlier.filter(|path| path.exists()) {
+            fs::remove_dir_all(&path).map_err(|error| RunError::Saved {
+                message: error.to_string(),
+                path,
+            })?;
+        }
+        Ok(())
     }
 
     fn stretch(&self, number: usize) -> PathBuf {

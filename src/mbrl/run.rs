@@ -142,7 +142,7 @@ impl Run<'_> {
         let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
         let mut rng = stream(self.seed, Purpose::Judge, 0);
         let start = self.task.draw_start(&mut rng);
-        let mut rig = self.rig_from(&dynamics, &values, &start);
+        let mut rig = self.task.rig(self.plant, &dynamics, &values, &start);
         let draws = stream(self.seed, Purpose::JudgePlan, 0);
         with_controller(predictor, self.task, replan, &draws, |controller| {
             let episode = episode(self.task, &mut rig, controller, &mut rng)?;
@@ -185,19 +185,7 @@ impl Run<'_> {
 
     fn rig<'d>(&self, dynamics: &'d Dynamics, values: &[f64], number: usize) -> Rig<'d> {
         let mut rng = stream(self.seed, Purpose::Start, number);
-        self.rig_from(dynamics, values, &self.task.draw_start(&mut rng))
-    }
-
-    fn rig_from<'d>(&self, dynamics: &'d Dynamics, values: &[f64], start: &[f64]) -> Rig<'d> {
-        let (task, start) = (self.task, self.plant.as_read(start));
-        let settings = &task.plant;
-        Rig::new(
-            dynamics,
-            values,
-            &start,
-            settings.integrator,
-            task.step_s,
-            settings.noise,
-        )
+        let start = self.task.draw_start(&mut rng);
+        self.task.rig(self.plant, dynamics, values, &start)
     }
 }

@@ -1,3 +1,4 @@
+use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -118,6 +119,28 @@ fn a_run_in_sessions_is_the_run_in_one() {
     let seen: Vec<usize> = rounds.iter().map(|round| round.transitions).collect();
     assert_eq!(seen, [15, 35, 55, 75, 95]);
     assert_eq!(angles.len(), 15 + 5 * 20 + 6);
+}
+
+#[test]
+fn a_round_without_its_line_is_done_again_from_the_model_before_it() {
+    let setting = setting();
+    let (killed, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let go_on = |dir: &Path, until| {
+        let mut folder = Folder::open(dir).unwrap();
+        let mut progress = folder.progress(&setting.run(), &setting.dynamics).unwrap();
+        setting.rounds(&mut progress, &mut folder, until);
+        folder
+    };
+    // As a kill between the third model and its line leaves it.
+    let second = go_on(killed.path(), 2).checkpoint();
+    let third = go_on(further.path(), 3).checkpoint();
+    let left = killed.path().join(third.file_name().unwrap());
+    fs::rename(third, &left).unwrap();
+    assert_eq!(
+        go_on(killed.path(), 5).rounds(),
+        setting.in_sessions(&[5]).0
+    );
+    assert!(!second.exists() && !left.exists());
 }
 
 #[test]
