@@ -138,6 +138,11 @@ fn what_cannot_be_controlled_is_told() {
     );
 }
 
+/// The command line of an experiment.
+fn experiment<'a>(name: &'a str, config: &'a str, out: &'a str) -> [&'a str; 6] {
+    ["experiment", name, "--config", config, "--out", out]
+}
+
 /// The error that a recipe's run has on other data, and the model that comes of it.
 fn trained_again(recipe: &str) -> (f64, tempfile::TempDir) {
     let dir = tempfile::tempdir().unwrap();
@@ -257,14 +262,7 @@ fn every_experiment_is_sound() {
 fn a_killed_experiment_goes_on_to_the_same_numbers() {
     let config = config("smoke/physics-prior-pendulum.toml");
     let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let command = [
-        "experiment",
-        "physics-prior",
-        "--config",
-        &config,
-        "--out",
-        "x",
-    ];
+    let command = experiment("physics-prior", &config, "x");
     let expected = json(whole.path(), &command);
     for file in ["hybrid-00/rounds.jsonl", "data_driven-00/rounds.jsonl"] {
         kill_after(
@@ -321,14 +319,7 @@ fn a_folder_keeps_to_its_experiment() {
         .replace("../plants/pendulum-real.toml", "pendulum-real");
     let text = text.replace("../../models/pendulum.toml", "pendulum");
     fs::write(dir.path().join("c.toml"), &text).unwrap();
-    let command = [
-        "experiment",
-        "receding-horizon",
-        "--config",
-        "c.toml",
-        "--out",
-        "x",
-    ];
+    let command = experiment("receding-horizon", "c.toml", "x");
     let found = json(dir.path(), &command);
     assert_eq!(found["receding_horizon"], serde_json::json!([25, 50]));
     assert_eq!(
@@ -364,17 +355,7 @@ fn a_folder_keeps_to_its_experiment() {
 fn an_offline_prior_is_what_its_checkpoint_is() {
     let dir = tempfile::tempdir().unwrap();
     let config = config("smoke/offline-prior-pendulum.toml");
-    let found = json(
-        dir.path(),
-        &[
-            "experiment",
-            "offline-prior",
-            "--config",
-            &config,
-            "--out",
-            "x",
-        ],
-    );
+    let found = json(dir.path(), &experiment("offline-prior", &config, "x"));
     let prior = found["methods"]["prior"]["return_mean"][0]
         .as_f64()
         .unwrap();
@@ -382,17 +363,7 @@ fn an_offline_prior_is_what_its_checkpoint_is() {
         .as_f64()
         .unwrap();
     assert!(prior < 0.0 && perfect > 290.0, "{prior} {perfect}");
-    let wrong = refused(
-        dir.path(),
-        &[
-            "experiment",
-            "physics-prior",
-            "--config",
-            &config,
-            "--out",
-            "y",
-        ],
-    );
+    let wrong = refused(dir.path(), &experiment("physics-prior", &config, "y"));
     assert!(
         wrong.contains("physics-prior needs a method whose prior is equations"),
         "{wrong}"

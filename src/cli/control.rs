@@ -1,4 +1,5 @@
 use std::fmt::Write;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -10,9 +11,10 @@ use super::{Answer, Common, inputs, progress};
 use crate::control::{
     Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
 };
-use crate::model::{Integrator, Library};
+use crate::experiment::statistics::{deviation, mean};
+use crate::model::Library;
 use crate::plan::Method;
-use crate::plant::{Noise, Plant, Rig};
+use crate::plant::{Noise, Plant};
 use crate::report::{film, write_whole};
 
 /// Model-predictive control of a simulated plant by any model
@@ -39,8 +41,8 @@ pub(super) struct Arguments {
     /// Task file, or the name of a built-in task; by default a built-in one of the plant's system
     #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
-    #[arg(long, default_value_t = 1)]
-    episodes: usize,
+    #[arg(long, default_value = "1")]
+    episodes: NonZeroUsize,
     /// Steps of a plan that are carried out before the next, instead of the task's
     #[arg(long, value_name = "STEPS")]
     replan: Option<usize>,
@@ -118,9 +120,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         std::fs::create_dir_all(out)
             .with_context(|| format!("{} cannot be made", out.display()))?;
     }
-    let bar = progress::bar(arguments.episodes);
+    let count = arguments.episodes.get();
+    let bar = progress::bar(count);
     let mut entries = Vec::new();
-    for number in 0..arguments.episodes {
+    for number in 0..count {
         entries.push(one(arguments, &plant, &task, &predictor, number)?);
         bar.inc(1);
         bar.set_message("episodes");
@@ -195,10 +198,9 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
     }
     let file = arguments.model.as_ref().expect("clap asks for one of both");
     let system = library.system(file)?;
-    let integrator: Integrator = task.integrator;
     Ok(Predictor::of_equations(
         system.dynamics(&system.sign()),
-        integrator,
+        task.integrator,
     ))
 }
 
@@ -212,29 +214,30 @@ fn one(
     let seed = arguments.common.seed;
     let mut rng = stream(seed, Purpose::Judge, number);
     let (dynamics, values) = (plant.dynamics(), plant.values());
-    let start = plant.as_read(&task.draw_start(&mut rng));
-    let settings = &task.plant;
-    let mut rig = Rig::new(
-        &dynamics,
-        &values,
-        &start,
-        settings.integrator,
-        task.step_s,
-        settings.noise,
-    );
+    let start = task.draw_start(&mut rng);
+    let mut rig = task.rig(plant, &dynamics, &values, &start);
     let draws = stream(seed, Purpose::JudgePlan, number);
-    let (episode, timed) = with_controller(predictor, task, task.replan, &draws, |controller| {
-        let mut timed = Timed::new(controller);
+    with_controller(predictor, task, task.replan, &draws, |controller| {
+        let mut timed = Timed {
+            controller,
+            deciding: Duration::ZERO,
+        };
         let episode = episode(task, &mut rig, &mut timed, &mut rng)?;
-        Ok::<_, anyhow::Error>((episode, timed.effort()))
-    })?;
-    let (log, film) = written(arguments, task, &episode, number)?;
-    Ok(Entry {
-        total: episode.total(),
-        success: episode.success,
-        log,
-        film,
-        ..timed
+        let Timed {
+            controller,
+            deciding,
+        } = timed;
+        let decisions = controller.decisions();
+        let (log, film) = written(arguments, task, &episode, number)?;
+        Ok(Entry {
+            total: episode.total(),
+            success: episode.success,
+            decisions,
+            ms_per_decision: 1e3 * deciding.as_secs_f64() / decisions as f64,
+            diverged: controller.diverged(),
+            log,
+            film,
+        })
     })
 }
 
@@ -271,29 +274,6 @@ struct Timed<'c, 'p, 'r> {
     deciding: Duration,
 }
 
-impl<'c, 'p, 'r> Timed<'c, 'p, 'r> {
-    fn new(controller: &'c mut Controller<'p, 'r>) -> Self {
-        Self {
-            controller,
-            deciding: Duration::ZERO,
-        }
-    }
-
-    /// An entry with what it took.
-    fn effort(&self) -> Entry {
-        let decisions = self.controller.decisions();
-        Entry {
-            total: 0.0,
-            success: false,
-            decisions,
-            ms_per_decision: 1e3 * self.deciding.as_secs_f64() / decisions as f64,
-            diverged: self.controller.diverged(),
-            log: None,
-            film: None,
-        }
-    }
-}
-
 impl Policy for Timed<'_, '_, '_> {
     fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64> {
         let began = Instant::now();
@@ -305,9 +285,7 @@ impl Policy for Timed<'_, '_, '_> {
 
 impl Printed {
     fn new(arguments: &Arguments, task: Task, episodes: Vec<Entry>) -> Self {
-        let count = episodes.len() as f64;
-        let mean = episodes.iter().map(|e| e.total).sum::<f64>() / count;
-        let squares = episodes.iter().map(|e| (e.total - mean).powi(2));
+        let returns: Vec<f64> = episodes.iter().map(|e| e.total).collect();
         Self {
             schema: 1,
             version: env!("CARGO_PKG_VERSION"),
@@ -315,8 +293,8 @@ impl Printed {
             plant: arguments.plant.clone(),
             task_name: task.name(),
             task,
-            return_mean: mean,
-            return_std: (squares.sum::<f64>() / (count - 1.0).max(1.0)).sqrt(),
+            return_mean: mean(&returns),
+            return_std: deviation(&returns),
             successes: episodes.iter().filter(|e| e.success).count(),
             episodes,
         }

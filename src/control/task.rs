@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Meter;
-use crate::model::Integrator;
+use crate::model::{Dynamics, Integrator};
 use crate::plan::{Objective, Settings};
-use crate::plant::Noise;
+use crate::plant::{Noise, Plant, Rig};
 
 /// What a plant is to do, and how is planned for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -162,6 +162,22 @@ impl Task {
         (self.start.iter().zip(spread))
             .map(|(middle, half)| middle + half * rng.random_range(-1.0..=1.0))
             .collect()
+    }
+
+    /// `plant` at a true start, moving and measured as the task says; `dynamics` and `values` are its own.
+    ///
+    /// # Panics
+    /// When one of them is of another system.
+    pub fn rig<'d>(
+        &self,
+        plant: &Plant,
+        dynamics: &'d Dynamics,
+        values: &[f64],
+        start: &[f64],
+    ) -> Rig<'d> {
+        let PlantSettings { integrator, noise } = self.plant;
+        let start = plant.as_read(start);
+        Rig::new(dynamics, values, &start, integrator, self.step_s, noise)
     }
 
     /// Whether it makes sense, for a plant of `joints` joints.

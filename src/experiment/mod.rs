@@ -10,7 +10,7 @@ mod picture;
 mod receding_horizon;
 mod results;
 mod session;
-mod statistics;
+pub(crate) mod statistics;
 pub mod undeclared_effect;
 
 pub use config::{Config, MethodConfig};
