@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use super::{Answer, Common, inputs, progress};
 use crate::experiment::undeclared_effect::{self, Lab, Trial};
 use crate::experiment::{Config, Experiment, Session, Step, picture};
+use crate::model::Library;
 use crate::report::write_whole;
 
 /// Experiments: return against real transitions, against the receding horizon, and with effects that nobody declared
@@ -52,11 +53,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let out = &arguments.out;
     inputs::check_writable(out)?;
     let clock = Clock::open(out)?;
+    let library = inputs::library(&arguments.effects)?;
+    let published = |experiment| published(arguments, experiment, &library, &clock);
     let finished = match arguments.name {
-        Name::PhysicsPrior => published(arguments, Experiment::PhysicsPrior, &clock),
-        Name::OfflinePrior => published(arguments, Experiment::OfflinePrior, &clock),
-        Name::RecedingHorizon => published(arguments, Experiment::RecedingHorizon, &clock),
-        Name::UndeclaredEffect => undeclared_effect(arguments, &clock),
+        Name::PhysicsPrior => published(Experiment::PhysicsPrior),
+        Name::OfflinePrior => published(Experiment::OfflinePrior),
+        Name::RecedingHorizon => published(Experiment::RecedingHorizon),
+        Name::UndeclaredEffect => undeclared_effect(arguments, library, &clock),
     }?;
     clock.save();
     write_whole(&out.join("results.json"), finished.json.as_bytes())?;
@@ -65,16 +68,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(finished.answer)
 }
 
-fn published(arguments: &Arguments, experiment: Experiment, clock: &Clock) -> Result<Finished> {
-    let Arguments {
-        config,
-        out,
-        effects,
-        common,
-        ..
-    } = arguments;
-    let library = inputs::library(effects)?;
-    let session = Session::open(Config::read(config)?, &library, common.device)?;
+fn published(
+    arguments: &Arguments,
+    experiment: Experiment,
+    library: &Library,
+    clock: &Clock,
+) -> Result<Finished> {
+    let (config, out) = (Config::read(&arguments.config)?, &arguments.out);
+    let session = Session::open(config, library, arguments.common.device)?;
     let bar = progress::bar(session.rounds());
     let results = session.carry_out(experiment, out, &|step: &Step<'_>| {
         bar.inc(1);
@@ -97,17 +98,10 @@ fn published(arguments: &Arguments, experiment: Experiment, clock: &Clock) -> Re
     })
 }
 
-fn undeclared_effect(arguments: &Arguments, clock: &Clock) -> Result<Finished> {
-    let Arguments {
-        config,
-        out,
-        effects,
-        common,
-        ..
-    } = arguments;
-    let library = inputs::library(effects)?;
-    let experiment = undeclared_effect::Experiment::read(config)?;
-    let lab = Lab::new(experiment, library, common.device)?;
+fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock) -> Result<Finished> {
+    let out = &arguments.out;
+    let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
+    let lab = Lab::new(experiment, library, arguments.common.device)?;
     let trials = lab.experiment.seeds * lab.plants.len() as u64;
     let bar = progress::bar(usize::try_from(trials)?);
     let outcome = lab.run(out, &|trial: &Trial| {

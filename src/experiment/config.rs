@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::ExperimentError;
@@ -55,17 +56,9 @@ impl Config {
     /// # Errors
     /// Unreadable file, unknown key, numbers that make no sense: with place and remedy.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ExperimentError::Open {
-            path: path.to_owned(),
-            source,
-        })?;
-        let wrong = |message| ExperimentError::File {
-            path: path.to_owned(),
-            message,
-        };
-        let mut config: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let mut config: Self = read_toml(path)?;
         path.clone_into(&mut config.path);
-        config.check().map_err(wrong)?;
+        config.check().map_err(|message| config.wrong(message))?;
         Ok(config)
     }
 
@@ -118,6 +111,18 @@ impl Config {
         }
         Ok(())
     }
+}
+
+/// What a file of this kind says.
+pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ExperimentError::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    toml::from_str(&text).map_err(|error| ExperimentError::File {
+        path: path.to_owned(),
+        message: error.to_string(),
+    })
 }
 
 /// A file that the one at `path` names or, where there is none, the name as it is: that of something built in.

@@ -6,12 +6,7 @@ use crate::mbrl::Prior;
 pub(super) const NAME: &str = "offline-prior";
 
 pub(super) fn check(session: &Session) -> Result<(), String> {
-    let trained = |prior: &Prior| matches!(prior, Prior::Trained(_));
-    if session
-        .methods
-        .iter()
-        .any(|method| trained(&method.learner.prior))
-    {
+    if session.has_prior(|prior| matches!(prior, Prior::Trained(_))) {
         return Ok(());
     }
     Err(format!(

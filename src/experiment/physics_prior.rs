@@ -6,12 +6,7 @@ use crate::mbrl::Prior;
 pub(super) const NAME: &str = "physics-prior";
 
 pub(super) fn check(session: &Session) -> Result<(), String> {
-    let physics = |prior: &Prior| matches!(prior, Prior::Equations(_));
-    if session
-        .methods
-        .iter()
-        .any(|method| physics(&method.learner.prior))
-    {
+    if session.has_prior(|prior| matches!(prior, Prior::Equations(_))) {
         return Ok(());
     }
     Err(format!(

@@ -110,10 +110,7 @@ impl Results {
                 None => enough.next().map(|(transitions, _)| *transitions),
             },
             final_share_of_perfect: course.return_mean[last] / perfect,
-            final_successes: course.success[last]
-                .iter()
-                .filter(|success| **success)
-                .count(),
+            final_successes: course.successes(last),
             seeds_above_prior: self.methods.get(PRIOR).map(above),
         }
     }
@@ -163,11 +160,13 @@ impl Results {
 }
 
 impl Course {
+    fn successes(&self, entry: usize) -> usize {
+        let seeds = self.success[entry].iter();
+        seeds.filter(|success| **success).count()
+    }
+
     fn entry(&self, entry: usize) -> String {
-        let upright = self.success[entry]
-            .iter()
-            .filter(|success| **success)
-            .count();
+        let upright = self.successes(entry);
         let seeds = self.success[entry].len();
         let (mean, std) = (self.return_mean[entry], self.return_std[entry]);
         format!("{mean:>9.1} +- {std:>6.1}   {upright:>3}/{seeds:<3}")

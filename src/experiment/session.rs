@@ -7,7 +7,7 @@ use super::learning::{Learnt, Method, Step};
 use super::results::{Course, PERFECT, PRIOR, Results};
 use super::{Config, ExperimentError, offline_prior, physics_prior, receding_horizon};
 use crate::control::{Predictor, Task};
-use crate::mbrl::{Judged, Run, Schedule};
+use crate::mbrl::{Judge, Judged, Prior, Run, Schedule};
 use crate::model::{FittedEffect, Library, System};
 use crate::plant::Plant;
 use crate::recipe::first_difference;
@@ -37,12 +37,6 @@ pub type Observer<'o> = &'o (dyn Fn(&Step<'_>) + Sync);
 const CONFIG: &str = "experiment.json";
 
 impl Experiment {
-    pub const ALL: [Self; 3] = [
-        Self::PhysicsPrior,
-        Self::OfflinePrior,
-        Self::RecedingHorizon,
-    ];
-
     /// The name that the command line takes.
     pub fn name(self) -> &'static str {
         match self {
@@ -109,10 +103,7 @@ impl Session {
 
     /// Trainings of one run of a method; 0 where it is unknown.
     pub fn rounds_of(&self, method: &str) -> usize {
-        let mut methods = self.methods.iter();
-        methods
-            .find(|known| known.config.name == method)
-            .map_or(0, |known| known.config.rounds)
+        self.method(method).map_or(0, |known| known.config.rounds)
     }
 
     /// Carry out an experiment in the folder `out`, or go on with it.
@@ -154,11 +145,7 @@ impl Session {
         dir: &Path,
         observer: Observer<'_>,
     ) -> Result<(), ExperimentError> {
-        let Some(method) = self
-            .methods
-            .iter()
-            .find(|known| known.config.name == method)
-        else {
+        let Some(method) = self.method(method) else {
             let known: Vec<&str> = self
                 .methods
                 .iter()
@@ -174,6 +161,18 @@ impl Session {
         resolved["method"] = json!(method.config.name);
         claim(dir, &resolved)?;
         self.learn_one(method, seed, dir, observer).map(drop)
+    }
+
+    fn method(&self, name: &str) -> Option<&Method> {
+        self.methods
+            .iter()
+            .find(|method| method.config.name == name)
+    }
+
+    /// Whether one of the methods has such a prior.
+    pub(super) fn has_prior(&self, is_such: impl Fn(&Prior) -> bool) -> bool {
+        let mut methods = self.methods.iter();
+        methods.any(|method| is_such(&method.learner.prior))
     }
 
     fn resolved(&self, experiment: &str) -> Value {
@@ -269,9 +268,13 @@ impl Session {
         method: &str,
     ) -> Result<Vec<Judged>, ExperimentError> {
         let judge = |seed: u64| {
-            let run = self.run_of(&self.methods[0], seed);
+            let judge = Judge {
+                task: &self.task,
+                plant: &self.plant,
+                seed,
+            };
             #[allow(clippy::cast_possible_truncation)] // few seeds
-            let judged = run.judge(&predictor(seed as usize), replan);
+            let judged = judge.judge(&predictor(seed as usize), replan);
             judged.map_err(|source| ExperimentError::Run {
                 method: method.to_owned(),
                 seed,

@@ -8,11 +8,6 @@ pub struct Experience {
 }
 
 impl Experience {
-    /// Number of transitions (s, a, s').
-    pub fn transitions(&self) -> usize {
-        self.logs.iter().map(|log| log.rows() - 1).sum()
-    }
-
     /// The transitions for training, states as they were measured.
     ///
     /// # Errors

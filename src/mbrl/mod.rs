@@ -4,6 +4,7 @@
 mod error;
 mod experience;
 mod folder;
+mod judge;
 mod learner;
 mod run;
 
@@ -13,5 +14,6 @@ mod tests;
 pub use error::RunError;
 pub use experience::Experience;
 pub use folder::Folder;
+pub use judge::{Judge, Judged};
 pub use learner::{Learner, Prior};
-pub use run::{Judged, Progress, Round, Run, Schedule};
+pub use run::{Progress, Round, Run, Schedule};

@@ -1,9 +1,7 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Learner, RunError};
-use crate::control::{
-    Episode, Predictor, Purpose, RandomTorque, Task, drive, episode, stream, with_controller,
-};
+use super::{Experience, Judge, Judged, Learner, RunError};
+use crate::control::{Predictor, Purpose, RandomTorque, Task, drive, stream, with_controller};
 use crate::data::Log;
 use crate::model::{Dynamics, HybridModel};
 use crate::plant::{Plant, Rig};
@@ -57,18 +55,6 @@ pub struct Round {
     pub parameters: Vec<(String, f64)>,
 }
 
-/// How an episode went that is not learnt from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Judged {
-    /// The sum of rewards.
-    #[serde(rename = "return")]
-    pub total: f64,
-    /// Whether the goal held until the end.
-    pub success: bool,
-    /// Candidates of all plans whose rollout diverged.
-    pub diverged: usize,
-}
-
 impl Run<'_> {
     /// Random data, before the first round.
     ///
@@ -99,7 +85,7 @@ impl Run<'_> {
         let training = self.learner.learn(&segments, previous, seed, round)?;
         let model = training.result()?;
         let predictor = Predictor::of_model(&model, self.learner.fit.integrator);
-        let judged = self.judge(&predictor, self.task.replan)?;
+        let judged = self.judge().judge(&predictor, self.task.replan)?;
         let last = training.history().last().expect("a run records its end");
         let record = Round {
             round,
@@ -116,38 +102,12 @@ impl Run<'_> {
         Ok((record, training))
     }
 
-    /// An episode that is not learnt from. It has the same start, noise and draws of candidates for every model, so that
-    /// models alone make the difference.
-    ///
-    /// # Errors
-    /// A plant that diverges.
-    pub fn judge(&self, predictor: &Predictor, replan: usize) -> Result<Judged, RunError> {
-        let (episode, diverged) = self.episode(predictor, replan)?;
-        Ok(Judged {
-            total: episode.total(),
-            success: episode.success,
-            diverged,
-        })
-    }
-
-    /// The same in full, and how many candidates diverged.
-    ///
-    /// # Errors
-    /// A plant that diverges.
-    pub fn episode(
-        &self,
-        predictor: &Predictor,
-        replan: usize,
-    ) -> Result<(Episode, usize), RunError> {
-        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
-        let mut rng = stream(self.seed, Purpose::Judge, 0);
-        let start = self.task.draw_start(&mut rng);
-        let mut rig = self.task.rig(self.plant, &dynamics, &values, &start);
-        let draws = stream(self.seed, Purpose::JudgePlan, 0);
-        with_controller(predictor, self.task, replan, &draws, |controller| {
-            let episode = episode(self.task, &mut rig, controller, &mut rng)?;
-            Ok((episode, controller.diverged()))
-        })
+    fn judge(&self) -> Judge<'_> {
+        Judge {
+            task: self.task,
+            plant: self.plant,
+            seed: self.seed,
+        }
     }
 
     fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {

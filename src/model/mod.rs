@@ -32,7 +32,7 @@ pub use integrator::{Integrator, Step};
 pub use library::Library;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, ResidualOn,
-    network_dynamics, nothing_but, with_residual,
+    with_residual,
 };
 pub use reader::FileError;
 pub use rollout::Rollout;

@@ -393,21 +393,9 @@ pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, 
     })
 }
 
-/// A model that is a network alone: dq/dt = qd and dqd/dt = network, or both from the network.
-///
-/// # Errors
-/// When the network is not one for `joints` joints.
-pub fn network_dynamics(
-    name: &str,
-    joints: usize,
-    mlp: &MlpWeights,
-) -> Result<Dynamics, HybridError> {
-    with_residual(&nothing_but(name, joints, mlp.on), mlp)
-}
-
 /// The rates that a network is added to where there are no equations: none, or dq/dt = qd where it gives
 /// accelerations alone.
-pub fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
+pub(super) fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
     let mut graph = Graph::new();
     let numbered = |stem: &'static str| (1..=joints).map(move |joint| format!("{stem}{joint}"));
     let names = ["q", "qd", "tau"]
@@ -434,7 +422,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{InputScaling, LastLayer, MlpSettings, MlpWeights, network_dynamics};
+    use super::{InputScaling, LastLayer, MlpSettings, MlpWeights, nothing_but, with_residual};
 
     #[test]
     fn a_network_with_other_scaling_is_the_same_function() {
@@ -451,8 +439,9 @@ mod tests {
         };
         let rescaled = network.rescaled(other.clone());
         assert_eq!(rescaled.scaling, other);
-        let rates = |network| {
-            let dynamics = network_dynamics("pendulum", 1, network).unwrap();
+        let rates = |network: &MlpWeights| {
+            let around = nothing_but("pendulum", 1, network.on);
+            let dynamics = with_residual(&around, network).unwrap();
             dynamics.program.eval(&[0.7, -1.5, 0.4, 0.0])
         };
         for (a, b) in rates(&network).into_iter().zip(rates(&rescaled)) {

@@ -66,16 +66,11 @@ impl<'d> Rig<'d> {
         f64::from(self.steps) * self.step_s
     }
 
-    /// Steps since the start.
-    pub fn steps(&self) -> usize {
-        self.steps as usize
-    }
-
     /// What the sensors give for the state.
     pub fn measure(&mut self, rng: &mut impl Rng) -> Vec<f64> {
         let state: Vec<_> = self.state.iter().map(|x| Row([*x])).collect();
         let acting = || self.environment.acting().into_iter().map(|x| Row([x]));
-        let time = Row([f64::from(self.steps) * self.step_s]);
+        let time = Row([self.time_s()]);
         let shown = self.sensors.show(&state, || acting().collect(), time);
         let angles = shown
             .iter()

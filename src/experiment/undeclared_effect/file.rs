@@ -51,17 +51,19 @@ impl Experiment {
     /// # Errors
     /// Unreadable file, unknown key, or numbers that make no sense: with line and remedy.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
-        let wrong = |message: String| ExperimentError::File {
-            path: path.to_owned(),
-            message,
-        };
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| wrong(format!("{error}; give an experiment with --config")))?;
-        let mut experiment: Self =
-            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let mut experiment: Self = config::read_toml(path)?;
         path.clone_into(&mut experiment.path);
-        experiment.check().map_err(wrong)?;
+        experiment
+            .check()
+            .map_err(|message| experiment.wrong(message))?;
         Ok(experiment)
+    }
+
+    pub(super) fn wrong(&self, message: String) -> ExperimentError {
+        ExperimentError::File {
+            path: self.path.clone(),
+            message,
+        }
     }
 
     fn check(&self) -> Result<(), String> {

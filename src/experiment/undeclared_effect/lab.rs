@@ -35,18 +35,15 @@ impl Lab {
         let model = experiment.beside_or_named(&experiment.model);
         let declared = library.system(&model)?;
         let task = Task::read(&experiment.beside_or_named(&experiment.task))?;
-        let wrong = |message: String| ExperimentError::File {
-            path: experiment.path.clone(),
-            message,
-        };
         if task.system != declared.name {
-            return Err(wrong(format!(
+            return Err(experiment.wrong(format!(
                 "the task is for {}, the model is of {}; give those that belong together",
                 task.system, declared.name
             )));
         }
         let plant = |case: &Case| -> Result<Plant, ExperimentError> {
-            let told = |message: String| wrong(format!("case `{}`: {message}", case.name));
+            let told =
+                |message: String| experiment.wrong(format!("case `{}`: {message}", case.name));
             let mut plant =
                 Plant::read(&model, &library).map_err(|error| told(error.to_string()))?;
             plant.set_parameters(&case.parameters).map_err(told)?;

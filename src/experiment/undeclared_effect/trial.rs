@@ -6,7 +6,7 @@ use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, cl
 use crate::control::{Predictor, Purpose, stream};
 use crate::data::Log;
 use crate::experiment::ExperimentError;
-use crate::mbrl::{Experience, Judged, Learner, Prior, Run, RunError, Schedule};
+use crate::mbrl::{Experience, Judge, Judged, Learner, Prior, RunError};
 use crate::model::Dynamics;
 
 /// One plant under control by every model, all from the same start, under the same noise and with the same draws of
@@ -113,9 +113,9 @@ impl Lab {
             source,
         };
         let learner = self.learner();
-        let run = self.on(case, &learner, seed);
+        let judge = self.judge(case, seed);
         let score = |model, episodes, predictor: &Predictor| -> Result<Score, ExperimentError> {
-            let judged = run.judge(predictor, self.task.replan).map_err(failed)?;
+            let judged = judge.judge(predictor, self.task.replan).map_err(failed)?;
             Ok(Score {
                 model,
                 episodes,
@@ -130,7 +130,7 @@ impl Lab {
         let mut best = declared;
         for &episodes in &self.experiment.episodes {
             while logs.len() < episodes {
-                logs.push(self.gather(&run, &best, logs.len()).map_err(failed)?);
+                logs.push(self.gather(judge, &best, logs.len()).map_err(failed)?);
             }
             let outcome = self
                 .close(&logs, seed)
@@ -173,24 +173,18 @@ impl Lab {
         }
     }
 
-    fn on<'a>(&'a self, case: usize, learner: &'a Learner, seed: u64) -> Run<'a> {
-        Run {
+    fn judge(&self, case: usize, seed: u64) -> Judge<'_> {
+        Judge {
             task: &self.task,
             plant: &self.plants[case],
-            learner,
-            schedule: Schedule {
-                random: 0,
-                gather: self.task.steps,
-                rounds: 1,
-            },
             seed,
         }
     }
 
     /// The log of an episode with a start, noise and candidates of its own.
-    fn gather(&self, run: &Run<'_>, model: &Predictor, number: usize) -> Result<Log, RunError> {
-        let seed = stream(run.seed, Purpose::Gather, number).next_u64();
-        let (episode, _) = Run { seed, ..*run }.episode(model, self.task.replan)?;
+    fn gather(&self, judge: Judge<'_>, model: &Predictor, number: usize) -> Result<Log, RunError> {
+        let seed = stream(judge.seed, Purpose::Gather, number).next_u64();
+        let (episode, _) = Judge { seed, ..judge }.episode(model, self.task.replan)?;
         let mut log = episode.stretch.log;
         log.path = format!("episode{}.csv", number + 1).into();
         Ok(log)

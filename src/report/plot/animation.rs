@@ -6,7 +6,7 @@ use super::PlotError;
 use super::axes::{Axis, FOOT, Frame, HEAD, Quantity, remark};
 use super::canvas::{Area, Canvas, clipped, curves, dots, dots_data, line_data, px, rule};
 use super::decimate::{decimate, drawable_pieces};
-use super::legend::{Entry, Sample, legend};
+use super::legend::{Entry, Sample, with_key};
 use super::scale::Range;
 use super::style::{INK, MARGIN, SPINE, Stroke, WIDTH, numbered};
 
@@ -75,9 +75,7 @@ struct Motion {
 /// No chain or no frame to show; chains that differ in their number of frames or change their number of points.
 pub fn animation(episode: &Animation) -> Result<String, PlotError> {
     let motion = shown_motion(episode)?;
-    let mut canvas = Canvas::new(&episode.title);
-    let (key, top) = legend(&entries(&episode.strips), canvas.top);
-    canvas.add(key);
+    let (mut canvas, top) = with_key(&episode.title, entries(&episode.strips));
     let strip_axes: Vec<Axis> = episode.strips.iter().map(strip_axis).collect();
     let stage = Stage::new(&motion, &strip_axes, top);
     let stage_frame = stage.frame();
@@ -168,16 +166,11 @@ fn resampled(frames: &[Vec<[f64; 2]>], shown: usize) -> Vec<Vec<(f64, f64)>> {
 }
 
 fn entries(strips: &[Strip]) -> Vec<Entry> {
-    let mut entries: Vec<Entry> = Vec::new();
-    for strip in strips.iter().filter(|strip| strip.lines.len() > 1) {
-        for (k, line) in strip.lines.iter().enumerate() {
-            let entry = Entry::new(Sample::Line(numbered(k)), &line.label);
-            if !entries.contains(&entry) {
-                entries.push(entry);
-            }
-        }
-    }
-    entries
+    let several = strips.iter().filter(|strip| strip.lines.len() > 1);
+    let lines = several.flat_map(|strip| strip.lines.iter().enumerate());
+    lines
+        .map(|(k, line)| Entry::new(Sample::Line(numbered(k)), &line.label))
+        .collect()
 }
 
 /// Where the motion is drawn: a metre is as long across as it is up.

@@ -6,7 +6,7 @@ use svg::node::element::Rectangle;
 
 use super::axes::{Axis, FOOT, Frame, HEAD, heading};
 use super::canvas::{Anchor, Area, Canvas, TO_BASELINE, curves, text};
-use super::legend::{Entry, Sample, legend};
+use super::legend::{Entry, Sample, begin};
 use super::scale::{Range, three_digits};
 use super::style::{MARGIN, Role, Stroke, TEXT_SIZE, WIDTH};
 use super::{JointKind, PlotError};
@@ -50,14 +50,7 @@ pub struct Bar {
 /// Joints have an axis each: what compares is the models, and the error of one joint can be many times another's.
 /// An error that is not finite is written out as diverged.
 pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
-    if rows.is_empty() {
-        return Err(PlotError::Empty {
-            title: title.to_owned(),
-        });
-    }
-    let mut canvas = Canvas::new(title);
-    let (key, mut top) = legend(&entries(rows), canvas.top);
-    canvas.add(key);
+    let (mut canvas, mut top) = begin(title, rows, entries)?;
     let mut joints: Vec<usize> = Vec::new();
     for row in rows {
         if !joints.contains(&row.joint) {
@@ -72,14 +65,9 @@ pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
 }
 
 fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
-    let mut entries: Vec<Entry> = Vec::new();
-    for bar in rows.iter().flat_map(|row| &row.bars) {
-        let entry = Entry::new(Sample::Bar(bar.role.colour()), &bar.label);
-        if !entries.contains(&entry) {
-            entries.push(entry);
-        }
-    }
-    entries
+    let bars = rows.iter().flat_map(|row| &row.bars);
+    bars.map(|bar| Entry::new(Sample::Bar(bar.role.colour()), &bar.label))
+        .collect()
 }
 
 /// Draws the rows of one joint from `top` on, and says where their frame ends.

@@ -5,7 +5,7 @@ use svg::node::element::SVG;
 use super::PlotError;
 use super::axes::{Axis, FOOT, Frame, HEAD, Quantity, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, dots, filled};
-use super::legend::{Entry, Sample, legend};
+use super::legend::{Entry, Sample, begin};
 use super::scale::{Range, Scale};
 use super::style::{MARGIN, Method, Stroke, WIDTH};
 
@@ -67,14 +67,7 @@ pub struct LearningPanel {
 /// # Errors
 /// No panel.
 pub fn learning_curves(panels: &[LearningPanel], title: &str) -> Result<String, PlotError> {
-    if panels.is_empty() {
-        return Err(PlotError::Empty {
-            title: title.to_owned(),
-        });
-    }
-    let mut canvas = Canvas::new(title);
-    let (key, mut top) = legend(&entries(panels), canvas.top);
-    canvas.add(key);
+    let (mut canvas, mut top) = begin(title, panels, entries)?;
     let columns = columns(panels.len());
     let width = (WIDTH - 2.0 * MARGIN + COLUMN_GAP) / columns as f64 - COLUMN_GAP;
     let height = if columns == 1 { 380.0 } else { 280.0 };
@@ -101,14 +94,8 @@ fn columns(panels: usize) -> usize {
 fn entries(panels: &[LearningPanel]) -> Vec<Entry> {
     let mut methods: Vec<&MethodCurve> = panels.iter().flat_map(|panel| &panel.curves).collect();
     methods.sort_by_key(|curve| curve.method);
-    let mut entries: Vec<Entry> = Vec::new();
-    for curve in methods {
-        let entry = Entry::new(Sample::Band(curve.method.stroke()), &curve.label);
-        if !entries.contains(&entry) {
-            entries.push(entry);
-        }
-    }
-    entries
+    let band = |curve: &MethodCurve| Entry::new(Sample::Band(curve.method.stroke()), &curve.label);
+    methods.into_iter().map(band).collect()
 }
 
 /// Draws a panel with its numbers and labels into an area.

@@ -2,7 +2,8 @@
 
 use svg::node::element::{Group, Rectangle};
 
-use super::canvas::{Anchor, TO_BASELINE, curves, dots, filled, marker, text, text_width};
+use super::PlotError;
+use super::canvas::{Anchor, Canvas, TO_BASELINE, curves, dots, filled, marker, text, text_width};
 use super::style::{INK, MARGIN, START_MARK_PX, Stroke, TEXT_SIZE, WIDTH};
 
 const SAMPLE_PX: f64 = 30.0;
@@ -37,8 +38,39 @@ impl Entry {
     }
 }
 
+/// Begins a figure of some panels as [`with_key`] does.
+///
+/// # Errors
+/// No panel.
+pub(super) fn begin<P>(
+    title: &str,
+    panels: &[P],
+    entries: impl Fn(&[P]) -> Vec<Entry>,
+) -> Result<(Canvas, f64), PlotError> {
+    if panels.is_empty() {
+        return Err(PlotError::Empty {
+            title: title.to_owned(),
+        });
+    }
+    Ok(with_key(title, entries(panels)))
+}
+
+/// A canvas with a title and a key, each entry once, and where these end.
+pub(super) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
+    let mut once: Vec<Entry> = Vec::new();
+    for entry in entries {
+        if !once.contains(&entry) {
+            once.push(entry);
+        }
+    }
+    let mut canvas = Canvas::new(title);
+    let (key, end) = legend(&once, canvas.top);
+    canvas.add(key);
+    (canvas, end)
+}
+
 /// Draws the entries from `top` on, and says where they end.
-pub(super) fn legend(entries: &[Entry], top: f64) -> (Group, f64) {
+fn legend(entries: &[Entry], top: f64) -> (Group, f64) {
     let mut drawn = Group::new();
     let (mut x, mut middle) = (MARGIN, top + ROW_PX / 2.0);
     for entry in entries {

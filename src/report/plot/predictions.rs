@@ -3,7 +3,7 @@
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, marker};
 use super::decimate::{decimate, drawable_pieces};
-use super::legend::{Entry, Sample, legend};
+use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, START_MARK_PX, WIDTH};
 use super::{JointKind, PlotError};
@@ -45,19 +45,12 @@ pub struct Panel {
 /// range, and a remark counts the points that lie outside. Points that are not finite leave a gap and are counted
 /// there too. Long curves are thinned to what can be seen, spikes kept.
 pub fn predictions(panels: &[Panel], title: &str) -> Result<String, PlotError> {
-    if panels.is_empty() {
-        return Err(PlotError::Empty {
-            title: title.to_owned(),
-        });
-    }
+    let (mut canvas, mut top) = begin(title, panels, entries)?;
     let height = match panels.len() {
         1 => 330.0,
         2 => 220.0,
         _ => 170.0,
     };
-    let mut canvas = Canvas::new(title);
-    let (key, mut top) = legend(&entries(panels), canvas.top);
-    canvas.add(key);
     let vertical: Vec<Axis> = panels.iter().map(|panel| y_axis(panel, height)).collect();
     let left = MARGIN + vertical.iter().map(Axis::gutter).fold(0.0, f64::max);
     let width = WIDTH - left - MARGIN;
@@ -101,13 +94,8 @@ fn track_points(track: &Track) -> impl Iterator<Item = (f64, f64)> {
 fn entries(panels: &[Panel]) -> Vec<Entry> {
     let mut tracks: Vec<&Track> = panels.iter().flat_map(|panel| &panel.tracks).collect();
     tracks.sort_by_key(|track| track.role);
-    let mut entries: Vec<Entry> = Vec::new();
-    for track in &tracks {
-        let entry = Entry::new(Sample::Line(track.role.stroke()), &track.label);
-        if !entries.contains(&entry) {
-            entries.push(entry);
-        }
-    }
+    let line = |track: &&Track| Entry::new(Sample::Line(track.role.stroke()), &track.label);
+    let mut entries: Vec<Entry> = tracks.iter().map(line).collect();
     if tracks.iter().any(|track| has_start_marks(track)) {
         entries.push(Entry::new(Sample::Start, "restart from the log"));
     }

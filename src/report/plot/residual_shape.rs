@@ -4,7 +4,7 @@ use svg::node::element::SVG;
 
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, dots, filled, rule};
-use super::legend::{Entry, Sample, legend};
+use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, WIDTH};
 use super::{JointKind, PlotError};
@@ -68,14 +68,7 @@ struct Column {
 /// The axes cover the middle 98 % of the values; a remark counts the points outside. Large clouds are thinned
 /// evenly.
 pub fn residual_shape(panels: &[ShapePanel], title: &str) -> Result<String, PlotError> {
-    if panels.is_empty() {
-        return Err(PlotError::Empty {
-            title: title.to_owned(),
-        });
-    }
-    let mut canvas = Canvas::new(title);
-    let (key, mut top) = legend(&entries(panels), canvas.top);
-    canvas.add(key);
+    let (mut canvas, mut top) = begin(title, panels, entries)?;
     for panel in panels {
         draw_row(&mut canvas, panel, top + HEAD);
         top += HEAD + PANEL_HEIGHT + FOOT;

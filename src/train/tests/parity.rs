@@ -9,7 +9,7 @@ use crate::expr::{Program, SignForm};
 use crate::lanes::Row;
 use crate::model::{
     Angles, Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
-    ResidualOn, network_dynamics, with_residual,
+    ResidualOn, with_residual,
 };
 use crate::train::Backend;
 
@@ -185,7 +185,10 @@ fn a_new_residual_changes_nothing_to_the_last_bit() {
 #[test]
 fn networks_of_another_shape_are_refused() {
     let mlp = &networks()[0];
-    let message = network_dynamics("arm", 2, mlp).unwrap_err().to_string();
+    let device = Backend::Flex.device();
+    let message = HybridModel::network("arm", 2, mlp, &device)
+        .unwrap_err()
+        .to_string();
     assert_eq!(
         message,
         "a network with layer widths [3, 16, 16, 16, 1] does not fit 2 joints: it must begin with 6 \
