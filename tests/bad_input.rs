@@ -379,3 +379,16 @@ fn good_input_is_not_refused() {
         "--json",
     ]);
 }
+
+#[test]
+fn a_cause_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (missing, out) = (folder.path().join("none.toml"), folder.path().join("out"));
+    let paths = ["--config", text(&missing), "--out", text(&out)];
+    for command in [&["train"][..], &["experiment", "physics-prior"]] {
+        let message = refuses(&[command, &paths].concat());
+        assert_eq!(message.matches("No such file").count(), 1, "{message}");
+        says(&message, &["none.toml", "--config"]);
+        assert!(!out.exists(), "a folder was left behind");
+    }
+}

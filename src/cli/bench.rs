@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 
-use super::{Answer, Common, inputs, progress};
+use super::{Answer, Common, inputs, progress, told};
 use crate::bench::{Cell, Line, Source, hash, markdown, read, recorded, summarise};
 use crate::model::Library;
 
@@ -143,7 +143,7 @@ impl Store {
         // A panic is a failure of what is measured: one more line, and the run of hours goes on.
         let run = std::panic::AssertUnwindSafe(|| cell.run(library));
         let findings = match std::panic::catch_unwind(run) {
-            Ok(findings) => findings.map_err(|error| format!("{error:#}")),
+            Ok(findings) => findings.map_err(|error| told(&error)),
             Err(_) => Err("the program panicked".to_owned()),
         };
         let line = Line {
