@@ -46,6 +46,7 @@ pub mod control;
 pub mod data;
 pub mod evaluate;
 pub mod experiment;
+pub mod export;
 pub mod expr;
 pub mod identify;
 pub mod lanes;

@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs};
 use crate::control::Task;
+use crate::export::FORMATS;
 use crate::model::{Effect, Library, System};
 use crate::plant::Plant;
 
@@ -31,15 +32,13 @@ enum What {
     Formats,
 }
 
-/// Formats that the program reads and writes, and what for.
-const FORMATS: &[(&str, &str)] = &[
+/// Formats that the program reads and writes beside those of `export`, and what for.
+const OTHERS: &[(&str, &str)] = &[
     ("csv", "logs, in and out"),
     (
         "toml",
         "models, effects, plants, tasks and recipes, in; fitted models, out",
     ),
-    ("safetensors", "weights of checkpoints, in and out"),
-    ("json", "reports and results, out"),
     ("markdown", "reports, out"),
     ("svg", "plots and films of episodes, out"),
     ("jsonl", "rounds of the learning loop, in and out"),
@@ -132,13 +131,16 @@ fn tasks() -> Result<(String, serde_json::Value)> {
 }
 
 fn formats() -> (String, serde_json::Value) {
-    let text = FORMATS
+    let exported = FORMATS
         .iter()
-        .map(|(name, what)| format!("{name}: {what}\n"))
-        .collect();
-    let values: Vec<_> = FORMATS
+        .map(|f| (f.name, format!("{}, out", f.about)));
+    let others = OTHERS
         .iter()
-        .map(|(name, what)| json!({"name": name, "about": what}))
-        .collect();
-    (text, values.into())
+        .map(|(name, what)| (*name, (*what).to_owned()));
+    let all: Vec<_> = exported.chain(others).collect();
+    let text = all.iter().map(|(name, what)| format!("{name}: {what}\n"));
+    let values = all
+        .iter()
+        .map(|(name, what)| json!({"name": name, "about": what}));
+    (text.collect(), values.collect())
 }

@@ -6,7 +6,9 @@ mod closeloop;
 mod control;
 mod evaluate;
 mod experiment;
+mod export;
 mod fitting;
+mod import;
 mod inputs;
 mod list;
 mod mbrl;
@@ -47,6 +49,8 @@ enum Command {
     Mbrl(mbrl::Arguments),
     Experiment(experiment::Arguments),
     Simulate(simulate::Arguments),
+    Export(export::Arguments),
+    Import(import::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
 }
@@ -85,6 +89,8 @@ pub fn main() -> ExitCode {
         Command::Mbrl(arguments) => mbrl::run(&arguments),
         Command::Experiment(arguments) => experiment::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };

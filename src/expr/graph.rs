@@ -8,7 +8,8 @@ use super::op::{Binary, Op, Unary};
 pub struct Node(pub(super) u32);
 
 impl Node {
-    pub(super) fn index(self) -> usize {
+    /// Its place in the list of operations.
+    pub fn index(self) -> usize {
         self.0 as usize
     }
 }

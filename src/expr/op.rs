@@ -1,7 +1,10 @@
+use serde::Serialize;
+
 use super::Node;
 
 /// Functions of one value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Unary {
     Neg,
     Sin,
@@ -17,7 +20,8 @@ pub enum Unary {
 }
 
 /// Functions of two values.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Binary {
     Add,
     Sub,

@@ -1,27 +1,54 @@
+use std::collections::{HashMap, HashSet};
+
 use super::op::{Binary, Op, Unary};
 use super::{Node, Program};
 
 /// How one language writes what a program can do. Strings come with the strength with which they
-/// bind, so that parentheses stand only where they must.
-trait Notation {
+/// bind, so that parentheses stand only where they must. What is not said otherwise is written as most
+/// programming languages do.
+pub trait Notation {
+    /// A constant; it may be negative.
     fn number(&self, value: f64) -> String;
+    /// An input, an output or an intermediate.
     fn name(&self, name: &str) -> String;
-    fn call(&self, function: &str, arguments: &[String]) -> String;
-    fn parenthesis(&self, inner: &str) -> String;
-    fn product(&self, a: &str, b: &str) -> String;
-    fn quotient(&self, a: Part, b: Part) -> Part;
+    /// `a` to the power of `b`; squares and cubes come with a whole number for `b`.
     fn power(&self, a: Part, b: Part) -> Part;
-    fn absolute(&self, a: &str) -> String;
-    fn root(&self, a: &str) -> String;
-    /// `a` where `condition` holds, else `b`.
-    fn choice(&self, condition: &str, a: &str, b: &str) -> String;
-    fn less(&self) -> &'static str;
+    /// `a` where `condition` is positive, else `b`.
+    fn choice(&self, condition: &Part, a: &str, b: &str) -> String;
+
+    fn call(&self, function: &str, arguments: &[String]) -> String {
+        format!("{function}({})", arguments.join(", "))
+    }
+
+    fn parenthesis(&self, inner: &str) -> String {
+        format!("({inner})")
+    }
+
+    fn product(&self, a: &str, b: &str) -> String {
+        format!("{a} * {b}")
+    }
+
+    fn quotient(&self, a: Part, b: Part) -> Part {
+        let (a, b) = (a.binding(self, PRODUCT), b.binding(self, PRODUCT + 1));
+        Part {
+            text: format!("{a} / {b}"),
+            strength: PRODUCT,
+        }
+    }
+
+    fn absolute(&self, a: &str) -> String {
+        self.call("abs", &[a.to_owned()])
+    }
+
+    fn root(&self, a: &str) -> String {
+        self.call("sqrt", &[a.to_owned()])
+    }
 }
 
 /// A printed expression and the strength of its weakest operator.
-#[derive(Clone)]
-struct Part {
-    text: String,
+#[derive(Debug, Clone)]
+pub struct Part {
+    pub text: String,
     strength: u8,
 }
 
@@ -39,6 +66,36 @@ impl Program {
         self.lines(&Text, names)
             .map(|(l, r)| format!("{l} = {r}\n"))
             .collect()
+    }
+
+    /// The equations as assignments, left side and right side, of a language in which every value that is used more
+    /// than once is worth a name; `names` are those of the outputs.
+    pub fn assignments(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
+        let shared = self.shared();
+        self.lines_with(notation, &shared, names).collect()
+    }
+
+    /// The labels, and names for whatever else is used more than once.
+    fn shared(&self) -> Vec<(Node, String)> {
+        let mut uses = vec![0; self.ops.len()];
+        let operands = self.ops.iter().flat_map(|op| op.operands());
+        for node in operands.chain(self.outputs.iter().copied()) {
+            uses[node.index()] += 1;
+        }
+        let mut taken: HashSet<String> = self.inputs.iter().cloned().collect();
+        taken.extend(self.labels.iter().map(|(_, label)| label.clone()));
+        let labelled: HashSet<Node> = self.labels.iter().map(|(node, _)| *node).collect();
+        let mut fresh = (1..)
+            .map(|k| format!("w{k}"))
+            .filter(|name| !taken.contains(name));
+        let more = (0..)
+            .map(Node)
+            .zip(&uses)
+            .filter(|(node, uses)| **uses > 1 && self.is_step(*node) && !labelled.contains(node));
+        let more: Vec<_> = more
+            .map(|(node, _)| (node, fresh.next().expect("names do not run out")))
+            .collect();
+        self.labels.iter().cloned().chain(more).collect()
     }
 
     /// The formula of one output, with all intermediates written out.
@@ -61,8 +118,18 @@ impl Program {
         notation: &dyn Notation,
         names: &[&str],
     ) -> impl Iterator<Item = (String, String)> {
-        let parts = self.parts(notation, &self.labels);
-        let unlabelled = self.definitions(notation, &parts);
+        self.lines_with(notation, &self.labels, names)
+    }
+
+    /// One line for each node that has a name, then one for each output.
+    fn lines_with(
+        &self,
+        notation: &dyn Notation,
+        named: &[(Node, String)],
+        names: &[&str],
+    ) -> impl Iterator<Item = (String, String)> {
+        let parts = self.parts(notation, named);
+        let unlabelled = self.definitions(notation, named, &parts);
         let outputs: Vec<_> = self
             .outputs
             .iter()
@@ -73,12 +140,13 @@ impl Program {
     }
 
     /// The right-hand side of each named intermediate, in terms of earlier ones.
-    fn definitions(&self, notation: &dyn Notation, parts: &[Part]) -> Vec<(String, String)> {
-        let mut labels: Vec<_> = self
-            .labels
-            .iter()
-            .filter(|(n, _)| self.is_step(*n))
-            .collect();
+    fn definitions(
+        &self,
+        notation: &dyn Notation,
+        named: &[(Node, String)],
+        parts: &[Part],
+    ) -> Vec<(String, String)> {
+        let mut labels: Vec<_> = named.iter().filter(|(n, _)| self.is_step(*n)).collect();
         labels.sort_by_key(|(node, _)| *node);
         labels.dedup_by_key(|(node, _)| *node);
         labels
@@ -97,12 +165,13 @@ impl Program {
     /// Each node printed, with labelled ones by their name.
     fn parts(&self, notation: &dyn Notation, labels: &[(Node, String)]) -> Vec<Part> {
         let mut parts: Vec<Part> = Vec::with_capacity(self.ops.len());
+        let mut names: HashMap<usize, &str> = HashMap::new();
+        for (node, name) in labels.iter().filter(|(node, _)| self.is_step(*node)) {
+            names.entry(node.index()).or_insert(name);
+        }
         for (index, op) in self.ops.iter().enumerate() {
-            let label = labels
-                .iter()
-                .find(|(node, _)| node.index() == index && self.is_step(*node));
-            parts.push(match label {
-                Some((_, name)) => atom(notation.name(name)),
+            parts.push(match names.get(&index) {
+                Some(name) => atom(notation.name(name)),
                 None => self.part(notation, *op, &parts),
             });
         }
@@ -126,7 +195,41 @@ impl Program {
                 notation.power(at(a), atom("3".into()))
             }
             Op::Binary(op, a, b) => binary(notation, op, at(a), at(b)),
-            Op::Where(c, a, b) => atom(notation.choice(&at(c).text, &at(a).text, &at(b).text)),
+            Op::Where(c, a, b) => atom(notation.choice(&at(c), &at(a).text, &at(b).text)),
+        }
+    }
+}
+
+impl Part {
+    /// Whether it is a comparison.
+    pub fn is_comparison(&self) -> bool {
+        self.strength == COMPARE
+    }
+
+    /// A product of factors that are already printed.
+    pub fn product(text: String) -> Self {
+        Self {
+            text,
+            strength: PRODUCT,
+        }
+    }
+
+    /// A call or another expression that needs no parentheses.
+    pub fn call(text: String) -> Self {
+        atom(text)
+    }
+
+    /// The text as a factor of a product, in parentheses if it needs them.
+    pub fn factor<N: Notation + ?Sized>(&self, notation: &N) -> String {
+        self.binding(notation, PRODUCT + 1)
+    }
+
+    /// The text, in parentheses if it binds weaker than `least`.
+    fn binding<N: Notation + ?Sized>(&self, notation: &N, least: u8) -> String {
+        if self.strength < least {
+            notation.parenthesis(&self.text)
+        } else {
+            self.text.clone()
         }
     }
 }
@@ -138,20 +241,11 @@ fn atom(text: String) -> Part {
     }
 }
 
-/// The text, in parentheses if it binds weaker than `least`.
-fn guard(notation: &dyn Notation, part: &Part, least: u8) -> String {
-    if part.strength < least {
-        notation.parenthesis(&part.text)
-    } else {
-        part.text.clone()
-    }
-}
-
 fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
     let name = match op {
         Unary::Neg => {
             return Part {
-                text: format!("-{}", guard(notation, &a, PRODUCT + 1)),
+                text: format!("-{}", a.binding(notation, PRODUCT + 1)),
                 strength: SIGN,
             };
         }
@@ -172,19 +266,19 @@ fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
     let infix = |sign: &str, strength: u8| Part {
         text: format!(
             "{} {sign} {}",
-            guard(notation, &a, strength),
-            guard(notation, &b, strength + 1)
+            a.binding(notation, strength),
+            b.binding(notation, strength + 1)
         ),
         strength,
     };
     match op {
         Binary::Add => infix("+", SUM),
         Binary::Sub => infix("-", SUM),
-        Binary::Less => infix(notation.less(), COMPARE),
+        Binary::Less => infix("<", COMPARE),
         Binary::Mul => Part {
             text: notation.product(
-                &guard(notation, &a, PRODUCT),
-                &guard(notation, &b, PRODUCT + 1),
+                &a.binding(notation, PRODUCT),
+                &b.binding(notation, PRODUCT + 1),
             ),
             strength: PRODUCT,
         },
@@ -208,50 +302,15 @@ impl Notation for Text {
         name.to_owned()
     }
 
-    fn call(&self, function: &str, arguments: &[String]) -> String {
-        format!("{function}({})", arguments.join(", "))
-    }
-
-    fn parenthesis(&self, inner: &str) -> String {
-        format!("({inner})")
-    }
-
-    fn product(&self, a: &str, b: &str) -> String {
-        format!("{a} * {b}")
-    }
-
-    fn quotient(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!(
-                "{} / {}",
-                guard(self, &a, PRODUCT),
-                guard(self, &b, PRODUCT + 1)
-            ),
-            strength: PRODUCT,
-        }
-    }
-
     fn power(&self, a: Part, b: Part) -> Part {
         Part {
-            text: format!("{}^{}", guard(self, &a, POWER + 1), guard(self, &b, POWER)),
+            text: format!("{}^{}", a.binding(self, POWER + 1), b.binding(self, POWER)),
             strength: POWER,
         }
     }
 
-    fn absolute(&self, a: &str) -> String {
-        format!("abs({a})")
-    }
-
-    fn root(&self, a: &str) -> String {
-        format!("sqrt({a})")
-    }
-
-    fn choice(&self, condition: &str, a: &str, b: &str) -> String {
-        format!("where({condition}, {a}, {b})")
-    }
-
-    fn less(&self) -> &'static str {
-        "<"
+    fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
+        format!("where({}, {a}, {b})", condition.text)
     }
 }
 
@@ -341,7 +400,7 @@ impl Notation for Latex {
 
     fn power(&self, a: Part, b: Part) -> Part {
         Part {
-            text: format!("{{{}}}^{{{}}}", guard(self, &a, POWER + 1), b.text),
+            text: format!("{{{}}}^{{{}}}", a.binding(self, POWER + 1), b.text),
             strength: POWER,
         }
     }
@@ -354,12 +413,15 @@ impl Notation for Latex {
         format!("\\sqrt{{{a}}}")
     }
 
-    fn choice(&self, condition: &str, a: &str, b: &str) -> String {
+    fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
+        // Only a comparison reads as a condition by itself.
+        let sign = if condition.is_comparison() {
+            ""
+        } else {
+            " > 0"
+        };
+        let condition = format!("{}{sign}", condition.text);
         format!("\\begin{{cases}} {a} & {condition} \\\\ {b} & \\text{{otherwise}} \\end{{cases}}")
-    }
-
-    fn less(&self) -> &'static str {
-        "<"
     }
 }
 

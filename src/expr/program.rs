@@ -24,6 +24,11 @@ impl Program {
         &self.ops
     }
 
+    /// The operations that make the values for the caller.
+    pub fn outputs(&self) -> &[Node] {
+        &self.outputs
+    }
+
     /// How many values the program makes for its caller.
     pub fn output_count(&self) -> usize {
         self.outputs.len()

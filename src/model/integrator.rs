@@ -1,4 +1,6 @@
+use std::fmt::{self, Display, Formatter};
 use std::num::NonZeroU32;
+use std::str::FromStr;
 
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
@@ -18,6 +20,38 @@ pub enum Integrator {
     /// Equal substeps of [`Integrator::Rk4`], which reach a given error in far fewer evaluations than
     /// substeps of order 1.
     Fine { steps: NonZeroU32 },
+}
+
+impl Integrator {
+    /// How it is written on a command line.
+    const USAGE: &str = "semi_implicit_euler, rk4, or fine:N for N substeps of rk4";
+}
+
+impl FromStr for Integrator {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let unknown = || format!("unknown integrator {text:?}; there are {}", Self::USAGE);
+        match (text, text.split_once(':')) {
+            ("semi_implicit_euler", _) => Ok(Self::SemiImplicitEuler),
+            ("rk4", _) => Ok(Self::Rk4),
+            (_, Some(("fine", steps))) => {
+                let steps = steps.parse().map_err(|_| unknown())?;
+                Ok(Self::Fine { steps })
+            }
+            _ => Err(unknown()),
+        }
+    }
+}
+
+impl Display for Integrator {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SemiImplicitEuler => f.write_str("semi_implicit_euler"),
+            Self::Rk4 => f.write_str("rk4"),
+            Self::Fine { steps } => write!(f, "fine:{steps}"),
+        }
+    }
 }
 
 /// One step of a batch.

@@ -88,6 +88,8 @@ pub struct System {
     pub effects: Vec<FittedEffect>,
     /// Widths of the hidden layers of the residual MLP.
     pub hidden: Vec<usize>,
+    /// The text of the file.
+    pub text: String,
     /// The text of the declared part of the file: everything before the first effect.
     pub declaration: String,
     pub(super) lets: Vec<(String, Located<Formula>)>,
@@ -141,6 +143,7 @@ impl System {
             parameters: sections::parameters(top.section("parameters")?)?,
             effects: super::effects_in_file::read(&top, joints, library)?,
             hidden: sections::hidden(top.section("residual")?, joints)?,
+            text: document.text.clone(),
             declaration: sections::declaration(&document.text),
             lets: sections::lets(document, &dynamics)?,
             motion: sections::motion(document, &dynamics, joints)?,

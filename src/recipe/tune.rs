@@ -54,7 +54,7 @@ impl Job {
         backend: Backend,
         seed: u64,
     ) -> Result<Self, RecipeError> {
-        let recipe = Recipe::for_logs(&checkpoint.manifest.system, logs);
+        let recipe = Recipe::for_logs(&checkpoint.manifest.shape.system, logs);
         tuned(checkpoint, recipe, library, backend, seed)
     }
 }

@@ -58,8 +58,8 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     let json = serde_json::to_vec_pretty(&manifest)
         .map_err(|error| io("encode the description of", dir)(std::io::Error::other(error)))?;
     let files: [(&str, &[u8]); 5] = [
-        (WEIGHTS, &weights::to_bytes(&manifest, used)),
-        (LAST, &weights::to_bytes(&manifest, &last)),
+        (WEIGHTS, &weights::to_bytes(&manifest.shape, used)),
+        (LAST, &weights::to_bytes(&manifest.shape, &last)),
         (OPTIMIZER, &moments::to_bytes(&manifest, &moments)),
         (MODEL, origin.model_toml.as_bytes()),
         (MANIFEST, &json),
@@ -163,7 +163,8 @@ impl Checkpoint {
             dir.to_owned()
         };
         let manifest = read_manifest(&dir)?;
-        let numbers = |file: &str| weights::from_bytes(&manifest, &read(&dir, file)?, file, &dir);
+        let numbers =
+            |file: &str| weights::from_bytes(&manifest.shape, &read(&dir, file)?, file, &dir);
         let model_toml = String::from_utf8(read(&dir, MODEL)?)
             .map_err(|error| corrupt(MODEL, error.to_string(), &dir))?;
         let (weights, last) = (numbers(WEIGHTS)?, numbers(LAST)?);
@@ -233,22 +234,7 @@ impl Checkpoint {
         device: &Device,
     ) -> Result<HybridModel, CheckpointError> {
         self.check(dynamics)?;
-        let manifest = &self.manifest;
-        let model = match &weights.prior {
-            Some(prior) => HybridModel::network(&manifest.system, manifest.joints, prior, device)?,
-            None => {
-                let saved = manifest.parameters.iter().zip(&weights.parameters);
-                let trained = Dynamics {
-                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
-                    ..dynamics.clone()
-                };
-                HybridModel::physics(&trained, device)?
-            }
-        };
-        Ok(match &weights.residual {
-            Some(residual) => model.with_residual(residual)?,
-            None => model,
-        })
+        Ok(self.manifest.shape.model(weights, dynamics, device)?)
     }
 
     fn check(&self, dynamics: &Dynamics) -> Result<(), CheckpointError> {
@@ -258,7 +244,7 @@ impl Checkpoint {
             given,
             dir: self.dir.clone(),
         };
-        let saved = &self.manifest;
+        let saved = &self.manifest.shape;
         if saved.system != dynamics.name {
             let (saved, given) = (saved.system.clone(), dynamics.name.clone());
             return Err(foreign("system", saved, given));

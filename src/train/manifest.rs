@@ -1,8 +1,12 @@
+use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
 use super::history::null_if_infinite;
 use super::{FitSettings, Record, Training};
-use crate::model::{Angles, InputScaling, MlpWeights, Parameter, ResidualOn};
+use crate::model::{
+    Angles, Dynamics, HybridError, HybridModel, InputScaling, MlpWeights, ModelWeights, Parameter,
+    ResidualOn,
+};
 
 /// The number of the checkpoint format that this program writes and reads.
 pub const FORMAT: u64 = 2;
@@ -13,14 +17,8 @@ pub struct Manifest {
     pub format: u64,
     /// The program that wrote it.
     pub residyn: String,
-    /// Name of the system.
-    pub system: String,
-    pub joints: usize,
-    /// Empty where the prior is a network.
-    pub parameters: Vec<SavedParameter>,
-    /// The prior, where it is a network.
-    pub prior: Option<SavedNetwork>,
-    pub residual: Option<SavedNetwork>,
+    #[serde(flatten)]
+    pub shape: Shape,
     /// The whole configuration of the run, as its caller resolved it.
     pub config: serde_json::Value,
     pub seed: u64,
@@ -34,6 +32,19 @@ pub struct Manifest {
     pub optimizer_steps: [usize; 2],
     pub best: Option<SavedBest>,
     pub history: Vec<Record>,
+}
+
+/// A model without its learnable numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Shape {
+    /// Name of the system.
+    pub system: String,
+    pub joints: usize,
+    /// Empty where the prior is a network.
+    pub parameters: Vec<SavedParameter>,
+    /// The prior, where it is a network.
+    pub prior: Option<SavedNetwork>,
+    pub residual: Option<SavedNetwork>,
 }
 
 /// What training needs to know of a physical parameter, besides its value.
@@ -76,13 +87,12 @@ impl Manifest {
         Self {
             format: FORMAT,
             residyn: env!("CARGO_PKG_VERSION").to_owned(),
-            system: training.model.system().to_owned(),
-            joints: training.model.joints(),
-            parameters: (training.model.declared().iter())
-                .map(SavedParameter::of)
-                .collect(),
-            prior: weights.prior.as_ref().map(SavedNetwork::of),
-            residual: weights.residual.as_ref().map(SavedNetwork::of),
+            shape: Shape::of(
+                training.model.system(),
+                training.model.joints(),
+                &training.model.declared(),
+                &weights,
+            ),
             config: config.clone(),
             seed,
             settings: training.settings.clone(),
@@ -95,6 +105,51 @@ impl Manifest {
                 validation: Some(best.validation),
             }),
             history: training.history.clone(),
+        }
+    }
+}
+
+impl Shape {
+    /// The shape of a model with these physical parameters and networks.
+    pub fn of(
+        system: &str,
+        joints: usize,
+        parameters: &[Parameter],
+        weights: &ModelWeights,
+    ) -> Self {
+        Self {
+            system: system.to_owned(),
+            joints,
+            parameters: parameters.iter().map(SavedParameter::of).collect(),
+            prior: weights.prior.as_ref().map(SavedNetwork::of),
+            residual: weights.residual.as_ref().map(SavedNetwork::of),
+        }
+    }
+
+    /// A model of this shape with these numbers, on `device`. `dynamics` is what its model file says.
+    ///
+    /// # Errors
+    /// Numbers or networks that do not make a model.
+    pub fn model(
+        &self,
+        weights: &ModelWeights,
+        dynamics: &Dynamics,
+        device: &Device,
+    ) -> Result<HybridModel, HybridError> {
+        let model = match &weights.prior {
+            Some(prior) => HybridModel::network(&self.system, self.joints, prior, device)?,
+            None => {
+                let saved = self.parameters.iter().zip(&weights.parameters);
+                let trained = Dynamics {
+                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
+                    ..dynamics.clone()
+                };
+                HybridModel::physics(&trained, device)?
+            }
+        };
+        match &weights.residual {
+            Some(residual) => model.with_residual(residual),
+            None => Ok(model),
         }
     }
 }
@@ -112,7 +167,7 @@ impl SavedParameter {
     }
 
     /// The parameter as it was trained, with this value.
-    pub(super) fn restore(&self, value: f64) -> Parameter {
+    fn restore(&self, value: f64) -> Parameter {
         Parameter {
             name: self.name.clone(),
             value,

@@ -16,7 +16,7 @@ mod penalty;
 mod segments;
 mod settings;
 mod sweep;
-mod weights;
+pub(crate) mod weights;
 
 #[cfg(test)]
 mod tests;
@@ -28,7 +28,7 @@ pub use fit::{Ended, Progress, Training};
 pub use fused::Blocks;
 pub use history::{Best, Record};
 pub use loss::{Loss, Objective};
-pub use manifest::{FORMAT, Manifest};
+pub use manifest::{FORMAT, Manifest, Shape};
 pub use penalty::Penalty;
 pub use segments::{Batch, Columns, Segments, SegmentsError};
 pub use settings::{Batching, FitSettings, LearningRates};

@@ -23,7 +23,7 @@ pub(super) fn to_bytes(manifest: &Manifest, moments: &[Option<Moments>; 2]) -> V
             Entry::of_f32(format!("{part}.second"), &moments.second),
         ])
     });
-    serialize(manifest, &entries.flatten().collect::<Vec<_>>())
+    serialize(&manifest.shape, &entries.flatten().collect::<Vec<_>>())
 }
 
 /// Read the file back; `manifest` says what must be in it, and `weights` how much of it.

@@ -9,7 +9,7 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
 use super::CheckpointError;
-use super::manifest::{Manifest, SavedNetwork};
+use super::manifest::{SavedNetwork, Shape};
 use crate::model::{LayerWeights, MlpWeights, ModelWeights};
 
 /// A tensor on its way into a file.
@@ -33,8 +33,8 @@ impl Entry {
 }
 
 /// The bytes of the file.
-pub(super) fn to_bytes(manifest: &Manifest, weights: &ModelWeights) -> Vec<u8> {
-    let mut entries: Vec<Entry> = (manifest.parameters.iter().zip(&weights.parameters))
+pub(crate) fn to_bytes(shape: &Shape, weights: &ModelWeights) -> Vec<u8> {
+    let mut entries: Vec<Entry> = (shape.parameters.iter().zip(&weights.parameters))
         .map(|(parameter, value)| Entry {
             name: format!("parameters.{}", parameter.name),
             dtype: Dtype::F64,
@@ -47,17 +47,17 @@ pub(super) fn to_bytes(manifest: &Manifest, weights: &ModelWeights) -> Vec<u8> {
             entries.extend(layer_entries(prefix, k, layer));
         }
     }
-    serialize(manifest, &entries)
+    serialize(shape, &entries)
 }
 
 /// The bytes of a file with these tensors.
-pub(super) fn serialize(manifest: &Manifest, entries: &[Entry]) -> Vec<u8> {
+pub(super) fn serialize(shape: &Shape, entries: &[Entry]) -> Vec<u8> {
     let views = entries.iter().map(|entry| {
         let view = TensorView::new(entry.dtype, entry.shape.clone(), &entry.bytes)
             .expect("bytes are written for the shape");
         (entry.name.as_str(), view)
     });
-    let about = HashMap::from([("system".to_owned(), manifest.system.clone())]);
+    let about = HashMap::from([("system".to_owned(), shape.system.clone())]);
     safetensors::serialize(views, Some(about)).expect("names and shapes are plain")
 }
 
@@ -86,15 +86,15 @@ fn layer_entries(prefix: &str, k: usize, layer: &LayerWeights) -> [Entry; 2] {
     ]
 }
 
-/// Read the file back; `manifest` says what must be in it.
-pub(super) fn from_bytes(
-    manifest: &Manifest,
+/// Read the file back; `shape` says what must be in it.
+pub(crate) fn from_bytes(
+    shape: &Shape,
     bytes: &[u8],
     file: &str,
     dir: &Path,
 ) -> Result<ModelWeights, CheckpointError> {
     let reader = Reader::new(bytes, file, dir)?;
-    let parameters = (manifest.parameters.iter())
+    let parameters = (shape.parameters.iter())
         .map(|p| Ok(reader.read(&format!("parameters.{}", p.name), Dtype::F64, &[1])?[0]))
         .collect::<Result<_, CheckpointError>>()?;
     let network = |prefix: &str, saved: &Option<SavedNetwork>| {
@@ -103,8 +103,8 @@ pub(super) fn from_bytes(
     };
     Ok(ModelWeights {
         parameters,
-        prior: network("prior.", &manifest.prior)?,
-        residual: network("", &manifest.residual)?,
+        prior: network("prior.", &shape.prior)?,
+        residual: network("", &shape.residual)?,
     })
 }
 

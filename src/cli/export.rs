@@ -1,0 +1,199 @@
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use clap::Args;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+use super::{Answer, Common, inputs};
+use crate::export::{Difference, File, Format, Portable, Unread, find};
+use crate::model::{HybridModel, Integrator, Library};
+use crate::train::Manifest;
+
+/// Write a model for other programs, and measure how far what they predict is from here
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    residyn export --checkpoint closeloop-report/checkpoint --format onnx --out pendulum.onnx\n  \
+    residyn export --model closeloop-report/model.toml --format c --out pendulum.h --step 0.001")]
+pub(super) struct Arguments {
+    /// Checkpoint of a trained model
+    #[arg(
+        long,
+        value_name = "DIR",
+        required_unless_present = "model",
+        conflicts_with = "model"
+    )]
+    checkpoint: Option<PathBuf>,
+    /// Model file, or the name of a built-in system
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// What to write; `residyn list formats` shows all
+    #[arg(long, value_parser = find)]
+    format: &'static Format,
+    /// Where to write it
+    #[arg(long, value_name = "PATH")]
+    out: PathBuf,
+    /// How long a torque is held, in s; a checkpoint's own without it, else 0.01
+    #[arg(long, value_name = "S")]
+    step: Option<f64>,
+    /// How a step is integrated: semi_implicit_euler, rk4 or fine:N; a checkpoint's own without it, else rk4
+    #[arg(long)]
+    integrator: Option<Integrator>,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// The step where neither the user nor a recipe says one, in s.
+const STEP_S: f64 = 0.01;
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let format = arguments.format;
+    let model = portable(arguments)?;
+    let limits = (format.limits)(&model);
+    for limit in &limits {
+        eprintln!("not carried: {limit}");
+    }
+    let files = format.write(&model, &arguments.out)?;
+    let measured = measure(format, &model, arguments);
+    let json = printed(format, &files, &limits, &measured);
+    inputs::print(&match arguments.common.json {
+        true => serde_json::to_string_pretty(&json)? + "\n",
+        false => text(format, &files, &measured),
+    })?;
+    if let Err(Unread::Refused(said)) = &measured {
+        bail!("what was written cannot be read: {said}");
+    }
+    let same = |d: &Difference| d.pointwise() <= format.tolerance;
+    Ok(match measured.as_ref().is_ok_and(|d| !same(d)) {
+        true => Answer::No,
+        false => Answer::Yes,
+    })
+}
+
+fn measure(format: &Format, model: &Portable, arguments: &Arguments) -> Result<Difference, Unread> {
+    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let refused = |error: crate::model::HybridError| Unread::Refused(error.to_string());
+    let samples = model.samples(&mut rng).map_err(refused)?;
+    let own = model.answers(&samples).map_err(refused)?;
+    Ok(own.difference(&format.ask(&arguments.out, &samples)?))
+}
+
+fn portable(arguments: &Arguments) -> Result<Portable> {
+    if let Some(step) = arguments.step.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        bail!("--step {step}: a step is a number of seconds above zero");
+    }
+    let library = inputs::library(&arguments.effects)?;
+    match (&arguments.checkpoint, &arguments.model) {
+        (Some(dir), _) => of_checkpoint(arguments, dir, &library),
+        (_, Some(file)) => of_file(arguments, file, &library),
+        _ => unreachable!("clap asks for one of both"),
+    }
+}
+
+fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<Portable> {
+    let device = arguments.common.device;
+    let (checkpoint, system, model) = inputs::checkpoint(dir, library, device)?;
+    let Manifest {
+        config,
+        seed,
+        settings,
+        ..
+    } = &checkpoint.manifest;
+    Ok(Portable::new(
+        &system,
+        &model,
+        arguments.integrator.unwrap_or(settings.integrator),
+        arguments.step.or(step_of(config)).unwrap_or(STEP_S),
+        json!({"config": config, "seed": seed}),
+    ))
+}
+
+/// The step of what a checkpoint was trained on.
+fn step_of(config: &Value) -> Option<f64> {
+    let places = ["/recipe/data/step_s", "/step_s"];
+    let mut steps = places.iter().map(|place| config.pointer(place));
+    steps.find_map(|step| step?.as_f64())
+}
+
+fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Portable> {
+    let system = library.system(file)?;
+    let dynamics = system.dynamics(&system.sign());
+    let model = HybridModel::physics(&dynamics, &arguments.common.device.device())?;
+    Ok(Portable::new(
+        &system,
+        &model,
+        arguments.integrator.unwrap_or(Integrator::Rk4),
+        arguments.step.unwrap_or(STEP_S),
+        json!({"config": {"model": file}, "seed": arguments.common.seed}),
+    ))
+}
+
+fn printed(
+    format: &Format,
+    files: &[File],
+    limits: &[String],
+    measured: &Result<Difference, Unread>,
+) -> Value {
+    let file =
+        |file: &File| json!({"path": file.path, "bytes": file.bytes.len(), "about": file.about});
+    let difference = match measured {
+        Ok(difference) => json!(difference),
+        Err(_) => Value::Null,
+    };
+    json!({
+        "format": format.name,
+        "files": files.iter().map(file).collect::<Vec<_>>(),
+        "not_carried": limits,
+        "difference": difference,
+        "not_measured": measured.as_ref().err().map(ToString::to_string),
+    })
+}
+
+fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) -> String {
+    let mut out = String::new();
+    for File { path, bytes, about } in files {
+        let _ = writeln!(out, "{}: {about}, {}", path.display(), size(bytes.len()));
+    }
+    match measured {
+        Ok(difference) => {
+            let parts = [
+                ("a step", difference.next),
+                ("the derivative", difference.derivative),
+                ("a rollout of 5 s", difference.rollout),
+            ];
+            let parts = parts.iter().filter_map(|(what, d)| Some((what, (*d)?)));
+            let parts: Vec<String> = parts.map(|(what, d)| format!("{what} {d:.1e}")).collect();
+            let _ = writeln!(
+                out,
+                "largest difference to the prediction here, as a share of each state's largest value: {}",
+                parts.join(", ")
+            );
+            if difference.pointwise() > format.tolerance {
+                let _ = writeln!(
+                    out,
+                    "this is more than the {:.0e} it should be",
+                    format.tolerance
+                );
+            }
+        }
+        Err(reason) => {
+            let _ = writeln!(
+                out,
+                "difference to the prediction here not measured: {reason}"
+            );
+        }
+    }
+    out
+}
+
+fn size(bytes: usize) -> String {
+    match bytes {
+        0..10_000 => format!("{bytes} bytes"),
+        _ => format!("{} kB", bytes.div_ceil(1000)),
+    }
+}

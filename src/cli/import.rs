@@ -1,0 +1,45 @@
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use serde_json::json;
+
+use super::{Answer, Common, inputs};
+use crate::export::Imported;
+
+/// Make a checkpoint of a model that was exported as JSON and safetensors
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  residyn import --file pendulum.json --out pendulum")]
+pub(super) struct Arguments {
+    /// The JSON file; the weights that it names lie beside it
+    #[arg(long, value_name = "JSON")]
+    file: PathBuf,
+    /// Folder of the checkpoint
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Folders of your own effect files
+    #[arg(long, num_args = 1.., value_name = "DIR")]
+    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let library = inputs::library(&arguments.effects)?;
+    let device = arguments.common.device;
+    let imported = Imported::read(&arguments.file, library.effects(), device)?;
+    let (system, by) = (
+        imported.model.system().to_owned(),
+        imported.description.residyn.clone(),
+    );
+    imported.save(&arguments.out, arguments.common.seed)?;
+    let out = arguments.out.display();
+    inputs::print(&match arguments.common.json {
+        true => {
+            let json = json!({"system": system, "written_by": by, "checkpoint": arguments.out});
+            serde_json::to_string_pretty(&json)? + "\n"
+        }
+        false => format!("{out}: checkpoint of a model of {system}, exported by version {by}\n"),
+    })?;
+    Ok(Answer::Yes)
+}

@@ -1,0 +1,19 @@
+//! The model in other people's tools: one file a format, each of which reads a [`Portable`] and says before writing
+//! what it cannot carry; and what a reader of the written files predicts beside what the program itself does.
+
+mod answers;
+mod description;
+mod format;
+mod portable;
+mod python_client;
+mod samples;
+
+pub use answers::{Answers, Difference};
+pub use description::{Description, ImportError, Imported};
+pub use format::{ExportError, File, Format, Reader, Unread, find};
+pub use portable::{CarriedEffect, Portable};
+pub use python_client::PythonClient;
+pub use samples::Samples;
+
+/// Every format, by name.
+pub const FORMATS: &[&Format] = &[&description::JSON, &description::SAFETENSORS];

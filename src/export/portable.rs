@@ -1,0 +1,215 @@
+use rand::Rng;
+use serde::Serialize;
+use serde_json::json;
+
+use super::{Answers, Samples};
+use crate::model::{
+    CommandFilter, Dynamics, HybridError, HybridModel, Integrator, MlpWeights, ModelWeights,
+    System, with_residual,
+};
+use crate::plant::Environment;
+
+/// A model as every format reads it: the equations with their values, the networks whose outputs are added to their
+/// derivative, and how both become steps.
+#[derive(Debug, Clone)]
+pub struct Portable {
+    /// One line.
+    pub about: String,
+    /// What stands around the networks, its parameters at the values to export.
+    pub equations: Dynamics,
+    /// The network that stands in place of equations, where one does.
+    pub prior: Option<MlpWeights>,
+    /// The network for what the equations or the prior lack.
+    pub residual: Option<MlpWeights>,
+    /// What the equations carry of the library of effects.
+    pub effects: Vec<CarriedEffect>,
+    /// For each joint whether it slides (m, N) rather than turns (rad, N m).
+    pub prismatic: Vec<bool>,
+    pub integrator: Integrator,
+    /// How long a torque is held, in s.
+    pub step_s: f64,
+    /// Text of the model file.
+    pub model_toml: String,
+    /// The configuration and the seed that the model came of.
+    pub origin: serde_json::Value,
+}
+
+/// An effect that a model carries, in the names of the model's parameters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CarriedEffect {
+    pub name: String,
+    /// Counted from 1.
+    pub joint: usize,
+    pub expression: String,
+    pub parameters: Vec<String>,
+}
+
+impl Portable {
+    /// A model of `system` that was trained or, without networks, one that its file states.
+    pub fn new(
+        system: &System,
+        model: &HybridModel,
+        integrator: Integrator,
+        step_s: f64,
+        origin: serde_json::Value,
+    ) -> Self {
+        let (mut equations, _) = model.parts();
+        let ModelWeights {
+            prior, residual, ..
+        } = model.weights();
+        keep_intervals(&mut equations, system);
+        Self {
+            about: system.about.clone(),
+            effects: carried(system, &equations),
+            prismatic: system.prismatic.clone(),
+            equations,
+            prior,
+            residual,
+            integrator,
+            step_s,
+            model_toml: system.text.clone(),
+            origin,
+        }
+    }
+
+    /// Name of the system.
+    pub fn name(&self) -> &str {
+        &self.equations.name
+    }
+
+    /// Number of joints n.
+    pub fn joints(&self) -> usize {
+        self.equations.joints
+    }
+
+    /// The networks in the order in which they are evaluated. Each gives n or `2n` outputs, added to the last of the
+    /// rates.
+    pub fn networks(&self) -> impl Iterator<Item = &MlpWeights> {
+        self.prior.iter().chain(&self.residual)
+    }
+
+    /// Every learnable number.
+    pub fn weights(&self) -> ModelWeights {
+        ModelWeights {
+            parameters: self.equations.values(),
+            prior: self.prior.clone(),
+            residual: self.residual.clone(),
+        }
+    }
+
+    /// Unit of a joint's (counted from 0) position, and of its torque.
+    pub fn units(&self, joint: usize) -> [&'static str; 2] {
+        if self.prismatic[joint] {
+            ["m", "N"]
+        } else {
+            ["rad", "N m"]
+        }
+    }
+
+    /// Whether the motion depends on time other than through the torque.
+    pub fn depends_on_time(&self) -> bool {
+        let program = &self.equations.program;
+        let time = program.ops().iter().position(
+            |op| matches!(op, crate::expr::Op::Input(k) if *k as usize == 3 * self.joints()),
+        );
+        let mut operands = program.ops().iter().flat_map(|op| op.operands());
+        operands.any(|node| Some(node.index()) == time)
+    }
+
+    /// The time constant of a filter on a joint (counted from 0) in s, where the model has such a filter.
+    pub fn filter(&self, joint: usize, kind: CommandFilter) -> Option<f64> {
+        let mut filters = self.equations.filters.iter();
+        let filter = filters.find(|filter| filter.joint == joint && filter.kind == kind)?;
+        Some(self.equations.parameters[filter.parameter].value)
+    }
+
+    /// The whole model, networks included, as one program.
+    ///
+    /// # Errors
+    /// A network that is not one for the model's joints.
+    pub fn whole(&self) -> Result<Dynamics, HybridError> {
+        let mut networks = self.networks();
+        networks.try_fold(self.equations.clone(), |dynamics, network| {
+            with_residual(&dynamics, network)
+        })
+    }
+
+    /// Which program wrote a file, and what the model came of: for the head of every file.
+    pub fn provenance(&self) -> serde_json::Value {
+        json!({
+            "residyn": env!("CARGO_PKG_VERSION"),
+            "system": self.name(),
+            "integrator": self.integrator,
+            "step_s": self.step_s,
+            "origin": self.origin,
+        })
+    }
+
+    /// Points and a rollout at which readers of the model can be asked.
+    ///
+    /// # Errors
+    /// As [`Portable::whole`].
+    pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, HybridError> {
+        Ok(Samples::draw(self, &self.whole()?, rng))
+    }
+
+    /// What the program itself predicts there, in f64.
+    ///
+    /// # Errors
+    /// As [`Portable::whole`].
+    pub fn answers(&self, samples: &Samples) -> Result<Answers, HybridError> {
+        let whole = self.whole()?;
+        let values = whole.values();
+        let environment = || Environment::new(&whole, &values, self.integrator, self.step_s);
+        let points = || samples.states.iter().zip(&samples.torques);
+        let next = points().map(|(state, tau)| {
+            let mut state = state.clone();
+            environment().step(&mut state, tau, 0.0);
+            state
+        });
+        let derivative = points().map(|(state, tau)| {
+            let inputs = [state.as_slice(), tau, &[0.0], &values].concat();
+            whole.program.eval(&inputs)
+        });
+        let (mut rollout, mut state) = (environment(), samples.start.clone());
+        let steps = samples.held.iter().enumerate().map(|(k, tau)| {
+            rollout.step(&mut state, tau, k as f64 * self.step_s);
+            state.clone()
+        });
+        Ok(Answers {
+            next: Some(next.collect()),
+            derivative: Some(derivative.collect()),
+            rollout: Some(steps.collect()),
+        })
+    }
+}
+
+/// A checkpoint knows no intervals; the file's hold where its value is still within them.
+fn keep_intervals(equations: &mut Dynamics, system: &System) {
+    let declared = system.dynamics(&system.sign()).parameters;
+    for parameter in &mut equations.parameters {
+        let known = declared.iter().find(|known| known.name == parameter.name);
+        let ci95 = known.and_then(|known| known.ci95);
+        parameter.ci95 = ci95.filter(|[low, high]| (*low..=*high).contains(&parameter.value));
+    }
+}
+
+/// The effects of a model file, unless a network takes the place of its equations.
+fn carried(system: &System, equations: &Dynamics) -> Vec<CarriedEffect> {
+    let mut first = system.parameters.len();
+    if equations.parameters.len() < first {
+        return Vec::new();
+    }
+    let effects = system.effects.iter().map(|effect| {
+        let own = &equations.parameters[first..first + effect.values.len()];
+        first += own.len();
+        let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
+        CarriedEffect {
+            name: effect.effect.name.clone(),
+            joint: effect.joint + 1,
+            expression: effect.expression(&names),
+            parameters: names,
+        }
+    });
+    effects.collect()
+}
