@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::{Answer, Common, inputs};
 use crate::export::{Difference, File, Format, Portable, Unread, find};
-use crate::model::{HybridModel, Integrator, Library};
+use crate::model::{Integrator, Library, ModelWeights};
 use crate::train::Manifest;
 
 /// Write a model for other programs, and measure how far what they predict is from here
@@ -97,7 +97,7 @@ fn portable(arguments: &Arguments) -> Result<Portable> {
 
 fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<Portable> {
     let device = arguments.common.device;
-    let (checkpoint, system, model) = inputs::checkpoint(dir, library, device)?;
+    let (checkpoint, system, _) = inputs::checkpoint(dir, library, device)?;
     let Manifest {
         config,
         seed,
@@ -106,7 +106,7 @@ fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result
     } = &checkpoint.manifest;
     Ok(Portable::new(
         &system,
-        &model,
+        checkpoint.weights.clone(),
         arguments.integrator.unwrap_or(settings.integrator),
         arguments.step.or(step_of(config)).unwrap_or(STEP_S),
         json!({"config": config, "seed": seed}),
@@ -122,11 +122,14 @@ fn step_of(config: &Value) -> Option<f64> {
 
 fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Portable> {
     let system = library.system(file)?;
-    let dynamics = system.dynamics(&system.sign());
-    let model = HybridModel::physics(&dynamics, &arguments.common.device.device())?;
+    let declared = ModelWeights {
+        parameters: system.dynamics(&system.sign()).values(),
+        prior: None,
+        residual: None,
+    };
     Ok(Portable::new(
         &system,
-        &model,
+        declared,
         arguments.integrator.unwrap_or(Integrator::Rk4),
         arguments.step.unwrap_or(STEP_S),
         json!({"config": {"model": file}, "seed": arguments.common.seed}),

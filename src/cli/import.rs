@@ -26,13 +26,13 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = inputs::library(&arguments.effects)?;
-    let device = arguments.common.device;
-    let imported = Imported::read(&arguments.file, library.effects(), device)?;
+    let Common { seed, device, .. } = arguments.common;
+    let imported = Imported::read(&arguments.file, library.effects())?;
     let (system, by) = (
-        imported.model.system().to_owned(),
+        imported.system.name.clone(),
         imported.description.residyn.clone(),
     );
-    imported.save(&arguments.out, arguments.common.seed)?;
+    imported.save(&arguments.out, seed, device)?;
     let out = arguments.out.display();
     inputs::print(&match arguments.common.json {
         true => {

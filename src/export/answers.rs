@@ -27,7 +27,7 @@ impl Answers {
     /// How far `other` is from these; infinite where it has another number of rows, or what is no number.
     pub fn difference(&self, other: &Self) -> Difference {
         let between = |mine: &Option<Vec<Vec<f64>>>, theirs: &Option<Vec<Vec<f64>>>| {
-            Some(largest(mine.as_ref()?, theirs.as_ref()?))
+            Some(difference(mine.as_ref()?, theirs.as_ref()?))
         };
         Difference {
             next: between(&self.next, &other.next),
@@ -45,7 +45,8 @@ impl Difference {
     }
 }
 
-fn largest(mine: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
+/// The largest difference between rows, for each column relative to its largest magnitude in the first.
+pub(super) fn difference(mine: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
     let same_shape =
         mine.len() == theirs.len() && mine.iter().zip(theirs).all(|(a, b)| a.len() == b.len());
     if !same_shape {

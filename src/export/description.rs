@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::{Answers, CarriedEffect, ExportError, File, Format, Portable, Reader, Samples, Unread};
 use crate::expr::{Op, Program};
-use crate::model::{CommandFilter, Effect, HybridError, HybridModel, Integrator, Library, System};
+use crate::model::{CommandFilter, Effect, HybridError, Integrator, Library, ModelWeights, System};
 use crate::train::weights::{from_bytes, to_bytes};
 use crate::train::{
     Backend, CheckpointError, FitSettings, Origin, Shape, TrainError, Training, save,
@@ -90,7 +90,7 @@ struct Equations {
 pub struct Imported {
     pub description: Description,
     pub system: System,
-    pub model: HybridModel,
+    pub numbers: ModelWeights,
 }
 
 /// Why a description cannot be read.
@@ -232,7 +232,7 @@ impl Imported {
     ///
     /// # Errors
     /// A missing or damaged file, another format, or files that do not belong together.
-    pub fn read(path: &Path, effects: &[Effect], backend: Backend) -> Result<Self, ImportError> {
+    pub fn read(path: &Path, effects: &[Effect]) -> Result<Self, ImportError> {
         let description = Description::read(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let weights = folder.join(&description.weights);
@@ -246,11 +246,10 @@ impl Imported {
         let system = System::from_text(path, &description.model_toml, effects)?;
         let dynamics = system.dynamics(&system.sign());
         check(path, shape, &dynamics.parameters)?;
-        let model = shape.model(&numbers, &dynamics, &backend.device())?;
         Ok(Self {
             description,
             system,
-            model,
+            numbers,
         })
     }
 
@@ -264,7 +263,7 @@ impl Imported {
         } = self.description;
         Portable::new(
             &self.system,
-            &self.model,
+            self.numbers.clone(),
             integrator,
             step_s,
             origin.clone(),
@@ -275,7 +274,10 @@ impl Imported {
     ///
     /// # Errors
     /// A folder that cannot be written, or that holds something else than a checkpoint.
-    pub fn save(self, dir: &Path, seed: u64) -> Result<(), ImportError> {
+    pub fn save(self, dir: &Path, seed: u64, backend: Backend) -> Result<(), ImportError> {
+        let dynamics = self.system.dynamics(&self.system.sign());
+        let shape = &self.description.shape;
+        let model = shape.model(&self.numbers, &dynamics, &backend.device())?;
         let Description {
             integrator,
             step_s,
@@ -287,7 +289,7 @@ impl Imported {
             integrator,
             ..FitSettings::default()
         };
-        let training = Training::new(self.model, settings, ChaCha8Rng::seed_from_u64(seed))?;
+        let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(seed))?;
         let origin = Origin {
             config: json!({"command": "import", "step_s": step_s, "origin": origin}),
             seed,
@@ -345,7 +347,7 @@ fn check(
 fn answers(path: &Path, samples: &Samples) -> Result<Answers, Unread> {
     let refused = |error: &dyn std::error::Error| Unread::Refused(error.to_string());
     let library = Library::built_in();
-    let imported = Imported::read(path, library.effects(), Backend::default());
+    let imported = Imported::read(path, library.effects());
     let model = imported.map_err(|error| refused(&error))?.portable();
     model.answers(samples).map_err(|error| refused(&error))
 }

@@ -4,6 +4,8 @@
 mod answers;
 mod description;
 mod format;
+mod held;
+mod onnx;
 mod portable;
 mod python_client;
 mod samples;
@@ -11,9 +13,10 @@ mod samples;
 pub use answers::{Answers, Difference};
 pub use description::{Description, ImportError, Imported};
 pub use format::{ExportError, File, Format, Reader, Unread, find};
+pub use held::{HeldFilter, Sum as HeldSum};
 pub use portable::{CarriedEffect, Portable};
 pub use python_client::PythonClient;
 pub use samples::Samples;
 
 /// Every format, by name.
-pub const FORMATS: &[&Format] = &[&description::JSON, &description::SAFETENSORS];
+pub const FORMATS: &[&Format] = &[&description::JSON, &onnx::FORMAT, &description::SAFETENSORS];

@@ -4,8 +4,8 @@ use serde_json::json;
 
 use super::{Answers, Samples};
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, HybridModel, Integrator, MlpWeights, ModelWeights,
-    System, with_residual,
+    CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, System,
+    nothing_but, with_residual,
 };
 use crate::plant::Environment;
 
@@ -45,19 +45,25 @@ pub struct CarriedEffect {
 }
 
 impl Portable {
-    /// A model of `system` that was trained or, without networks, one that its file states.
+    /// The model of `system` with these numbers: values for all parameters of the equations with their effects, or a
+    /// network in their place; and a residual.
     pub fn new(
         system: &System,
-        model: &HybridModel,
+        numbers: ModelWeights,
         integrator: Integrator,
         step_s: f64,
         origin: serde_json::Value,
     ) -> Self {
-        let (mut equations, _) = model.parts();
         let ModelWeights {
-            prior, residual, ..
-        } = model.weights();
-        keep_intervals(&mut equations, system);
+            parameters,
+            prior,
+            residual,
+        } = numbers;
+        let mut equations = match &prior {
+            Some(prior) => nothing_but(&system.name, system.joints, prior.on),
+            None => system.dynamics(&system.sign()).with_values(parameters),
+        };
+        keep_intervals(&mut equations);
         Self {
             about: system.about.clone(),
             effects: carried(system, &equations),
@@ -116,6 +122,14 @@ impl Portable {
         operands.any(|node| Some(node.index()) == time)
     }
 
+    /// What no format carries of a sensor that shows something else than the rig's own angle.
+    pub(super) fn reading_limit(&self) -> Option<String> {
+        let shown = self.equations.reading.as_ref();
+        shown.map(|_| {
+            "what the sensors show: positions are the rig's own, before play shifts them".to_owned()
+        })
+    }
+
     /// The time constant of a filter on a joint (counted from 0) in s, where the model has such a filter.
     pub fn filter(&self, joint: usize, kind: CommandFilter) -> Option<f64> {
         let mut filters = self.equations.filters.iter();
@@ -171,26 +185,39 @@ impl Portable {
             let inputs = [state.as_slice(), tau, &[0.0], &values].concat();
             whole.program.eval(&inputs)
         });
-        let (mut rollout, mut state) = (environment(), samples.start.clone());
-        let steps = samples.held.iter().enumerate().map(|(k, tau)| {
-            rollout.step(&mut state, tau, k as f64 * self.step_s);
-            state.clone()
-        });
         Ok(Answers {
             next: Some(next.collect()),
             derivative: Some(derivative.collect()),
-            rollout: Some(steps.collect()),
+            rollout: Some(self.rollout(&whole, &samples.start, &samples.held)),
         })
     }
 }
 
-/// A checkpoint knows no intervals; the file's hold where its value is still within them.
-fn keep_intervals(equations: &mut Dynamics, system: &System) {
-    let declared = system.dynamics(&system.sign()).parameters;
+impl Portable {
+    /// The state after each step from `start` under torques `held`; `whole` is the model as one program.
+    pub(super) fn rollout(
+        &self,
+        whole: &Dynamics,
+        start: &[f64],
+        held: &[Vec<f64>],
+    ) -> Vec<Vec<f64>> {
+        let values = whole.values();
+        let mut environment = Environment::new(whole, &values, self.integrator, self.step_s);
+        let mut state = start.to_vec();
+        let steps = held.iter().enumerate().map(|(k, tau)| {
+            environment.step(&mut state, tau, k as f64 * self.step_s);
+            state.clone()
+        });
+        steps.collect()
+    }
+}
+
+/// The file's intervals hold where the value is still within them.
+fn keep_intervals(equations: &mut Dynamics) {
     for parameter in &mut equations.parameters {
-        let known = declared.iter().find(|known| known.name == parameter.name);
-        let ci95 = known.and_then(|known| known.ci95);
-        parameter.ci95 = ci95.filter(|[low, high]| (*low..=*high).contains(&parameter.value));
+        let value = parameter.value;
+        let holds = |[low, high]: &[f64; 2]| (*low..=*high).contains(&value);
+        parameter.ci95 = parameter.ci95.filter(holds);
     }
 }
 

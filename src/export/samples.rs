@@ -4,6 +4,7 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::Portable;
+use super::answers::difference;
 use crate::model::Dynamics;
 
 /// Points in the space of states and torques, and a rollout. Every number is exactly an f32, so that readers in single
@@ -27,20 +28,21 @@ const POINTS: usize = 256;
 const ROLLOUT_S: f64 = 5.0;
 /// Steps of the rollout for which a torque is held.
 const HOLD: usize = 5;
-/// The rollout's start and torques as a share of what points are drawn from: near rest, where a mechanism of several
-/// joints does not yet turn rounding into another motion.
+/// The rollout's torques, and its speeds at the start, as a share of what points are drawn from.
 const CALM: f64 = 0.1;
+/// Of so many rollouts the one is taken that a small change of its start changes least: where a motion turns every
+/// difference into another motion, two readers tell of nothing but their rounding.
+const ROLLOUTS: usize = 16;
+/// The change of the start, as a share of what points are drawn from.
+const NUDGE: f64 = 1e-6;
 
 impl Samples {
     /// Points over a whole turn (or a metre either way) and speeds as large per second, with torques that change the
     /// accelerations about as much as the state does.
     pub(super) fn draw(model: &Portable, whole: &Dynamics, rng: &mut impl Rng) -> Self {
-        let reach: Vec<f64> = (0..2 * model.joints())
-            .map(|k| match model.prismatic[k % model.joints()] {
-                true => 1.0,
-                false => PI,
-            })
-            .collect();
+        let n = model.joints();
+        let reach = |k: usize| if model.prismatic[k % n] { 1.0 } else { PI };
+        let reach: Vec<f64> = (0..2 * n).map(reach).collect();
         let states = rows(POINTS, &reach, rng);
         let torque = torque_scale(whole, &states);
         let steps = (ROLLOUT_S / model.step_s).ceil().max(1.0);
@@ -48,12 +50,27 @@ impl Samples {
         let steps = steps as usize;
         let calm = |scale: &[f64]| scale.iter().map(|x| CALM * x).collect::<Vec<_>>();
         let pieces = rows(steps.div_ceil(HOLD), &calm(&torque), rng);
+        let held: Vec<_> = (0..steps).map(|k| pieces[k / HOLD].clone()).collect();
+        let slow = [&reach[..n], &calm(&reach[n..])].concat();
+        let starts = rows(ROLLOUTS, &slow, rng);
+        let growth = |start: &[f64]| {
+            let nudged: Vec<f64> = start
+                .iter()
+                .zip(&reach)
+                .map(|(x, r)| x + NUDGE * r)
+                .collect();
+            let [there, here] = [&nudged, start].map(|start| model.rollout(whole, start, &held));
+            difference(&here, &there)
+        };
+        let growths = starts.iter().map(|start| growth(start));
+        let calmest = growths.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (calmest, _) = calmest.expect("there are some");
         Self {
-            joints: model.joints(),
+            joints: n,
             step_s: model.step_s,
             torques: rows(POINTS, &torque, rng),
-            start: rows(1, &calm(&reach), rng).remove(0),
-            held: (0..steps).map(|k| pieces[k / HOLD].clone()).collect(),
+            start: starts[calmest].clone(),
+            held,
             states,
         }
     }

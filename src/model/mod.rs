@@ -30,6 +30,7 @@ pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};
 pub(crate) use hybrid::{PRIOR_ID, RESIDUAL_ID};
 pub use integrator::{Integrator, Step};
 pub use library::Library;
+pub(crate) use network::nothing_but;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, ResidualOn,
     with_residual,

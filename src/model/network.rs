@@ -395,7 +395,7 @@ pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, 
 
 /// The rates that a network is added to where there are no equations: none, or dq/dt = qd where it gives
 /// accelerations alone.
-pub(super) fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
+pub(crate) fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics {
     let mut graph = Graph::new();
     let numbered = |stem: &'static str| (1..=joints).map(move |joint| format!("{stem}{joint}"));
     let names = ["q", "qd", "tau"]
