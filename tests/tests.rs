@@ -18,6 +18,7 @@ mod identify;
 mod measured;
 mod memory;
 mod metric;
+mod models;
 mod oracles;
 mod parity;
 mod per_log;

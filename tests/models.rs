@@ -1,0 +1,187 @@
+//! One model of each kind that can be exported: equations, effects, filters of the command, networks; one joint and two.
+
+use std::path::Path;
+
+use rand_chacha::ChaCha8Rng;
+use residyn::export::Portable;
+use residyn::model::{
+    Angles, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+    ResidualOn, System,
+};
+use residyn::train::Backend;
+use serde_json::json;
+
+use crate::common::rng;
+
+/// Friction, and a command that is delayed by no whole number of steps and then smoothed.
+const PENDULUM_EFFECTS: &str = r#"
+[[effect]]
+name = "coulomb_friction"
+joint = 1
+F_c = { value = 0.16, ci95 = [0.15, 0.17] }
+
+[[effect]]
+name = "actuator_delay"
+joint = 1
+d = 0.013
+
+[[effect]]
+name = "actuator_lag"
+joint = 1
+T = 0.02
+"#;
+
+/// A delay on one joint, a lag on the other.
+const ACROBOT_EFFECTS: &str = r#"
+[[effect]]
+name = "actuator_delay"
+joint = 1
+d = 0.025
+
+[[effect]]
+name = "actuator_lag"
+joint = 2
+T = 0.01
+
+[[effect]]
+name = "stribeck_friction"
+joint = 1
+F_c = 0.1
+F_s = 0.15
+v_s = 0.2
+
+[[effect]]
+name = "actuator_saturation"
+joint = 2
+m = 4.0
+"#;
+
+/// All of them, by name.
+pub fn all() -> Vec<(&'static str, Portable)> {
+    let fine = Integrator::Fine {
+        steps: 4.try_into().unwrap(),
+    };
+    let (euler, rk4) = (Integrator::SemiImplicitEuler, Integrator::Rk4);
+    let pendulum = || system("pendulum", "");
+    let friction = || system("pendulum", PENDULUM_EFFECTS);
+    let acrobot = || system("acrobot", "");
+    let late = || system("acrobot", ACROBOT_EFFECTS);
+    let mut random = rng(7);
+    let forces =
+        [Angles::Raw, Angles::SinCos].map(|angles| settings(angles, ResidualOn::Accelerations));
+    let rates = settings(Angles::SinCos, ResidualOn::Derivative);
+    let mut small = |joints, settings: &MlpSettings| network(joints, settings, &mut random);
+    let residuals = [small(1, &rates), small(2, &forces[0]), small(2, &forces[1])];
+    let priors = [small(1, &forces[1]), small(2, &rates)];
+    vec![
+        ("pendulum", physics(&pendulum(), euler, 0.02)),
+        ("pendulum_effects", physics(&friction(), rk4, 0.01)),
+        (
+            "pendulum_hybrid",
+            hybrid(&friction(), &residuals[0], euler, 0.02),
+        ),
+        (
+            "pendulum_data",
+            data_driven(&pendulum(), &priors[0], rk4, 0.02),
+        ),
+        ("acrobot", physics(&acrobot(), fine, 0.02)),
+        ("acrobot_effects", physics(&late(), fine, 0.01)),
+        (
+            "acrobot_hybrid",
+            hybrid(&late(), &residuals[2], euler, 0.01),
+        ),
+        (
+            "acrobot_data",
+            data_driven(&acrobot(), &priors[1], fine, 0.02),
+        ),
+        ("cartpole", physics(&system("cartpole", ""), rk4, 0.02)),
+        (
+            "cartpole_hybrid",
+            hybrid(&system("cartpole", ""), &residuals[1], rk4, 0.02),
+        ),
+    ]
+}
+
+/// A built-in system with effects appended to its file.
+fn system(name: &str, effects: &str) -> System {
+    let library = Library::built_in();
+    let declared = library.system(Path::new(name)).unwrap();
+    System::from_text(
+        Path::new(name),
+        &(declared.text + effects),
+        library.effects(),
+    )
+    .unwrap()
+}
+
+fn physics(system: &System, integrator: Integrator, step_s: f64) -> Portable {
+    portable(system, &equations(system), integrator, step_s)
+}
+
+fn hybrid(system: &System, residual: &MlpWeights, integrator: Integrator, step_s: f64) -> Portable {
+    let model = equations(system).with_residual(residual).unwrap();
+    portable(system, &model, integrator, step_s)
+}
+
+fn data_driven(
+    system: &System,
+    prior: &MlpWeights,
+    integrator: Integrator,
+    step_s: f64,
+) -> Portable {
+    let device = Backend::Flex.device();
+    let model = HybridModel::network(&system.name, system.joints, prior, &device).unwrap();
+    portable(system, &model, integrator, step_s)
+}
+
+fn equations(system: &System) -> HybridModel {
+    let dynamics = system.dynamics(&system.sign());
+    HybridModel::physics(&dynamics, &Backend::Flex.device()).unwrap()
+}
+
+fn portable(system: &System, model: &HybridModel, integrator: Integrator, step_s: f64) -> Portable {
+    let origin = json!({"config": {"model": system.name}, "seed": 7});
+    Portable::new(system, model, integrator, step_s, origin)
+}
+
+fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {
+    MlpSettings {
+        hidden: vec![8, 6],
+        angles,
+        on,
+    }
+}
+
+/// A random network whose features are scaled and whose outputs are small beside the motion's own.
+fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> MlpWeights {
+    let features = settings.angles.features(joints);
+    let scaling = InputScaling {
+        mean: (0..features).map(|k| 0.125 * k as f64 - 0.25).collect(),
+        std: (0..features).map(|k| 1.0 + 0.5 * k as f64).collect(),
+    };
+    let mut network = MlpWeights::new(joints, settings, scaling, LastLayer::Random, random);
+    let last = network.layers.last_mut().unwrap();
+    for number in last.weight.iter_mut().chain(&mut last.bias) {
+        *number *= 0.25;
+    }
+    network
+}
+
+#[test]
+fn the_models_are_of_every_kind() {
+    let models = all();
+    let some = |kind: fn(&Portable) -> bool| models.iter().any(|(_, model)| kind(model));
+    assert!(some(
+        |m| m.networks().next().is_none() && m.effects.is_empty()
+    ));
+    assert!(some(
+        |m| !m.equations.filters.is_empty() && m.residual.is_some()
+    ));
+    assert!(some(|m| m.prior.is_some()));
+    for (name, model) in &models {
+        let samples = model.samples(&mut rng(1)).unwrap();
+        let answers = model.answers(&samples).unwrap();
+        let numbers = answers.rollout.unwrap().concat();
+        assert!(numbers.iter().all(|x| x.abs() < 100.0), "{name} runs away");
+    }
+}
