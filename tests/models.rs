@@ -5,10 +5,9 @@ use std::path::Path;
 use rand_chacha::ChaCha8Rng;
 use residyn::export::Portable;
 use residyn::model::{
-    Angles, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+    Angles, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights,
     ResidualOn, System,
 };
-use residyn::train::Backend;
 use serde_json::json;
 
 use crate::common::rng;
@@ -115,12 +114,15 @@ fn system(name: &str, effects: &str) -> System {
 }
 
 fn physics(system: &System, integrator: Integrator, step_s: f64) -> Portable {
-    portable(system, &equations(system), integrator, step_s)
+    portable(system, declared(system), integrator, step_s)
 }
 
 fn hybrid(system: &System, residual: &MlpWeights, integrator: Integrator, step_s: f64) -> Portable {
-    let model = equations(system).with_residual(residual).unwrap();
-    portable(system, &model, integrator, step_s)
+    let numbers = ModelWeights {
+        residual: Some(residual.clone()),
+        ..declared(system)
+    };
+    portable(system, numbers, integrator, step_s)
 }
 
 fn data_driven(
@@ -129,19 +131,31 @@ fn data_driven(
     integrator: Integrator,
     step_s: f64,
 ) -> Portable {
-    let device = Backend::Flex.device();
-    let model = HybridModel::network(&system.name, system.joints, prior, &device).unwrap();
-    portable(system, &model, integrator, step_s)
+    let numbers = ModelWeights {
+        parameters: Vec::new(),
+        prior: Some(prior.clone()),
+        residual: None,
+    };
+    portable(system, numbers, integrator, step_s)
 }
 
-fn equations(system: &System) -> HybridModel {
-    let dynamics = system.dynamics(&system.sign());
-    HybridModel::physics(&dynamics, &Backend::Flex.device()).unwrap()
+/// The equations with the values of the file.
+fn declared(system: &System) -> ModelWeights {
+    ModelWeights {
+        parameters: system.dynamics(&system.sign()).values(),
+        prior: None,
+        residual: None,
+    }
 }
 
-fn portable(system: &System, model: &HybridModel, integrator: Integrator, step_s: f64) -> Portable {
+fn portable(
+    system: &System,
+    numbers: ModelWeights,
+    integrator: Integrator,
+    step_s: f64,
+) -> Portable {
     let origin = json!({"config": {"model": system.name}, "seed": 7});
-    Portable::new(system, model, integrator, step_s, origin)
+    Portable::new(system, numbers, integrator, step_s, origin)
 }
 
 fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {
