@@ -12,6 +12,7 @@ mod control;
 mod demo;
 mod effects;
 mod experiments;
+mod export;
 mod functions;
 mod gradients;
 mod identify;

@@ -9,7 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use super::{Answers, CarriedEffect, ExportError, File, Format, Portable, Reader, Samples, Unread};
+use super::{
+    Answers, CarriedEffect, ExportError, File, Format, HeldFilter, Portable, Reader, Samples,
+    Unread,
+};
 use crate::expr::{Op, Program};
 use crate::model::{CommandFilter, Effect, HybridError, Integrator, Library, ModelWeights, System};
 use crate::train::weights::{from_bytes, to_bytes};
@@ -73,6 +76,9 @@ struct Equations {
     effects: Vec<CarriedEffect>,
     /// What commanded torques go through before they act.
     filters: Vec<Value>,
+    /// The same for the step of the file: `mean` torques over each substep and what the lag has come to at the `end`, as
+    /// sums of factors times the lagged torque and the torques at two `places`.
+    held: Vec<HeldFilter>,
     /// The rates around the networks, as formulas.
     formulas: String,
     /// Names of the inputs of the operations.
@@ -198,6 +204,7 @@ impl Equations {
                     json!({"joint": filter.joint + 1, "kind": kind, "parameter": name})
                 })
                 .collect(),
+            held: HeldFilter::all(model),
             formulas: program.text(&names),
             inputs: program.inputs().to_vec(),
             operations: operations(program),

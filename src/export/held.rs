@@ -1,10 +1,12 @@
+use serde::{Serialize, Serializer};
+
 use crate::model::{CommandFilter, Integrator};
 
 use super::Portable;
 
 /// What the filters of one joint make of torques that are held over equal steps. They are linear: everything is a sum
 /// of what the lag has come to and of two of the torques commanded so far.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldFilter {
     /// Counted from 0.
     pub joint: usize,
@@ -114,6 +116,12 @@ fn split(steps: f64) -> (usize, f64) {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a delay is not negative
     let whole = whole as usize;
     (whole, if rest < LEAST_REST { 0.0 } else { rest })
+}
+
+impl Serialize for Sum {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        [self.lagged, self.first, self.then].serialize(serializer)
+    }
 }
 
 impl Sum {

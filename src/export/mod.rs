@@ -5,8 +5,10 @@ mod answers;
 mod description;
 mod format;
 mod held;
+mod latex;
 mod onnx;
 mod portable;
+mod python;
 mod python_client;
 mod samples;
 
@@ -19,4 +21,10 @@ pub use python_client::PythonClient;
 pub use samples::Samples;
 
 /// Every format, by name.
-pub const FORMATS: &[&Format] = &[&description::JSON, &onnx::FORMAT, &description::SAFETENSORS];
+pub const FORMATS: &[&Format] = &[
+    &description::JSON,
+    &latex::FORMAT,
+    &onnx::FORMAT,
+    &python::FORMAT,
+    &description::SAFETENSORS,
+];

@@ -30,6 +30,8 @@ pub struct Portable {
     pub step_s: f64,
     /// Text of the model file.
     pub model_toml: String,
+    /// What the model file says.
+    pub system: System,
     /// The configuration and the seed that the model came of.
     pub origin: serde_json::Value,
 }
@@ -74,6 +76,7 @@ impl Portable {
             integrator,
             step_s,
             model_toml: system.text.clone(),
+            system: system.clone(),
             origin,
         }
     }

@@ -17,7 +17,10 @@ pub struct PythonClient {
 impl PythonClient {
     /// Run it as `python SCRIPT FILE SAMPLES.json`; it prints [`Answers`] as JSON. The interpreter is
     /// `$RESIDYN_PYTHON`, else `python3`.
-    pub(super) fn ask(&self, path: &Path, samples: &Samples) -> Result<Answers, Unread> {
+    ///
+    /// # Errors
+    /// No interpreter, a package that is missing, or a file that it cannot read.
+    pub fn ask(&self, path: &Path, samples: &Samples) -> Result<Answers, Unread> {
         let io = |error: std::io::Error| Unread::NoReader(format!("no place for samples: {error}"));
         let folder = tempfile::tempdir().map_err(io)?;
         let (script, question) = (

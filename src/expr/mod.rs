@@ -24,6 +24,6 @@ pub use eval::{Real, Tape};
 pub use graph::{Graph, Node};
 pub use op::{Binary, Op, Unary};
 pub use parse::{Formula, parse};
-pub use print::{Notation, Part};
+pub use print::{Notation, Part, latex_name};
 pub use program::Program;
 pub use scope::{Scope, SignForm};

@@ -104,6 +104,12 @@ impl Program {
         parts[self.outputs[output].index()].text.clone()
     }
 
+    /// The formula of one output in LaTeX, with all intermediates written out.
+    pub fn latex_formula(&self, output: usize) -> String {
+        let parts = self.parts(&Latex, &[]);
+        parts[self.outputs[output].index()].text.clone()
+    }
+
     /// The equations as lines of a LaTeX `align` environment.
     pub fn latex(&self, names: &[&str]) -> String {
         let lines: Vec<String> = self
@@ -315,6 +321,11 @@ impl Notation for Text {
 }
 
 struct Latex;
+
+/// The name of an input, an output or an intermediate in LaTeX's mathematics.
+pub fn latex_name(name: &str) -> String {
+    Latex.name(name)
+}
 
 const GREEK: &[&str] = &[
     "alpha", "beta", "gamma", "delta", "epsilon", "theta", "kappa", "lambda", "mu", "nu", "omega",

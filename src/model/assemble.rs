@@ -1,4 +1,4 @@
-use super::command::Filter;
+use super::command::{CommandFilter, Filter};
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
@@ -86,10 +86,16 @@ impl FittedEffect {
 
     /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
     pub fn expression(&self, names: &[String]) -> String {
+        match self.program(names) {
+            Ok(program) => program.formula(0),
+            Err(filter) => filter.expression(&format!("tau{}", self.joint + 1), &names[0]),
+        }
+    }
+
+    /// The effect's formula as a program, or the filter that it is.
+    pub(super) fn program(&self, names: &[String]) -> Result<Program, CommandFilter> {
         let formula = match &self.effect.entry {
-            Entry::Command(filter) => {
-                return filter.expression(&format!("tau{}", self.joint + 1), &names[0]);
-            }
+            Entry::Command(filter) => return Err(*filter),
             Entry::Force(f)
             | Entry::Torque(f)
             | Entry::Angle(f)
@@ -115,7 +121,7 @@ impl FittedEffect {
         let node = scope
             .lower(&mut graph, formula)
             .expect("formulas were checked when the file was read");
-        graph.finish(&[node]).formula(0)
+        Ok(graph.finish(&[node]))
     }
 
     /// The names of the effect's parameters on its joint, told apart from names already `taken`.

@@ -22,6 +22,14 @@ impl CommandFilter {
             Self::Lag => format!("{parameter} * d({tau})/dt + {tau} = commanded"),
         }
     }
+
+    /// The same in LaTeX.
+    pub fn latex(self, tau: &str, parameter: &str) -> String {
+        match self {
+            Self::Delay => format!("{tau}\\left(t - {parameter}\\right)"),
+            Self::Lag => format!("{parameter} \\,\\dot{{{tau}}} + {tau} = \\text{{commanded}}"),
+        }
+    }
 }
 
 /// A filter of one joint's commanded torque.

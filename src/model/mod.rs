@@ -20,6 +20,7 @@ mod sensors;
 mod shift;
 mod stack;
 mod system;
+mod typeset;
 
 pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};

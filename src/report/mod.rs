@@ -17,4 +17,5 @@ pub use json::Report;
 pub use model_file::model_file;
 pub use summary::summary;
 pub use tensorboard::EventFile;
+pub(crate) use text::digits;
 pub use text::text;

@@ -122,22 +122,30 @@ fn value(parameter: &Parameter) -> String {
 
 /// `0.1598 N m (0.1593 to 0.1603)`
 fn amount(parameter: &Parameter) -> String {
-    let digits = parameter
-        .ci95
-        .map_or(1e-4 * parameter.value.abs(), |[low, high]| {
-            0.05 * (high - low)
-        });
-    let number = |x: f64| rounded(x, digits);
+    let (value, ends) = digits(parameter);
     let unit = if parameter.unit == "1" {
         String::new()
     } else {
         format!(" {}", parameter.unit)
     };
-    let interval = parameter.ci95.map_or_else(
+    let interval = ends.map_or_else(
         || " (not fitted)".to_owned(),
-        |[low, high]| format!(" ({} to {})", number(low), number(high)),
+        |[low, high]| format!(" ({low} to {high})"),
     );
-    number(parameter.value) + &unit + &interval
+    value + &unit + &interval
+}
+
+/// A parameter's value and the ends of its interval, in as many digits as they are worth.
+pub(crate) fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
+    let resolution = match parameter.ci95 {
+        Some([low, high]) => 0.05 * (high - low),
+        None => 1e-4 * parameter.value.abs(),
+    };
+    let number = |x: f64| rounded(x, resolution);
+    (
+        number(parameter.value),
+        parameter.ci95.map(|ends| ends.map(number)),
+    )
 }
 
 /// As many digits as the resolution is worth.

@@ -1,0 +1,29 @@
+"""Run an exported Python module: python module.py MODEL.py SAMPLES.json prints what it predicts at the samples."""
+
+import importlib.util
+import json
+import pathlib
+import sys
+
+# What `import model` does, for a file anywhere.
+specification = importlib.util.spec_from_file_location("model", sys.argv[1])
+model = importlib.util.module_from_spec(specification)
+specification.loader.exec_module(model)
+samples = json.loads(pathlib.Path(sys.argv[2]).read_text())
+
+# Any number of rows at once.
+states, torques = samples["states"], samples["torques"]
+next_states, _ = model.step(states, torques)
+
+# One row after the other.
+state, memory, rollout = samples["start"], None, []
+for k, held in enumerate(samples["held"]):
+    state, memory = model.step(state, held, memory, time=k * model.STEP)
+    rollout.append(state.tolist())
+
+answers = {
+    "next": next_states.tolist(),
+    "derivative": model.derivative(states, torques).tolist(),
+    "rollout": rollout,
+}
+print(json.dumps(answers))

@@ -1,0 +1,81 @@
+use super::reader::Located;
+use super::system::{FittedEffect, Motion, System};
+use crate::expr::{Formula, Graph, Scope, SignForm, latex_name};
+
+impl System {
+    /// The declared equations as lines of a LaTeX `align` environment: intermediates, then the motion. Torques are
+    /// those that effects leave.
+    pub fn latex(&self) -> Vec<String> {
+        let mut names = self.input_names();
+        let mut lines = Vec::new();
+        for (name, formula) in &self.lets {
+            lines.push(format!(
+                "{} &= {}",
+                latex_name(name),
+                latex(&names, formula)
+            ));
+            names.push(name.clone());
+        }
+        let each = |formulas: &[Located<Formula>]| -> Vec<String> {
+            formulas
+                .iter()
+                .map(|formula| latex(&names, formula))
+                .collect()
+        };
+        let column = |stem: &str| -> Vec<String> {
+            (1..=self.joints)
+                .map(|j| latex_name(&format!("{stem}{j}")))
+                .collect()
+        };
+        match &self.motion {
+            Motion::Accelerations(formulas) => {
+                let pairs = column("qdd").into_iter().zip(each(formulas));
+                lines.extend(pairs.map(|(left, right)| format!("{left} &= {right}")));
+            }
+            Motion::MassAndBias { mass, bias } => {
+                let rows: Vec<String> = mass.iter().map(|row| each(row).join(" & ")).collect();
+                lines.push(format!(
+                    "{}\\,{} + {} &= {}",
+                    matrix(&rows),
+                    matrix(&column("qdd")),
+                    matrix(&each(bias)),
+                    matrix(&column("tau"))
+                ));
+            }
+        }
+        lines
+    }
+}
+
+impl FittedEffect {
+    /// The effect's formula in the names of its joint and of its parameters, in LaTeX.
+    pub fn latex(&self, names: &[String]) -> String {
+        match self.program(names) {
+            Ok(program) => program.latex_formula(0),
+            Err(filter) => {
+                let tau = latex_name(&format!("tau{}", self.joint + 1));
+                filter.latex(&tau, &latex_name(&names[0]))
+            }
+        }
+    }
+}
+
+fn matrix(rows: &[String]) -> String {
+    format!(
+        "\\begin{{pmatrix}} {} \\end{{pmatrix}}",
+        rows.join(" \\\\ ")
+    )
+}
+
+fn latex(names: &[String], formula: &Located<Formula>) -> String {
+    let mut graph = Graph::new();
+    let mut scope = Scope::new(SignForm::Exact);
+    for name in names {
+        let node = graph.input(name);
+        scope.bind(name, node);
+    }
+    let node = scope
+        .lower(&mut graph, &formula.value)
+        .expect("formulas were checked when the file was read");
+    graph.finish(&[node]).latex_formula(0)
+}

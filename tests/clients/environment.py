@@ -1,0 +1,31 @@
+"""Put the environment of an exported Python module through gymnasium's checker, and compare its rewards."""
+
+import importlib.util
+import json
+import pathlib
+import sys
+
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+
+specification = importlib.util.spec_from_file_location("model", sys.argv[1])
+model = importlib.util.module_from_spec(specification)
+specification.loader.exec_module(model)
+expected = json.loads(pathlib.Path(sys.argv[2]).read_text())
+
+environment = model.Environment()
+check_env(environment, skip_render_check=True)
+
+rewards = model.reward(expected["states"], expected["torques"])
+assert np.allclose(rewards, expected["rewards"], rtol=1e-12, atol=1e-12), rewards
+
+observation, _ = environment.reset(seed=3)
+action = np.array(expected["torques"][0])
+after, won, terminated, truncated, _ = environment.step(action)
+state, memory = observation, None
+for _ in range(round(model.TASK["hold_s"] / model.STEP)):
+    state, memory = model.step(state, action, memory)
+assert np.array_equal(after, state), (after, state)
+assert won == model.reward(after, action, model.TASK["hold_s"]) and not (terminated or truncated)
+again, _ = environment.reset(seed=3)
+assert np.array_equal(again, observation)

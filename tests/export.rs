@@ -1,0 +1,293 @@
+//! Exported models, read by the programs that they are for.
+
+use std::io::Write;
+use std::path::Path;
+
+use residyn::control::{Meter, Task};
+use residyn::export::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
+use serde_json::{Value, json};
+
+use crate::clients::client;
+use crate::common::rng;
+use crate::models;
+use crate::support::{refuses, residyn, succeeds, text};
+
+/// The rebuilding of a description that docs/export.md shows.
+const DESCRIPTION: PythonClient = PythonClient {
+    name: "description.py",
+    script: include_str!("../docs/clients/description.py"),
+    packages: "numpy safetensors",
+};
+
+/// What a reader says of a model that was written to a folder of its own; loudly none without a reader.
+fn answers(name: &str, ask: impl FnOnce() -> Result<Answers, Unread>) -> Option<Answers> {
+    match ask() {
+        Ok(answers) => Some(answers),
+        Err(Unread::NoReader(reason)) => {
+            let required = std::env::var_os("RESIDYN_PYTHON").is_some();
+            assert!(!required, "{name}: {reason}");
+            // Not eprintln!, which the test harness swallows.
+            let _ = writeln!(std::io::stderr(), "SKIPPED {name}: {reason}; run tests/run");
+            None
+        }
+        Err(Unread::Refused(said)) => panic!("{name}: {said}"),
+    }
+}
+
+/// Steps, derivatives and a rollout are all there and as predicted here.
+fn agree(name: &str, own: &Answers, theirs: &Answers, tolerance: f64) {
+    let difference = own.difference(theirs);
+    for (what, difference) in [
+        ("step", difference.next),
+        ("derivative", difference.derivative),
+        ("rollout", difference.rollout),
+    ] {
+        let difference = difference.unwrap_or_else(|| panic!("{name}: no answer for a {what}"));
+        assert!(difference <= tolerance, "{name}, {what}: {difference:e}");
+    }
+}
+
+fn question(model: &Portable) -> (Samples, Answers) {
+    let samples = model.samples(&mut rng(1)).unwrap();
+    let own = model.answers(&samples).unwrap();
+    (samples, own)
+}
+
+/// Every kind of model in one format, as its reader sees it.
+fn every_model_is_read_alike(format: &Format, extension: &str) {
+    for (name, model) in models::all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("{name}.{extension}"));
+        format.write(&model, &path).unwrap();
+        let (samples, own) = question(&model);
+        let name = format!("{name} as {}", format.name);
+        if let Some(theirs) = answers(&name, || format.ask(&path, &samples)) {
+            agree(&name, &own, &theirs, format.tolerance);
+        }
+    }
+}
+
+#[test]
+fn onnxruntime_predicts_the_same() {
+    every_model_is_read_alike(find("onnx").unwrap(), "onnx");
+}
+
+#[test]
+fn a_python_module_predicts_the_same() {
+    every_model_is_read_alike(find("python").unwrap(), "py");
+}
+
+#[test]
+fn a_description_is_read_back_to_the_same_model() {
+    every_model_is_read_alike(find("json").unwrap(), "json");
+    every_model_is_read_alike(find("safetensors").unwrap(), "safetensors");
+}
+
+#[test]
+fn a_description_can_be_rebuilt_with_numpy() {
+    for (name, model) in models::all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.json");
+        find("json").unwrap().write(&model, &path).unwrap();
+        let (samples, own) = question(&model);
+        if let Some(theirs) = answers(name, || DESCRIPTION.ask(&path, &samples)) {
+            agree(name, &own, &theirs, 1e-9);
+        }
+    }
+}
+
+#[test]
+fn onnx_files_pass_the_checker_and_say_what_they_are() {
+    for (_, model) in models::all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.onnx");
+        find("onnx").unwrap().write(&model, &path).unwrap();
+        let parameters = model.equations.parameters.iter();
+        let parameters: Vec<Value> = parameters
+            .map(|p| json!([p.name, p.value, p.unit]))
+            .collect();
+        let expected =
+            json!({"system": model.name(), "step_s": model.step_s, "parameters": parameters});
+        let file = folder.path().join("expected.json");
+        std::fs::write(&file, expected.to_string()).unwrap();
+        client("onnx_checker.py", &[&path, &file]);
+    }
+}
+
+#[test]
+fn gymnasium_takes_the_environment_of_a_module() {
+    for (name, model) in models::all() {
+        let Some(task) = Task::of_system(model.name()) else {
+            continue;
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("{name}.py"));
+        find("python").unwrap().write(&model, &path).unwrap();
+        let samples = model.samples(&mut rng(1)).unwrap();
+        let meter = Meter::of(&task.objective());
+        let points = samples.states.iter().zip(&samples.torques);
+        let rewards: Vec<f64> = points
+            .map(|(state, tau)| meter.read(state, tau, 0.0))
+            .collect();
+        let expected =
+            json!({"states": samples.states, "torques": samples.torques, "rewards": rewards});
+        let file = folder.path().join("expected.json");
+        std::fs::write(&file, expected.to_string()).unwrap();
+        client("environment.py", &[&path, &file]);
+    }
+}
+
+#[test]
+fn what_is_exported_comes_back_as_a_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text(&folder.path().join(name)).to_owned();
+    let checkpoint = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints/acrobot-sim");
+    let first = [
+        "export",
+        "--checkpoint",
+        text(&checkpoint),
+        "--format",
+        "json",
+        "--out",
+    ];
+    let printed = succeeds(&[&first[..], &[&at("a.json"), "--json"]].concat());
+    let printed: Value = serde_json::from_str(&printed).unwrap();
+    assert_eq!(printed["difference"]["rollout"], 0.0);
+    succeeds(&["import", "--file", &at("a.json"), "--out", &at("back")]);
+    let again = [
+        "export",
+        "--checkpoint",
+        &at("back"),
+        "--format",
+        "json",
+        "--out",
+    ];
+    succeeds(&[&again[..], &[&at("b.json")]].concat());
+    let weights = |name: &str| std::fs::read(at(name)).unwrap();
+    assert!(weights("a.safetensors") == weights("b.safetensors"));
+    let description = |name: &str| -> Value { serde_json::from_slice(&weights(name)).unwrap() };
+    let (before, after) = (description("a.json"), description("b.json"));
+    for key in [
+        "prior",
+        "residual",
+        "integrator",
+        "step_s",
+        "model_toml",
+        "equations",
+    ] {
+        assert_eq!(before[key], after[key], "{key}");
+    }
+}
+
+#[test]
+fn mistakes_in_files_to_import_are_told_with_their_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text(&folder.path().join(name)).to_owned();
+    succeeds(&[
+        "export",
+        "--model",
+        "pendulum",
+        "--format",
+        "json",
+        "--out",
+        &at("m.json"),
+    ]);
+    let told = |change: &dyn Fn(&mut Value)| {
+        let mut json: Value =
+            serde_json::from_slice(&std::fs::read(at("m.json")).unwrap()).unwrap();
+        change(&mut json);
+        std::fs::write(at("n.json"), json.to_string()).unwrap();
+        let message = refuses(&["import", "--file", &at("n.json"), "--out", &at("back")]);
+        assert!(
+            !folder.path().join("back").exists(),
+            "something was written"
+        );
+        message.replace(&at(""), "")
+    };
+    assert_eq!(
+        told(&|json| json["residyn_model"] = json!(2)),
+        "error: n.json has format 2, this program reads 1; use the residyn that wrote it (0.1.0)\n"
+    );
+    let missing = told(&|json| json["weights"] = json!("gone.safetensors"));
+    assert!(
+        missing.starts_with("error: gone.safetensors cannot be read: "),
+        "{missing}"
+    );
+    let other = told(&|json| json["parameters"][0]["name"] = json!("C_h"));
+    assert!(
+        other.contains("there is no tensor `parameters.C_h`"),
+        "{other}"
+    );
+    let model =
+        told(&|json| json["model_toml"] = json!("[system]\nname = \"pendulum\"\njoint = 1\n"));
+    assert!(
+        model.contains("unknown key `joint`") && model.contains("line 3"),
+        "{model}"
+    );
+    std::fs::write(at("n.json"), "{").unwrap();
+    let message = refuses(&["import", "--file", &at("n.json"), "--out", &at("back")]);
+    assert!(message.contains("line 1 column 1"), "{message}");
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(&folder.path().join("m.json")).to_owned();
+    let export = |more: &[&str]| refuses(&[&["export", "--out", &out], more].concat());
+    let unknown = export(&["--model", "pendulum", "--format", "onyx"]);
+    assert!(unknown.contains("did you mean `onnx`?"), "{unknown}");
+    let step = export(&["--model", "pendulum", "--format", "json", "--step", "0"]);
+    assert!(
+        step.contains("--step 0: a step is a number of seconds above zero"),
+        "{step}"
+    );
+    let integrator = export(&[
+        "--model",
+        "pendulum",
+        "--format",
+        "json",
+        "--integrator",
+        "fine:0",
+    ]);
+    assert!(integrator.contains("fine:N"), "{integrator}");
+    let same = export(&["--model", "pendulum", "--format", "safetensors"]);
+    assert!(same.contains("both would be"), "{same}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let nowhere = residyn(&[
+        "export",
+        "--model",
+        "pendulum",
+        "--format",
+        "json",
+        "--out",
+        "no/such/folder/m.json",
+    ]);
+    assert_eq!(nowhere.status.code(), Some(2));
+}
+
+#[test]
+fn latex_is_parsed_and_holds_equations_values_and_intervals() {
+    for (name, model) in models::all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(format!("{name}.tex"));
+        find("latex").unwrap().write(&model, &path).unwrap();
+        let mut pieces = Vec::new();
+        let mut environments = vec!["document"];
+        if model.prior.is_none() {
+            environments.extend(["align*", "tabular"]);
+        }
+        if name == "pendulum_effects" {
+            environments.push("itemize");
+            pieces.extend([
+                r"\ddot{q}_{1} &= C_{g} \,\sin\left(q_{1}\right) + C_{i} \,\tau_{1}",
+                r"-F_{\mathrm{c1}} \,\operatorname{sign}\left(\dot{q}_{1}\right)",
+                r"$F_{\mathrm{c1}}$ & $0.160$ & $\mathrm{N\,m}$ & $0.150$ to $0.170$",
+                r"$C_{i}$ & $3.0000$ & $\mathrm{1/(kg\,m^{2})}$ & not fitted",
+            ]);
+        }
+        let expected = folder.path().join("expected.json");
+        let json = json!({"environments": environments, "pieces": pieces});
+        std::fs::write(&expected, json.to_string()).unwrap();
+        client("latex.py", &[&path, &expected]);
+    }
+}
