@@ -25,7 +25,7 @@ pub(super) const JSON: Format = Format {
     about: "the whole model as a description, its weights beside it as safetensors",
     limits: |_| Vec::new(),
     files: |model, path| pair(model, path, &path.with_extension(WEIGHTS)),
-    reader: Reader::Own(|path, samples| answers(path, samples)),
+    reader: Reader::Own(answers),
     tolerance: 1e-12,
 };
 

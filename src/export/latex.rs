@@ -85,6 +85,9 @@ fn motion(out: &mut String, model: &Portable) {
     *out += "\\subsection*{Equations of motion}\n\n\\begin{align*}\n";
     *out += &model.system.latex().join(" \\\\\n");
     *out += "\n\\end{align*}\n\n";
+    if !model.effects.is_empty() {
+        *out += "Here $\\tau$ is what the effects below make of the commanded torques.\n\n";
+    }
 }
 
 fn effects(out: &mut String, model: &Portable) {
