@@ -5,6 +5,7 @@ use clap::Args;
 
 use super::{Answer, Common, inputs};
 use crate::data::{Audit, audit};
+use crate::model::Library;
 
 /// What logs are good for: sampling, noise, spikes, lags, excitation, and what cannot be told from them
 #[derive(Debug, Args)]
@@ -21,7 +22,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let system = inputs::library(&[])?.system(&arguments.model)?;
+    let system = Library::built_in().system(&arguments.model)?;
     let logs = inputs::logs(&arguments.logs, &system)?;
     inputs::print_notes(&logs);
     let audits: Vec<Audit> = logs.iter().map(audit).collect();

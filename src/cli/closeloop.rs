@@ -46,9 +46,8 @@ pub(super) struct Arguments {
     /// where there is none, and how small an effect would it name? Takes about as long as so many runs
     #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS")]
     calibrate: Option<NonZeroUsize>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -58,7 +57,7 @@ const DEMO: &str = include_str!("../../configs/demo.toml");
 const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let (system, split) = match &arguments.model {
         Some(model) => measured(arguments, model, &library)?,
@@ -188,7 +187,7 @@ fn origin(arguments: &Arguments, system: &System) -> Origin {
             "test": paths(&arguments.test),
             "against": paths(&arguments.against),
             "leave_out": spans.collect::<Vec<_>>(),
-            "effects": paths(&arguments.effects),
+            "effects": paths(&arguments.effects.folders),
             "calibrate": arguments.calibrate,
             "device": arguments.common.device.name(),
         }),

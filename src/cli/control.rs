@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde::Serialize;
 
-use super::{Answer, Common, inputs, progress};
+use super::inputs::{self, Source};
+use super::{Answer, Common, progress};
 use crate::control::{
     Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
 };
@@ -24,17 +25,8 @@ use crate::report::{film, write_whole};
                   residyn control --checkpoint checkpoints/pendulum-sim --plant pendulum-sim"
 )]
 pub(super) struct Arguments {
-    /// Checkpoint of the model to plan with
-    #[arg(
-        long,
-        value_name = "DIR",
-        required_unless_present = "model",
-        conflicts_with = "model"
-    )]
-    checkpoint: Option<PathBuf>,
-    /// Model file to plan with, or the name of a built-in system
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    model: inputs::Model,
     /// Plant file, model file, or the name of a built-in plant or system
     #[arg(long, value_name = "NAME")]
     plant: PathBuf,
@@ -61,9 +53,8 @@ pub(super) struct Arguments {
     /// Folder for each episode as a log and, where the task has a figure, as a film (SVG)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -102,7 +93,7 @@ struct Entry {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let plant = Plant::read(&arguments.plant, &library)?;
     let task = task(arguments, &plant)?;
     let predictor = predictor(arguments, &library, &task)?;
@@ -188,20 +179,19 @@ fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
 }
 
 fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Predictor> {
-    if let Some(dir) = &arguments.checkpoint {
-        let device = arguments.common.device;
-        let (checkpoint, _, model) = inputs::checkpoint(dir, library, device)?;
-        return Ok(Predictor::of_model(
-            &model,
-            checkpoint.manifest.settings.integrator,
-        ));
+    match arguments.model.source() {
+        Source::Checkpoint(dir) => {
+            let device = arguments.common.device;
+            let (checkpoint, _, model) = inputs::checkpoint(dir, library, device)?;
+            let integrator = checkpoint.manifest.settings.integrator;
+            Ok(Predictor::of_model(&model, integrator))
+        }
+        Source::File(file) => {
+            let system = library.system(file)?;
+            let dynamics = system.dynamics(&system.sign());
+            Ok(Predictor::of_equations(dynamics, task.integrator))
+        }
     }
-    let file = arguments.model.as_ref().expect("clap asks for one of both");
-    let system = library.system(file)?;
-    Ok(Predictor::of_equations(
-        system.dynamics(&system.sign()),
-        task.integrator,
-    ))
 }
 
 fn one(

@@ -5,7 +5,8 @@ use anyhow::{Result, bail};
 use clap::Args;
 use serde::Serialize;
 
-use super::{Answer, Common, inputs};
+use super::inputs::{self, Source};
+use super::{Answer, Common};
 use crate::data::{LeaveOut, Log};
 use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
 use crate::model::{Dynamics, System};
@@ -16,16 +17,8 @@ use crate::model::{Dynamics, System};
     after_help = "Example:\n  residyn evaluate --model report/model.toml --test run3.csv --horizon 0.5 1.0"
 )]
 pub(super) struct Arguments {
-    /// Model file, or the name of a built-in system
-    #[arg(
-        long,
-        required_unless_present = "checkpoint",
-        conflicts_with = "checkpoint"
-    )]
-    model: Option<PathBuf>,
-    /// Checkpoint of a trained model
-    #[arg(long, value_name = "DIR")]
-    checkpoint: Option<PathBuf>,
+    #[command(flatten)]
+    model: inputs::Model,
     /// Logs to predict
     #[arg(long, num_args = 1.., required = true, value_name = "LOG")]
     test: Vec<PathBuf>,
@@ -38,9 +31,8 @@ pub(super) struct Arguments {
     /// Intervals to leave out, in the time of the log
     #[arg(long, num_args = 1.., value_name = "LOG@T0-T1")]
     leave_out: Vec<LeaveOut>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -121,19 +113,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 /// The system, for its columns, and what is integrated.
 fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
-    let library = inputs::library(&arguments.effects)?;
-    if let Some(model) = &arguments.model {
-        let system = library.system(model)?;
-        let dynamics = system.dynamics(&system.sign());
-        return Ok((system, dynamics));
+    let library = arguments.effects.library()?;
+    match arguments.model.source() {
+        Source::File(file) => {
+            let system = library.system(file)?;
+            let dynamics = system.dynamics(&system.sign());
+            Ok((system, dynamics))
+        }
+        Source::Checkpoint(dir) => {
+            let (_, system, model) = inputs::checkpoint(dir, &library, arguments.common.device)?;
+            let dynamics = model.to_dynamics()?;
+            Ok((system, dynamics))
+        }
     }
-    let dir = arguments
-        .checkpoint
-        .as_ref()
-        .expect("clap asks for one of both");
-    let (_, system, model) = inputs::checkpoint(dir, &library, arguments.common.device)?;
-    let dynamics = model.to_dynamics()?;
-    Ok((system, dynamics))
 }
 
 fn table(summary: &Summary) -> String {

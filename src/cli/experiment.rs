@@ -26,9 +26,8 @@ pub(super) struct Arguments {
     /// Folder for the results and all runs
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -53,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let out = &arguments.out;
     inputs::check_writable(out)?;
     let clock = Clock::open(out)?;
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let published = |experiment| published(arguments, experiment, &library, &clock);
     let finished = match arguments.name {
         Name::PhysicsPrior => published(Experiment::PhysicsPrior),

@@ -7,7 +7,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
-use super::{Answer, Common, inputs};
+use super::inputs::{self, Source};
+use super::{Answer, Common};
 use crate::export::{Difference, File, Format, Portable, Unread, find};
 use crate::model::{Integrator, Library, ModelWeights};
 use crate::train::Manifest;
@@ -18,17 +19,8 @@ use crate::train::Manifest;
     residyn export --checkpoint closeloop-report/checkpoint --format onnx --out pendulum.onnx\n  \
     residyn export --model closeloop-report/model.toml --format c --out pendulum.h --step 0.001")]
 pub(super) struct Arguments {
-    /// Checkpoint of a trained model
-    #[arg(
-        long,
-        value_name = "DIR",
-        required_unless_present = "model",
-        conflicts_with = "model"
-    )]
-    checkpoint: Option<PathBuf>,
-    /// Model file, or the name of a built-in system
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    model: inputs::Model,
     /// What to write; `residyn list formats` shows all
     #[arg(long, value_parser = find)]
     format: &'static Format,
@@ -41,9 +33,8 @@ pub(super) struct Arguments {
     /// How a step is integrated: semi_implicit_euler, rk4 or fine:N; a checkpoint's own without it, else rk4
     #[arg(long)]
     integrator: Option<Integrator>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -87,11 +78,10 @@ fn portable(arguments: &Arguments) -> Result<Portable> {
     if let Some(step) = arguments.step.filter(|s| !(*s > 0.0 && s.is_finite())) {
         bail!("--step {step}: a step is a number of seconds above zero");
     }
-    let library = inputs::library(&arguments.effects)?;
-    match (&arguments.checkpoint, &arguments.model) {
-        (Some(dir), _) => of_checkpoint(arguments, dir, &library),
-        (_, Some(file)) => of_file(arguments, file, &library),
-        _ => unreachable!("clap asks for one of both"),
+    let library = arguments.effects.library()?;
+    match arguments.model.source() {
+        Source::Checkpoint(dir) => of_checkpoint(arguments, dir, &library),
+        Source::File(file) => of_file(arguments, file, &library),
     }
 }
 

@@ -17,15 +17,14 @@ pub(super) struct Arguments {
     /// Folder of the checkpoint
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let Common { seed, device, .. } = arguments.common;
     let imported = Imported::read(&arguments.file, library.effects())?;
     let (system, by) = (

@@ -4,18 +4,56 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use clap::Args;
 
 use crate::data::{LeaveOut, Log, leave_out};
 use crate::model::{HybridModel, Library, System};
 use crate::train::{Backend, Checkpoint};
 
-/// The built-in effects and those of the user's folders.
-pub(super) fn library(folders: &[PathBuf]) -> Result<Library> {
-    let mut library = Library::built_in();
-    for folder in folders {
-        library = library.with_folder(folder)?;
+/// The effects that model files may name: the built-in ones and the user's own.
+#[derive(Debug, Args)]
+pub(super) struct Effects {
+    /// Folders of your own effect files
+    #[arg(long = "effects", num_args = 1.., value_name = "DIR")]
+    pub folders: Vec<PathBuf>,
+}
+
+impl Effects {
+    pub fn library(&self) -> Result<Library> {
+        let mut library = Library::built_in();
+        for folder in &self.folders {
+            library = library.with_folder(folder)?;
+        }
+        Ok(library)
     }
-    Ok(library)
+}
+
+/// The model that a command works with.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub(super) struct Model {
+    /// Checkpoint of a trained model
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Model file, or the name of a built-in system
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+}
+
+/// Where a model is read from.
+pub(super) enum Source<'a> {
+    Checkpoint(&'a Path),
+    File(&'a Path),
+}
+
+impl Model {
+    pub fn source(&self) -> Source<'_> {
+        match (&self.checkpoint, &self.model) {
+            (Some(dir), _) => Source::Checkpoint(dir),
+            (_, Some(file)) => Source::File(file),
+            _ => unreachable!("clap asks for one of both"),
+        }
+    }
 }
 
 /// A checkpoint, the system that it belongs to, and its model.

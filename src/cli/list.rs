@@ -1,5 +1,5 @@
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -16,9 +16,8 @@ use crate::plant::Plant;
 #[command(after_help = "Example:\n  residyn list effects")]
 pub(super) struct Arguments {
     what: What,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -46,7 +45,7 @@ const OTHERS: &[(&str, &str)] = &[
 ];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let (text, value) = match arguments.what {
         What::Systems => systems(&library)?,
         What::Effects => effects(library.effects()),

@@ -33,9 +33,8 @@ pub(super) struct Arguments {
     /// Folder for an event file of the rounds done now, for TensorBoard
     #[arg(long, value_name = "DIR")]
     tensorboard: Option<PathBuf>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -50,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         common,
     } = arguments;
     inputs::check_writable(out)?;
-    let library = inputs::library(effects)?;
+    let library = effects.library()?;
     let session = Session::open(Config::read(config)?, &library, common.device)?;
     let events = match tensorboard {
         Some(folder) => Some(Mutex::new(EventFile::create(folder, now_s())?)),

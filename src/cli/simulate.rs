@@ -29,9 +29,8 @@ pub(super) struct Arguments {
     /// Length in s instead of the plant's own
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -77,7 +76,7 @@ impl FromStr for EffectSetting {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let mut plant = Plant::read(&arguments.plant, &library)?;
     add_effects(&mut plant, &library, &arguments.effect)?;
     if let Some(duration) = arguments.duration {

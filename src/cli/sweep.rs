@@ -37,9 +37,8 @@ pub(super) struct Arguments {
     /// Folder of the result, sweep.json
     #[arg(long, default_value = "sweep", value_name = "DIR")]
     out: PathBuf,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
 }
@@ -92,7 +91,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if arguments.alpha.is_some() && arguments.seeds.get() == 1 {
         bail!("--alpha is a range of weights, and --seeds 1 trains one model; raise --seeds");
     }
-    let library = inputs::library(&arguments.effects)?;
+    let library = arguments.effects.library()?;
     let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
     let members = arguments.members();
     let begun = Instant::now();

@@ -18,9 +18,8 @@ pub(super) struct Arguments {
     /// Training recipe
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     saving: Saving,
     #[command(flatten)]
@@ -34,7 +33,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         saving,
         common,
     } = arguments;
-    let library = inputs::library(effects)?;
+    let library = effects.library()?;
     let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
     let dir = saving.folder(config, "checkpoint");
     carry_out(&job, &dir, saving, common)

@@ -27,9 +27,8 @@ pub(super) struct Arguments {
     /// Logs to learn from, with the usual settings
     #[arg(long, num_args = 1.., value_name = "LOG", conflicts_with = "config")]
     train: Vec<PathBuf>,
-    /// Folders of your own effect files
-    #[arg(long, num_args = 1.., value_name = "DIR")]
-    effects: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
     #[command(flatten)]
     saving: Saving,
     #[command(flatten)]
@@ -45,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         saving,
         common,
     } = arguments;
-    let library = inputs::library(effects)?;
+    let library = effects.library()?;
     let checkpoint = Checkpoint::load(from)?;
     let job = match config {
         Some(config) => {
