@@ -160,7 +160,9 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) 
                 ("a rollout of 5 s", difference.rollout),
             ];
             let parts = parts.iter().filter_map(|(what, d)| Some((what, (*d)?)));
-            let parts: Vec<String> = parts.map(|(what, d)| format!("{what} {d:.1e}")).collect();
+            let parts: Vec<String> = parts
+                .map(|(what, d)| format!("{what} {}", share(d)))
+                .collect();
             let _ = writeln!(
                 out,
                 "largest difference to the prediction here, as a share of each state's largest value: {}",
@@ -182,6 +184,14 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) 
         }
     }
     out
+}
+
+/// Two digits are enough to compare.
+fn share(difference: f64) -> String {
+    if difference == 0.0 {
+        return "none".to_owned();
+    }
+    format!("{difference:.1e}")
 }
 
 fn size(bytes: usize) -> String {

@@ -56,20 +56,17 @@ pub(super) fn difference(mine: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
     let of_column = |k: usize| {
         let scale = mine.iter().map(|row| row[k].abs()).fold(0.0, f64::max);
         let rows = mine.iter().zip(theirs);
-        let difference = rows
-            .map(|(a, b)| (a[k] - b[k]).abs())
-            .fold(0.0, |worst: f64, d| if d <= worst { worst } else { d });
+        let gap = rows.map(|(a, b)| gap(a[k], b[k])).fold(0.0, f64::max);
         // A state that never leaves zero is compared as it is.
-        difference / if scale > 0.0 { scale } else { 1.0 }
+        gap / if scale > 0.0 { scale } else { 1.0 }
     };
-    let worst = (0..columns).map(of_column);
-    worst.fold(0.0, |worst: f64, d| {
-        if d.is_nan() {
-            f64::INFINITY
-        } else {
-            worst.max(d)
-        }
-    })
+    (0..columns).map(of_column).fold(0.0, f64::max)
+}
+
+/// Infinite where one of them is no number, which a maximum would pass over.
+fn gap(a: f64, b: f64) -> f64 {
+    let gap = (a - b).abs();
+    if gap.is_nan() { f64::INFINITY } else { gap }
 }
 
 #[cfg(test)]
