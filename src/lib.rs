@@ -51,6 +51,7 @@ pub mod expr;
 pub mod identify;
 pub mod lanes;
 pub mod mbrl;
+pub mod mechanism;
 pub mod model;
 pub mod plan;
 pub mod plant;

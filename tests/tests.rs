@@ -17,6 +17,7 @@ mod functions;
 mod gradients;
 mod identify;
 mod measured;
+mod mechanism;
 mod memory;
 mod metric;
 mod models;

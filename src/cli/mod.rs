@@ -12,6 +12,7 @@ mod import;
 mod inputs;
 mod list;
 mod mbrl;
+mod new;
 mod progress;
 mod simulate;
 mod sweep;
@@ -51,6 +52,7 @@ enum Command {
     Simulate(simulate::Arguments),
     Export(export::Arguments),
     Import(import::Arguments),
+    New(new::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
 }
@@ -91,6 +93,7 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };

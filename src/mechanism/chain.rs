@@ -1,0 +1,53 @@
+use nalgebra::Vector3;
+
+use super::{Inertia, Pose};
+
+/// A spring between a joint and its base: force `-stiffness * (q - rest)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spring {
+    /// N m/rad, or N/m.
+    pub stiffness: f64,
+    /// Coordinate without force, rad or m.
+    pub rest: f64,
+}
+
+/// One joint of a serial chain with all that moves with it up to the next joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Joint {
+    pub name: String,
+    /// The body that the joint moves.
+    pub body: String,
+    /// Whether it slides along its axis rather than turning about it.
+    pub slides: bool,
+    /// The joint's frame in that of the joint before (or the world), while the joint's coordinate is `reference`; its
+    /// z is the joint's axis.
+    pub pose: Pose,
+    /// rad or m
+    pub reference: f64,
+    /// The frame's x in that of the file's body, to tell a reader what first moments mean.
+    pub across: Vector3<f64>,
+    /// The axis in the frame of the file's body.
+    pub axis: Vector3<f64>,
+    /// In the joint's frame.
+    pub inertia: Inertia,
+    /// N m s/rad, or N s/m.
+    pub damping: f64,
+    /// Dry friction, N m or N.
+    pub friction: f64,
+    /// Inertia of the rotor seen by the joint, kg m^2 or kg.
+    pub armature: f64,
+    pub spring: Option<Spring>,
+    /// The largest torque or force that the drive gives, N m or N.
+    pub effort: Option<f64>,
+}
+
+/// A serial mechanism: from 1 to [`MOST_JOINTS`](super::MOST_JOINTS) joints, each carrying the next.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    pub name: String,
+    /// Acceleration, m/s^2, in the frame of the world.
+    pub gravity: Vector3<f64>,
+    pub joints: Vec<Joint>,
+    /// What the file says of the motion that no model file of ours can carry, or that is carried in another way.
+    pub notes: Vec<String>,
+}

@@ -1,0 +1,26 @@
+//! Model files from robot descriptions: a serial mechanism is read from URDF or MJCF, and its equations of motion are
+//! derived in closed form.
+//!
+//! A reader makes a [tree of bodies](tree) of a file; lumping what is welded makes a [`Chain`] of it. Each entry of the
+//! mass matrix is linear in the physical parameters, with [Fourier series](series) in the angles as coefficients, which
+//! is a form in which equal functions look the same: so parameters that the motion shows only in combinations are
+//! found and [put together](base).
+
+mod base;
+mod chain;
+mod equations;
+mod file;
+mod formula;
+mod mjcf;
+mod series;
+mod spatial;
+mod tree;
+mod urdf;
+mod xml;
+
+pub use chain::{Chain, Joint, Spring};
+pub use file::model_text;
+pub use mjcf::read_mjcf;
+pub use series::MOST_JOINTS;
+pub use spatial::{Inertia, Pose};
+pub use urdf::read_urdf;

@@ -1,0 +1,458 @@
+//! Model files made of robot descriptions.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rand::RngExt;
+use residyn::expr::SignForm;
+use residyn::mechanism::{Chain, model_text, read_mjcf, read_urdf};
+use residyn::model::{Dynamics, FittedEffect, Library, System};
+use serde_json::json;
+
+use crate::clients::client;
+use crate::common::{dynamics, points, rng};
+use crate::support::{refuses, residyn, succeeds, text};
+
+const FILES: [&str; 5] = [
+    "planar_2r.urdf",
+    "spatial_3r.urdf",
+    "rp.xml",
+    "prr.xml",
+    "geoms.xml",
+];
+
+fn fixture(name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("tests/fixtures/mechanisms").join(name)
+}
+
+fn chain(name: &str) -> Chain {
+    let file = fixture(name);
+    if name.ends_with("urdf") {
+        read_urdf(&file).unwrap()
+    } else {
+        read_mjcf(&file).unwrap()
+    }
+}
+
+fn system(chain: &Chain) -> System {
+    let library = Library::built_in();
+    System::from_text(
+        Path::new(&chain.name),
+        &model_text(chain),
+        library.effects(),
+    )
+    .unwrap()
+}
+
+/// The model with the effects that are forces of a state: MuJoCo's dry friction and limits are constraints.
+fn comparable(system: &System) -> Dynamics {
+    let others = ["coulomb_friction", "actuator_saturation"];
+    let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
+    let effects: Vec<FittedEffect> = system.effects.iter().filter(is_force).cloned().collect();
+    dynamics(system, &effects, SignForm::Exact)
+}
+
+#[test]
+fn mujoco_finds_the_same_torques() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in FILES {
+        let model = comparable(&system(&chain(name)));
+        let n = model.joints;
+        let mut rng = rng(1);
+        let sample = |_| {
+            let mut draw = |bound: f64| (0..n).map(|_| rng.random_range(-bound..bound)).collect();
+            let [q, qd, tau]: [Vec<f64>; 3] = [draw(3.0), draw(4.0), draw(20.0)];
+            let inputs = [&q, &qd, &tau, &vec![0.0], &model.values()]
+                .map(Vec::as_slice)
+                .concat();
+            let qdd = &model.program.eval(&inputs)[n..];
+            json!({"q": q, "qd": qd, "tau": tau, "qdd": qdd})
+        };
+        let samples: Vec<_> = (0..200).map(sample).collect();
+        let file = folder.path().join("samples.json");
+        fs::write(&file, serde_json::to_string(&samples).unwrap()).unwrap();
+        client("mechanism.py", &[&fixture(name), &file]);
+    }
+}
+
+/// Coordinates, speeds, torques, time, and the parameters as they are.
+fn states(model: &Dynamics, count: usize) -> Vec<Vec<f64>> {
+    let moving = 3 * model.joints + 1;
+    let with_values = |point: Vec<f64>| [&point[..moving], &model.values()].concat();
+    points(model, count, 3)
+        .into_iter()
+        .map(with_values)
+        .collect()
+}
+
+#[test]
+fn energy_changes_by_the_power() {
+    for name in FILES {
+        let system = system(&chain(name));
+        let model = dynamics(&system, &[], SignForm::Exact);
+        let program = system.energy_program().unwrap();
+        for point in states(&model, 200) {
+            let (rates, energy) = (model.program.eval(&point), program.eval(&point));
+            let parts: Vec<f64> = energy[2..].iter().zip(&rates).map(|(s, r)| s * r).collect();
+            let size: f64 = parts.iter().map(|part| part.abs()).sum();
+            let off = parts.iter().sum::<f64>() - energy[1];
+            // Coefficients are rounded to 15 digits.
+            assert!(off.abs() <= 1e-12 * size, "{name}: {off:e} of {size}");
+        }
+    }
+}
+
+/// The mass matrix at a point: its inverse by what single torques change.
+fn inverse_mass(model: &Dynamics, point: &[f64]) -> nalgebra::DMatrix<f64> {
+    let n = model.joints;
+    let accelerations = |torque: Option<usize>| {
+        let mut point = point.to_vec();
+        point[2 * n..3 * n].fill(0.0);
+        if let Some(joint) = torque {
+            point[2 * n + joint] = 1.0;
+        }
+        model.program.eval(&point)[n..].to_vec()
+    };
+    let free = accelerations(None);
+    nalgebra::DMatrix::from_fn(n, n, |i, j| accelerations(Some(j))[i] - free[i])
+}
+
+#[test]
+fn the_mass_matrix_is_symmetric_and_positive() {
+    for name in FILES {
+        let model = dynamics(&system(&chain(name)), &[], SignForm::Exact);
+        for mut point in states(&model, 100) {
+            point[model.joints..2 * model.joints].fill(0.0);
+            let inverse = inverse_mass(&model, &point);
+            let off = (&inverse - inverse.transpose()).norm();
+            assert!(off <= 1e-12 * inverse.norm(), "{name}: {off:e}");
+            let eigenvalues = inverse.symmetric_eigenvalues();
+            assert!(eigenvalues.min() > 0.0, "{name}: {eigenvalues}");
+        }
+    }
+}
+
+/// A change of one parameter cannot be undone by the others: the torques' derivatives by them are independent.
+#[test]
+fn all_parameters_can_be_told_apart() {
+    for name in FILES {
+        let system = system(&chain(name));
+        let model = comparable(&system);
+        let n = model.joints;
+        let values = model.values();
+        let free: Vec<usize> = (0..values.len())
+            .filter(|k| !model.parameters[*k].fixed)
+            .collect();
+        let states = states(&model, 100);
+        let torque_change = |k: usize| {
+            let step = 1e-4 * model.parameters[k].scale;
+            let changes = states.iter().flat_map(|state| {
+                let at = |sign: f64| {
+                    let mut point = state.clone();
+                    point[3 * n + 1 + k] += sign * step;
+                    model.program.eval(&point)[n..].to_vec()
+                };
+                let slopes: Vec<f64> = (at(1.0).iter().zip(at(-1.0))).map(|(a, b)| a - b).collect();
+                // In torques, which parameters enter as they are.
+                let mass = inverse_mass(&model, state).try_inverse().unwrap();
+                (mass * nalgebra::DVector::from_vec(slopes))
+                    .iter()
+                    .copied()
+                    .collect::<Vec<f64>>()
+            });
+            nalgebra::DVector::from_iterator(states.len() * n, changes).normalize()
+        };
+        let columns: Vec<_> = free.iter().map(|k| torque_change(*k)).collect();
+        let singular = nalgebra::DMatrix::from_columns(&columns).singular_values();
+        assert!(singular.min() > 1e-3, "{name}: {singular}");
+    }
+}
+
+#[test]
+fn a_planar_arm_has_the_parameters_of_a_textbook() {
+    let chain = chain("planar_2r.urdf");
+    let system = system(&chain);
+    let names: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["zz_1", "mx_1", "zz_2", "mx_2", "g"]);
+    let value = |k: usize| system.parameters[k].value;
+    let (m_1, m_2, l) = (1.5, 0.8, 0.6);
+    let wanted = [
+        0.04 + m_1 * 0.25 * 0.25 + m_2 * l * l,
+        -(m_1 * 0.25 + m_2 * l),
+        0.02 + m_2 * 0.2 * 0.2,
+        -m_2 * 0.2,
+    ];
+    for (k, wanted) in wanted.into_iter().enumerate() {
+        assert!((value(k) - wanted).abs() < 1e-14, "{}", names[k]);
+    }
+    let text = model_text(&chain);
+    assert!(
+        text.contains("M11 = \"zz_1 + zz_2 - 1.2*mx_2*cos(q2)\""),
+        "{text}"
+    );
+}
+
+#[test]
+fn what_is_not_carried_is_noted() {
+    let notes = chain("prr.xml").notes;
+    assert_eq!(
+        notes,
+        [
+            "line 20: `belt` has the gear 20: tau is the torque or force at `rail`, 20 times the control",
+            "line 21: `ctrlrange` from -3 to 2 is not symmetric and is not carried",
+        ]
+    );
+    let output = residyn(&["new", "--from-mjcf", text(&fixture("geoms.xml"))]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.contains("note: line 20: contacts are not carried\n"),
+        "{said}"
+    );
+}
+
+#[test]
+fn the_command_writes_what_other_commands_take() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("arm.toml");
+    let file = fixture("planar_2r.urdf");
+    let said = succeeds(&["new", "--from-urdf", text(&file), "--out", text(&out)]);
+    assert!(
+        said.ends_with("arm.toml: planar_2r, 2 joint(s)\n"),
+        "{said}"
+    );
+    let json = succeeds(&["new", "--from-urdf", text(&file), "--json"]);
+    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(value["joints"], 2);
+    assert_eq!(value["model"], fs::read_to_string(&out).unwrap());
+    assert_eq!(value["notes"].as_array().unwrap().len(), 2);
+    let log = folder.path().join("log.csv");
+    succeeds(&[
+        "simulate",
+        "--plant",
+        text(&out),
+        "--duration",
+        "1",
+        "--out",
+        text(&log),
+    ]);
+    succeeds(&["evaluate", "--model", text(&out), "--test", text(&log)]);
+}
+
+/// What the command says of a fixture in which one place is changed.
+fn message(name: &str, from: &str, to: &str) -> String {
+    let contents = fs::read_to_string(fixture(name)).unwrap();
+    assert!(contents.contains(from), "{name} has no {from}");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join(name);
+    fs::write(&file, contents.replacen(from, to, 1)).unwrap();
+    let source = if name.ends_with("urdf") {
+        "--from-urdf"
+    } else {
+        "--from-mjcf"
+    };
+    let out = folder.path().join("model.toml");
+    let message = refuses(&["new", source, text(&file), "--out", text(&out)]);
+    assert!(!out.exists(), "a file was left behind");
+    message
+}
+
+#[test]
+fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
+    let cases: &[(&str, &str, &str, &[&str])] = &[
+        (
+            "planar_2r.urdf",
+            "type=\"continuous\"",
+            "type=\"floating\"",
+            &[
+                "planar_2r.urdf, line 20, column 29",
+                "`elbow`",
+                "`floating`",
+                "fix the joint",
+            ],
+        ),
+        (
+            "planar_2r.urdf",
+            "<limit lower",
+            "<mimic joint=\"elbow\"/><limit lower",
+            &["line 10, column 5", "mimics", "remove <mimic>"],
+        ),
+        (
+            "planar_2r.urdf",
+            "<parent link=\"upper\"/>",
+            "<parent link=\"uper\"/>",
+            &["line 21, column 19", "no link `uper`"],
+        ),
+        (
+            "planar_2r.urdf",
+            "<child link=\"fore\"/>",
+            "<child link=\"upper\"/>",
+            &["line 20, column 3", "closes a loop", "open the loop"],
+        ),
+        (
+            "planar_2r.urdf",
+            "<child link=\"upper\"/>",
+            "<child link=\"base\"/>",
+            &["loop"],
+        ),
+        (
+            "planar_2r.urdf",
+            "</robot>",
+            "<link name=\"x\"/></robot>",
+            &["line 34", "second link"],
+        ),
+        (
+            "planar_2r.urdf",
+            "</robot>",
+            "<link name=\"x\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link><joint name=\"j\" type=\"revolute\"><parent link=\"upper\"/><child link=\"x\"/></joint></robot>",
+            &["line 34", "branches", "`fore` and `x`", "keep one branch"],
+        ),
+        (
+            "planar_2r.urdf",
+            "value=\"0.8\"",
+            "value=\"${m}\"",
+            &["line 30, column 20", "not a number", "xacro"],
+        ),
+        (
+            "planar_2r.urdf",
+            "value=\"0.8\"",
+            "value=\"-0.8\"",
+            &["line 31", "mass of `fore`", "above zero"],
+        ),
+        (
+            "planar_2r.urdf",
+            "izz=\"0.001\"",
+            "izz=\"0.1\"",
+            &["line 31", "`fore`", "sum of the others"],
+        ),
+        (
+            "planar_2r.urdf",
+            "xyz=\"0 1 0\"",
+            "xyz=\"0 1\"",
+            &["line 9, column 16", "3 number(s), found 2"],
+        ),
+        (
+            "planar_2r.urdf",
+            "damping=\"0.02\"",
+            "damping=\"-1\"",
+            &["line 25, column 24", "from zero on"],
+        ),
+        ("planar_2r.urdf", "</robot>", "", &["no XML"]),
+        (
+            "spatial_3r.urdf",
+            "type=\"fixed\"",
+            "type=\"revolute\"",
+            &["line 60", "`flange` is one too many", "at most 3"],
+        ),
+        (
+            "prr.xml",
+            "type=\"slide\"",
+            "type=\"ball\"",
+            &["prr.xml, line 8", "`ball`", "hinge and slide"],
+        ),
+        (
+            "prr.xml",
+            "<joint name=\"rail\"",
+            "<freejoint/><joint name=\"rail\"",
+            &["line 8", "remove it"],
+        ),
+        (
+            "prr.xml",
+            "<inertial pos=\"0 0 -0.2\" mass=\"0.3\" diaginertia=\"0.006 0.006 0.0004\" xyaxes=\"1 0.1 0 0 1 0.3\"/>",
+            "",
+            &[
+                "line 14",
+                "`end` moves nothing that has inertia",
+                "<inertial>",
+            ],
+        ),
+        (
+            "prr.xml",
+            "stiffness=\"1.5\"",
+            "stiffness=\"1 2\"",
+            &["line 11", "polynomial"],
+        ),
+        (
+            "prr.xml",
+            "<actuator>",
+            "<equality><joint joint1=\"end\"/></equality><actuator>",
+            &["line 19", "close loops", "remove"],
+        ),
+        (
+            "geoms.xml",
+            "type=\"ellipsoid\"",
+            "type=\"mesh\"",
+            &["line 29", "mesh", "<inertial> in body `hand`"],
+        ),
+        (
+            "geoms.xml",
+            "class=\"main\"",
+            "class=\"mein\"",
+            &["line 22", "no default class `mein`"],
+        ),
+        (
+            "geoms.xml",
+            "autolimits=\"true\"",
+            "boundmass=\"1\"",
+            &["line 3", "`boundmass", "give the masses"],
+        ),
+        (
+            "geoms.xml",
+            "<option",
+            "<option><flag damper=\"disable\"/></option><option",
+            &["line 4", "`damper` is switched off"],
+        ),
+        (
+            "geoms.xml",
+            "zaxis=\"0.1 0.2 1\"",
+            "zaxis=\"0.1 0.2 1\" euler=\"0 0 1\"",
+            &["line 21", "second orientation"],
+        ),
+    ];
+    for (name, from, to, parts) in cases {
+        let message = message(name, from, to);
+        for part in *parts {
+            assert!(message.contains(part), "{part:?} is missing in:\n{message}");
+        }
+    }
+}
+
+#[test]
+fn the_other_format_is_met_with_its_option() {
+    let file = fixture("rp.xml");
+    let said = refuses(&["new", "--from-urdf", text(&file)]);
+    assert!(said.contains("read it with --from-mjcf"), "{said}");
+    let said = refuses(&["new", "--from-urdf", "nowhere.urdf"]);
+    assert!(said.contains("nowhere.urdf: cannot be read"), "{said}");
+    let said = refuses(&["new"]);
+    assert!(
+        said.contains("--from-urdf") && said.contains("--from-mjcf"),
+        "{said}"
+    );
+}
+
+#[test]
+fn angles_that_were_rounded_are_meant_and_noted() {
+    let contents = fs::read_to_string(fixture("planar_2r.urdf")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("turned.urdf");
+    let origin = "<origin xyz=\"0 0 -0.6\" rpy=\"0 0 0\"/>";
+    fs::write(
+        &file,
+        contents.replacen(origin, "<origin xyz=\"0 0 -0.6\" rpy=\"0 1.5708 0\"/>", 1),
+    )
+    .unwrap();
+    let chain = read_urdf(&file).unwrap();
+    assert!(
+        chain
+            .notes
+            .contains(&"line 23: `rpy`: 1.5708 is taken as 6/12 pi".to_owned()),
+        "{:?}",
+        chain.notes
+    );
+    let text = model_text(&chain);
+    assert!(
+        text.contains("M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\""),
+        "{text}"
+    );
+}
