@@ -232,7 +232,7 @@ fn the_command_writes_what_other_commands_take() {
         "--plant",
         text(&out),
         "--duration",
-        "1",
+        "3",
         "--out",
         text(&log),
     ]);
@@ -342,7 +342,7 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
             "spatial_3r.urdf",
             "type=\"fixed\"",
             "type=\"revolute\"",
-            &["line 60", "`flange` is one too many", "at most 3"],
+            &["line 54", "`flange` is one too many", "at most 3"],
         ),
         (
             "prr.xml",

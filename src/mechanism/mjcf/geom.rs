@@ -40,25 +40,27 @@ pub(super) fn inertia(
         }
     };
     let size = geom.list("size")?;
-    let side = |k: usize, axial: bool| match half_length {
-        Some(half) if axial => Ok(half),
-        _ => size
-            .get(k)
-            .copied()
-            .filter(|side| *side > 0.0)
-            .ok_or_else(|| {
-                geom.error(format!(
-                    "a {kind} of body `{body}` needs {} size(s) above zero",
-                    k + 1
-                ))
-            }),
+    let side = |k: usize| {
+        let given = size.get(k).copied().filter(|side| *side > 0.0);
+        given.ok_or_else(|| {
+            let sizes = k + 1;
+            geom.error(format!(
+                "a {kind} of body `{body}` needs {sizes} size(s) above zero"
+            ))
+        })
     };
+    // Between two points, what is across is round or square, and the length is theirs.
+    let sides = || match half_length {
+        Some(half) => Ok([side(0)?, side(0)?, half]),
+        None => Ok([side(0)?, side(1)?, side(2)?]),
+    };
+    let half = || half_length.map_or_else(|| side(1), Ok);
     let (volume, diagonal) = match kind {
-        "sphere" => ellipsoid([side(0, false)?; 3]),
-        "ellipsoid" => ellipsoid([side(0, false)?, side(1, false)?, side(2, true)?]),
-        "box" => cuboid([side(0, false)?, side(1, false)?, side(2, true)?]),
-        "cylinder" => cylinder(side(0, false)?, side(1, true)?),
-        "capsule" => capsule(side(0, false)?, side(1, true)?),
+        "sphere" => ellipsoid([side(0)?; 3]),
+        "ellipsoid" => ellipsoid(sides()?),
+        "box" => cuboid(sides()?),
+        "cylinder" => cylinder(side(0)?, half()?),
+        "capsule" => capsule(side(0)?, half()?),
         other => {
             let message = format!(
                 "the inertia of a {other} is not worked out; give <inertial> in body `{body}`, such as MuJoCo's mj_saveLastXML writes with saveinertial=\"true\""
