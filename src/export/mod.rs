@@ -6,11 +6,14 @@ mod description;
 mod format;
 mod held;
 mod latex;
+mod mechanism;
+mod mjcf;
 mod onnx;
 mod portable;
 mod python;
 mod python_client;
 mod samples;
+mod urdf;
 
 pub use answers::{Answers, Difference};
 pub use description::{Description, ImportError, Imported};
@@ -24,7 +27,9 @@ pub use samples::Samples;
 pub const FORMATS: &[&Format] = &[
     &description::JSON,
     &latex::FORMAT,
+    &mjcf::FORMAT,
     &onnx::FORMAT,
     &python::FORMAT,
     &description::SAFETENSORS,
+    &urdf::FORMAT,
 ];

@@ -3,6 +3,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Answers, Samples};
+use crate::expr::SignForm;
 use crate::model::{
     CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, System,
     nothing_but, with_residual,
@@ -17,6 +18,10 @@ pub struct Portable {
     pub about: String,
     /// What stands around the networks, its parameters at the values to export.
     pub equations: Dynamics,
+    /// The same without the file's effects.
+    pub declared: Dynamics,
+    /// For each joint how dry friction is written.
+    pub sign: Vec<SignForm>,
     /// The network that stands in place of equations, where one does.
     pub prior: Option<MlpWeights>,
     /// The network for what the equations or the prior lack.
@@ -66,7 +71,11 @@ impl Portable {
             None => system.dynamics(&system.sign()).with_values(parameters),
         };
         keep_intervals(&mut equations);
+        let sign = system.sign();
+        let declared = system.dynamics_with(&[], &sign);
         Self {
+            declared: declared.with_values(equations.values()),
+            sign,
             about: system.about.clone(),
             effects: carried(system, &equations),
             prismatic: system.prismatic.clone(),

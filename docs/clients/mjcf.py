@@ -1,0 +1,62 @@
+"""Run an exported MJCF model in MuJoCo: python mjcf.py MODEL.xml SAMPLES.json prints what it predicts at the samples."""
+
+import json
+import pathlib
+import sys
+
+import mujoco
+import numpy as np
+
+path, question = sys.argv[1:]
+samples = json.loads(pathlib.Path(question).read_text())
+model = mujoco.MjModel.from_xml_path(path)
+data = mujoco.MjData(model)
+n = model.nv
+
+# MuJoCo's dry friction is a constraint, which lets joints stick. The model that was exported has a smooth one: with that
+# in its place all the rest can be compared to the last digits.
+level, model.dof_frictionloss[:] = model.dof_frictionloss.copy(), 0
+width = model.numeric("dry_friction_width").data
+
+
+def smooth_friction(_, data):
+    data.qfrc_passive -= level * np.tanh(data.qvel / width)
+
+
+if level.any():
+    mujoco.set_mjcb_passive(smooth_friction)
+
+
+def begin(state):
+    mujoco.mj_resetData(model, data)
+    data.qpos, data.qvel = state[:n], state[n:]
+
+
+def derivative(state, torque):
+    """A drive with a lag takes the torque as the one that it has come to."""
+    begin(state)
+    data.ctrl = torque
+    data.act = [t for t, address in zip(torque, model.actuator_actadr) if address >= 0]
+    mujoco.mj_forward(model, data)
+    return [*data.qvel, *data.qacc]
+
+
+def advance(torque):
+    data.ctrl = torque
+    for _ in range(round(samples["step_s"] / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    return [*data.qpos, *data.qvel]
+
+
+def next_state(state, torque):
+    begin(state)
+    return advance(torque)
+
+
+points = list(zip(samples["states"], samples["torques"]))
+answers = {"derivative": [derivative(*point) for point in points]}
+if not model.na:
+    answers["next"] = [next_state(*point) for point in points]
+    begin(samples["start"])
+    answers["rollout"] = [advance(torque) for torque in samples["held"]]
+print(json.dumps(answers))

@@ -1,0 +1,185 @@
+//! MJCF, for MuJoCo.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::mechanism::{Drive, Link, Rig, escaped, friction_widths, head, numbers, refused};
+use super::{ExportError, File, Format, Portable, PythonClient, Reader};
+use crate::mechanism::Joint;
+use crate::model::Integrator;
+
+pub(super) const FORMAT: Format = Format {
+    name: "mjcf",
+    about: "a mechanism of one or two joints with its friction, springs and drives, for MuJoCo",
+    limits,
+    files,
+    reader: Reader::Python(PythonClient {
+        name: "mjcf.py",
+        script: include_str!("../../docs/clients/mjcf.py"),
+        packages: "mujoco numpy",
+    }),
+    tolerance: 1e-9,
+};
+
+fn limits(model: &Portable) -> Vec<String> {
+    let Ok(rig) = Rig::of(model) else {
+        return Vec::new();
+    };
+    let mut limits = rig.limits;
+    if rig.joints.iter().any(|joint| joint.friction > 0.0) {
+        limits.push(DRY_FRICTION.into());
+    }
+    if rig.drives.iter().any(|drive| drive.lag.is_some()) {
+        limits.push(
+            "the lag within a step: MuJoCo holds over each step what it has come to; only the derivative is compared"
+                .into(),
+        );
+    }
+    limits
+}
+
+pub(super) const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
+
+fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+    let rig = Rig::of(model).map_err(|reason| refused(model, "MJCF", reason))?;
+    let about = format!("a mechanism of {} joint(s)", rig.joints.len());
+    let bytes = text(model, &rig).into_bytes();
+    Ok(vec![File {
+        path: path.to_owned(),
+        bytes,
+        about,
+    }])
+}
+
+fn text(model: &Portable, rig: &Rig) -> String {
+    let mut text = head(model);
+    let _ = write!(
+        text,
+        "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n  <custom>\n    \
+         <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n    \
+         <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
+        escaped(model.name()),
+        option(model, rig),
+        friction_widths(model)
+    );
+    let links = rig.links();
+    for (k, (joint, link)) in rig.joints.iter().zip(&links).enumerate() {
+        text += &body(joint, link, links.get(k + 1), &"  ".repeat(k + 2));
+    }
+    for k in (0..links.len()).rev() {
+        let _ = writeln!(text, "{}</body>", "  ".repeat(k + 2));
+    }
+    text += "  </worldbody>\n  <actuator>\n";
+    for (joint, drive) in rig.joints.iter().zip(&rig.drives) {
+        text += &actuator(joint, drive);
+    }
+    text + "  </actuator>\n</mujoco>\n"
+}
+
+/// Gravity, and steps as the model makes them.
+pub(super) fn option(model: &Portable, rig: &Rig) -> String {
+    let (integrator, parts) = match model.integrator {
+        Integrator::SemiImplicitEuler => ("Euler", 1),
+        Integrator::Rk4 => ("RK4", 1),
+        Integrator::Fine { steps } => ("RK4", steps.get()),
+    };
+    format!(
+        "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{integrator}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
+        numbers([0.0, 0.0, -rig.gravity]),
+        model.step_s / f64::from(parts)
+    )
+}
+
+/// A body, left open for the next.
+fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String {
+    let rotation = link.pose.rotation;
+    let axes = rotation
+        .column(0)
+        .iter()
+        .chain(rotation.column(1).iter())
+        .copied()
+        .collect::<Vec<_>>();
+    let t = link.tensor;
+    let tensor = [
+        t[(0, 0)],
+        t[(1, 1)],
+        t[(2, 2)],
+        t[(0, 1)],
+        t[(0, 2)],
+        t[(1, 2)],
+    ];
+    let end = next.map_or(link.centre, |next| next.pose.origin);
+    let shape = match end.norm() {
+        0.0 => "type=\"sphere\" size=\"0.04\"".to_owned(),
+        length => {
+            let ends = numbers([0.0; 3].into_iter().chain(end.iter().copied()));
+            format!(
+                "type=\"capsule\" size=\"{}\" fromto=\"{ends}\"",
+                numbers([0.05 * length])
+            )
+        }
+    };
+    format!(
+        "{indent}<body name=\"{}\" pos=\"{}\" xyaxes=\"{}\">\n\
+         {indent}  <joint name=\"{}\" type=\"{}\" axis=\"{}\"{}/>\n\
+         {indent}  <inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>\n\
+         {indent}  <geom {shape} mass=\"0\" contype=\"0\" conaffinity=\"0\"/>\n",
+        joint.body,
+        numbers(link.pose.origin.iter().copied()),
+        numbers(axes),
+        joint.name,
+        if joint.slides { "slide" } else { "hinge" },
+        numbers(link.axis.iter().copied()),
+        of_joint(joint),
+        numbers(link.centre.iter().copied()),
+        link.mass,
+        numbers(tensor),
+    )
+}
+
+/// What the joint has beside its axis.
+fn of_joint(joint: &Joint) -> String {
+    let spring = joint
+        .spring
+        .map_or([0.0, 0.0], |spring| [spring.stiffness, spring.rest]);
+    attributes(&[
+        ("damping", joint.damping),
+        ("frictionloss", joint.friction),
+        ("armature", joint.armature),
+        ("stiffness", spring[0]),
+        ("springref", spring[1]),
+    ])
+}
+
+fn attributes(values: &[(&str, f64)]) -> String {
+    let given = values.iter().filter(|(_, value)| *value != 0.0);
+    given
+        .map(|(key, value)| format!(" {key}=\"{value}\""))
+        .collect()
+}
+
+fn actuator(joint: &Joint, drive: &Drive) -> String {
+    let mut text = format!(
+        "    <general name=\"{}\" joint=\"{0}\" gear=\"{}\"",
+        joint.name, drive.gear
+    );
+    text += &attributes(&[("gainprm", drive.gain)]);
+    if drive.constant != 0.0 {
+        let _ = write!(
+            text,
+            " biastype=\"affine\" biasprm=\"{}\"",
+            numbers([drive.constant, 0.0, 0.0])
+        );
+    }
+    if let Some(limit) = drive.limit {
+        let _ = write!(
+            text,
+            " forcelimited=\"true\" forcerange=\"{}\"",
+            numbers([-limit, limit])
+        );
+    }
+    if let Some(time) = drive.lag {
+        let _ = write!(text, " dyntype=\"filterexact\" dynprm=\"{time}\"");
+    }
+    text + "/>\n"
+}
