@@ -20,7 +20,7 @@ const DESCRIPTION: PythonClient = PythonClient {
 };
 
 /// What a reader says of a model that was written to a folder of its own; loudly none without a reader.
-fn answers(name: &str, ask: impl FnOnce() -> Result<Answers, Unread>) -> Option<Answers> {
+pub fn answers(name: &str, ask: impl FnOnce() -> Result<Answers, Unread>) -> Option<Answers> {
     match ask() {
         Ok(answers) => Some(answers),
         Err(Unread::NoReader(reason)) => {
@@ -35,7 +35,7 @@ fn answers(name: &str, ask: impl FnOnce() -> Result<Answers, Unread>) -> Option<
 }
 
 /// Steps, derivatives and a rollout are all there and as predicted here.
-fn agree(name: &str, own: &Answers, theirs: &Answers, tolerance: f64) {
+pub fn agree(name: &str, own: &Answers, theirs: &Answers, tolerance: f64) {
     let difference = own.difference(theirs);
     for (what, difference) in [
         ("step", difference.next),

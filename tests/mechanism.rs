@@ -21,7 +21,7 @@ const FILES: [&str; 5] = [
     "geoms.xml",
 ];
 
-fn fixture(name: &str) -> PathBuf {
+pub fn fixture(name: &str) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     root.join("tests/fixtures/mechanisms").join(name)
 }

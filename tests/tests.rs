@@ -29,6 +29,7 @@ mod printers;
 mod recipes;
 mod rigs;
 mod shift;
+mod simulators;
 mod support;
 mod sweep;
 mod train;

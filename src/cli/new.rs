@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs};
 use crate::mechanism::{Chain, model_text, read_mjcf, read_urdf};
-use crate::model::System;
+use crate::model::{Library, System};
 use crate::report::write_whole;
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
@@ -36,8 +36,8 @@ struct Description {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let chain = chain(&arguments.description)?;
     let text = model_text(&chain);
-    let (path, library) = (PathBuf::from(&chain.name), inputs::library(&[])?);
-    let system = System::from_text(&path, &text, library.effects())?;
+    let name = Path::new(&chain.name);
+    let system = System::from_text(name, &text, Library::built_in().effects())?;
     for note in &chain.notes {
         eprintln!("note: {note}");
     }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{CarriedEffect, ExportError, Portable};
 use crate::expr::SignForm;
-use crate::mechanism::{Inertia, Joint, Pose, Spring, recover};
+use crate::mechanism::{Inertia, Joint, Pose, Spring, recover, rounded};
 
 /// A mechanism with its drives.
 pub(super) struct Rig {
@@ -198,11 +198,15 @@ pub(super) fn friction_widths(model: &Portable) -> String {
     numbers(widths)
 }
 
-/// Numbers with blanks between them, without the sign of zero and without what rounding left of it.
+/// Numbers of 15 digits with blanks between them; what rounding left of zero is zero.
 pub(super) fn numbers(numbers: impl IntoIterator<Item = f64>) -> String {
     let mut text = String::new();
     for number in numbers {
-        let number = if number.abs() < 1e-15 { 0.0 } else { number };
+        let number = if number.abs() < 1e-15 {
+            0.0
+        } else {
+            rounded(number)
+        };
         let _ = write!(text, "{}{number}", if text.is_empty() { "" } else { " " });
     }
     text

@@ -132,7 +132,7 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
         numbers(link.axis.iter().copied()),
         of_joint(joint),
         numbers(link.centre.iter().copied()),
-        link.mass,
+        numbers([link.mass]),
         numbers(tensor),
     )
 }
@@ -143,27 +143,26 @@ fn of_joint(joint: &Joint) -> String {
         .spring
         .map_or([0.0, 0.0], |spring| [spring.stiffness, spring.rest]);
     attributes(&[
-        ("damping", joint.damping),
-        ("frictionloss", joint.friction),
-        ("armature", joint.armature),
-        ("stiffness", spring[0]),
-        ("springref", spring[1]),
+        ("damping", joint.damping, 0.0),
+        ("frictionloss", joint.friction, 0.0),
+        ("armature", joint.armature, 0.0),
+        ("stiffness", spring[0], 0.0),
+        ("springref", spring[1], 0.0),
     ])
 }
 
-fn attributes(values: &[(&str, f64)]) -> String {
-    let given = values.iter().filter(|(_, value)| *value != 0.0);
+/// Attributes whose values are not the format's own.
+fn attributes(values: &[(&str, f64, f64)]) -> String {
+    #[allow(clippy::float_cmp)] // as set
+    let given = values.iter().filter(|(_, value, default)| value != default);
     given
-        .map(|(key, value)| format!(" {key}=\"{value}\""))
+        .map(|(key, value, _)| format!(" {key}=\"{value}\""))
         .collect()
 }
 
 fn actuator(joint: &Joint, drive: &Drive) -> String {
-    let mut text = format!(
-        "    <general name=\"{}\" joint=\"{0}\" gear=\"{}\"",
-        joint.name, drive.gear
-    );
-    text += &attributes(&[("gainprm", drive.gain)]);
+    let mut text = format!("    <general name=\"{}\" joint=\"{0}\"", joint.name);
+    text += &attributes(&[("gear", drive.gear, 1.0), ("gainprm", drive.gain, 1.0)]);
     if drive.constant != 0.0 {
         let _ = write!(
             text,

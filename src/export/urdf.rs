@@ -75,7 +75,7 @@ fn text(model: &Portable, rig: &Rig) -> String {
     let mut text = head(model);
     let _ = write!(
         text,
-        "<robot name=\"{}\">\n  <mujoco>\n  <compiler balanceinertia=\"false\"/>\n  {}\n  </mujoco>\n  \
+        "<robot name=\"{}\">\n  <mujoco>\n  {}\n  </mujoco>\n  \
          <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n  \
          <residyn dry_friction_width=\"{}\"/>\n  <link name=\"base\"/>\n",
         escaped(model.name()),
@@ -107,7 +107,7 @@ fn of_link(name: &str, link: &Link) -> String {
         "  <link name=\"{name}\">\n    <inertial>\n      <origin xyz=\"{}\"/>\n      <mass value=\"{}\"/>\n      \
          <inertia{inertia}/>\n    </inertial>\n  </link>\n",
         numbers(link.centre.iter().copied()),
-        link.mass
+        numbers([link.mass])
     )
 }
 

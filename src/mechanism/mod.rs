@@ -1,10 +1,10 @@
 //! Model files from robot descriptions: a serial mechanism is read from URDF or MJCF, and its equations of motion are
 //! derived in closed form.
 //!
-//! A reader makes a [tree of bodies](tree) of a file; lumping what is welded makes a [`Chain`] of it. Each entry of the
-//! mass matrix is linear in the physical parameters, with [Fourier series](series) in the angles as coefficients, which
+//! A reader makes a tree of bodies of a file; lumping what is welded makes a [`Chain`] of it. Each entry of the
+//! mass matrix is linear in the physical parameters, with Fourier series in the angles as coefficients, which
 //! is a form in which equal functions look the same: so parameters that the motion shows only in combinations are
-//! found and [put together](base).
+//! found and put together.
 
 mod base;
 mod chain;
@@ -24,5 +24,6 @@ pub use file::model_text;
 pub use mjcf::read_mjcf;
 pub use recover::{Recovered, recover};
 pub use series::MOST_JOINTS;
+pub(crate) use series::rounded;
 pub use spatial::{Inertia, Pose};
 pub use urdf::read_urdf;

@@ -153,7 +153,7 @@ impl Wave {
 }
 
 /// To 15 significant digits.
-pub(super) fn rounded(number: f64) -> f64 {
+pub(crate) fn rounded(number: f64) -> f64 {
     format!("{number:.14e}")
         .parse()
         .expect("a printed number is a number")

@@ -1,0 +1,313 @@
+//! Mechanisms exported for simulators of rigid bodies, as MuJoCo moves them and as they are read back here.
+
+use std::path::Path;
+
+use residyn::export::{Portable, find};
+use residyn::expr::SignForm;
+use residyn::mechanism::{model_text, read_mjcf, read_urdf};
+use residyn::model::{Integrator, Library, ModelWeights, System};
+use serde_json::json;
+
+use crate::common::{assert_near, dynamics, points, rng};
+use crate::export::{agree, answers};
+use crate::mechanism::fixture;
+use crate::models;
+use crate::support::{refuses, residyn, text};
+
+/// An effect as a model file has it.
+fn effect(name: &str, joint: usize, values: &str) -> String {
+    format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
+}
+
+fn portable(name: &str, integrator: Integrator, effects: &[String]) -> Portable {
+    let text = Library::system_text(name).unwrap().to_owned() + &effects.concat();
+    of_text(&text, integrator)
+}
+
+fn of_text(text: &str, integrator: Integrator) -> Portable {
+    let library = Library::built_in();
+    let system = System::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
+    let numbers = ModelWeights {
+        parameters: system.dynamics(&system.sign()).values(),
+        prior: None,
+        residual: None,
+    };
+    Portable::new(&system, numbers, integrator, 0.01, json!({}))
+}
+
+/// What both formats carry.
+fn plain() -> Vec<(&'static str, Portable)> {
+    let fine = Integrator::Fine {
+        steps: 4.try_into().unwrap(),
+    };
+    let friction = |joint| {
+        let dry = effect("coulomb_friction", joint, "F_c = 0.1");
+        dry + &effect("viscous_friction", joint, "b = 0.05")
+    };
+    let limited = |joint, m: f64| effect("actuator_saturation", joint, &format!("m = {m}"));
+    let tilted = effect("gravity_tilt", 1, "delta = 0.3");
+    vec![
+        (
+            "pendulum",
+            portable("pendulum", Integrator::SemiImplicitEuler, &[]),
+        ),
+        (
+            "pendulum with effects",
+            portable(
+                "pendulum",
+                Integrator::Rk4,
+                &[friction(1), limited(1, 2.0), tilted.clone()],
+            ),
+        ),
+        ("drive", portable("drive", Integrator::Rk4, &[friction(1)])),
+        ("acrobot", portable("acrobot", fine, &[])),
+        (
+            "acrobot with effects",
+            portable(
+                "acrobot",
+                Integrator::Rk4,
+                &[friction(2), limited(2, 5.0), tilted],
+            ),
+        ),
+        ("cartpole", portable("cartpole", fine, &[])),
+        (
+            "cartpole with effects",
+            portable(
+                "cartpole",
+                Integrator::SemiImplicitEuler,
+                &[friction(1), friction(2), limited(1, 4.0)],
+            ),
+        ),
+    ]
+}
+
+/// Equations alone: what they are those of has to be found.
+fn stated() -> Vec<(&'static str, Portable)> {
+    let stated = |slides: &str, mass: &[&[&str]], bias: &[&str]| {
+        let text = format!(
+            "[system]\nname = \"stated\"\njoints = {}\nprismatic = {slides}\n[dynamics]\nmass = {mass:?}\nbias = {bias:?}\n",
+            bias.len()
+        );
+        of_text(&text, Integrator::Rk4)
+    };
+    let lean = &["2*sin(q1) + 1.5*cos(q1) + 0.1*qd1"];
+    let coupling = "0.9 + 0.4*cos(q2) + 0.1*sin(q2)";
+    let own = "3 + 0.8*cos(q2) + 0.2*sin(q2)";
+    let turning = &[
+        "(0.1*cos(q2) - 0.4*sin(q2))*(2*qd1*qd2 + qd2^2) + 0.2*qd1",
+        "(0.4*sin(q2) - 0.1*cos(q2))*qd1^2 + 0.3*qd2",
+    ];
+    let inclined = &["-4 - 0.3*sin(q2)*qd2^2", "-2.7*sin(q2) - 0.6*cos(q2)"];
+    let arm = read_urdf(&fixture("planar_2r.urdf")).unwrap();
+    vec![
+        ("leaning pendulum", stated("[]", &[&["0.7"]], lean)),
+        ("inclined slide", stated("[1]", &[&["2"]], &["5 + 0.3*qd1"])),
+        (
+            "weightless arm with a rotor",
+            stated("[]", &[&[own, coupling], &[coupling, "1.1"]], turning),
+        ),
+        (
+            "cart with a pole on a slope",
+            stated(
+                "[1]",
+                &[&["2", "0.3*cos(q2)"], &["0.3*cos(q2)", "0.2"]],
+                inclined,
+            ),
+        ),
+        ("arm from URDF", of_text(&model_text(&arm), Integrator::Rk4)),
+    ]
+}
+
+/// What MJCF carries beside that, by steps.
+fn driven() -> Vec<(&'static str, Portable)> {
+    let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
+    let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");
+    let gain = |joint| effect("actuator_gain", joint, "g = 0.3");
+    let limited = |joint| effect("actuator_saturation", joint, "m = 3.0");
+    let constant = |joint| effect("constant_torque", joint, "tau_0 = -0.4");
+    vec![
+        (
+            "gain, then limit",
+            portable(
+                "pendulum",
+                Integrator::Rk4,
+                &[gain(1), limited(1), spring(1)],
+            ),
+        ),
+        (
+            "limit, then gain",
+            portable(
+                "acrobot",
+                Integrator::Rk4,
+                &[limited(2), gain(2), rotor(1), rotor(2)],
+            ),
+        ),
+        (
+            "gain and offset",
+            portable(
+                "cartpole",
+                Integrator::Rk4,
+                &[constant(1), gain(1), rotor(1), rotor(2), spring(2)],
+            ),
+        ),
+    ]
+}
+
+fn mujoco_agrees(format: &str, extension: &str, models: &[(&str, Portable)]) {
+    let format = find(format).unwrap();
+    for (name, model) in models {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model").with_extension(extension);
+        format.write(model, &path).unwrap();
+        let samples = model.samples(&mut rng(1)).unwrap();
+        let own = model.answers(&samples).unwrap();
+        let name = format!("{name} as {}", format.name);
+        if let Some(theirs) = answers(&name, || format.ask(&path, &samples)) {
+            agree(&name, &own, &theirs, format.tolerance);
+        }
+    }
+}
+
+#[test]
+fn mujoco_moves_mjcf_alike() {
+    mujoco_agrees("mjcf", "xml", &plain());
+    mujoco_agrees("mjcf", "xml", &driven());
+    mujoco_agrees("mjcf", "xml", &stated());
+}
+
+#[test]
+fn mujoco_moves_urdf_alike() {
+    mujoco_agrees("urdf", "urdf", &plain());
+}
+
+#[test]
+fn a_lag_has_the_same_derivative() {
+    let lag = effect("actuator_lag", 1, "T = 0.05") + &effect("actuator_gain", 1, "g = -0.2");
+    let model = portable("pendulum", Integrator::Rk4, &[lag]);
+    let format = find("mjcf").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.xml");
+    format.write(&model, &path).unwrap();
+    let samples = model.samples(&mut rng(1)).unwrap();
+    let own = model.answers(&samples).unwrap();
+    if let Some(theirs) = answers("lag", || format.ask(&path, &samples)) {
+        let difference = own.difference(&theirs);
+        assert!(
+            difference.derivative.unwrap() <= format.tolerance,
+            "{difference:?}"
+        );
+        assert_eq!((difference.next, difference.rollout), (None, None));
+    }
+    let limits = (format.limits)(&model);
+    assert!(limits[0].starts_with("the lag within a step"), "{limits:?}");
+}
+
+#[test]
+fn what_is_written_is_read_back_to_the_same_accelerations() {
+    let library = Library::built_in();
+    for (name, model) in plain() {
+        let folder = tempfile::tempdir().unwrap();
+        for (format, extension) in [("mjcf", "xml"), ("urdf", "urdf")] {
+            let path = folder.path().join("model").with_extension(extension);
+            find(format).unwrap().write(&model, &path).unwrap();
+            let chain = if format == "mjcf" {
+                read_mjcf(&path)
+            } else {
+                read_urdf(&path)
+            };
+            let mut chain = chain.unwrap();
+            // URDF says nothing of gravity.
+            let down = chain.gravity.normalize();
+            let own = model.declared.parameters.iter().find(|p| p.unit == "m/s^2");
+            chain.gravity = own.map_or(chain.gravity, |g| down * g.value);
+            let text = model_text(&chain);
+            let back = System::from_text(Path::new(name), &text, library.effects()).unwrap();
+            let n = model.joints();
+            let back = dynamics(&back, &back.effects, SignForm::DEFAULT);
+            for point in points(&back, 50, 1) {
+                let moving = &point[..=3 * n];
+                let [found, wanted] = [&back, &model.equations]
+                    .map(|d| d.program.eval(&[moving, &d.values()].concat())[n]);
+                assert_near(found, wanted, 1e-9, &format!("{name} as {format}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_not_carried_is_said() {
+    let rest = effect("stribeck_friction", 1, "F_c = 0.1\nF_s = 0.2\nv_s = 0.1")
+        + &effect("rotor_inertia", 2, "J = 0.1")
+        + &effect("actuator_gain", 2, "g = 0.5");
+    let model = portable("acrobot", Integrator::Rk4, &[rest]);
+    let said = |format: &str| (find(format).unwrap().limits)(&model).join("\n");
+    let (mjcf, urdf) = (said("mjcf"), said("urdf"));
+    assert!(
+        mjcf.starts_with("stribeck_friction on joint 1") && mjcf.lines().count() == 1,
+        "{mjcf}"
+    );
+    for part in [
+        "stribeck_friction",
+        "gravity of 9.8 ",
+        "rotor's inertia of joint 2",
+        "gain of joint 2",
+    ] {
+        assert!(urdf.contains(part), "{part} is missing in {urdf}");
+    }
+}
+
+#[test]
+fn what_is_no_mechanism_is_refused() {
+    let all = models::all();
+    let (_, data) = all
+        .iter()
+        .find(|(name, _)| *name == "pendulum_data")
+        .unwrap();
+    let error = find("mjcf")
+        .unwrap()
+        .write(data, Path::new("no.xml"))
+        .unwrap_err();
+    assert!(
+        error.to_string().contains("a network stands in place"),
+        "{error}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("no.urdf");
+    let rig =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs/dfki_simple_pendulum_published.toml");
+    let said = refuses(&[
+        "export",
+        "--model",
+        text(&rig),
+        "--format",
+        "urdf",
+        "--out",
+        text(&out),
+    ]);
+    assert!(
+        said.contains("none of the mechanisms that are known"),
+        "{said}"
+    );
+    assert!(!out.exists());
+}
+
+#[test]
+fn the_command_says_what_is_lost_and_measures_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("cartpole.xml");
+    let run = residyn(&[
+        "export",
+        "--model",
+        "cartpole",
+        "--format",
+        "mjcf",
+        "--out",
+        text(&out),
+    ]);
+    assert_eq!(run.status.code(), Some(0));
+    assert!(
+        std::fs::read_to_string(&out)
+            .unwrap()
+            .contains("<joint name=\"joint1\" type=\"slide\" axis=\"1 0 0\"/>")
+    );
+}
