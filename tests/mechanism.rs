@@ -13,8 +13,9 @@ use crate::clients::client;
 use crate::common::{dynamics, points, rng};
 use crate::support::{refuses, residyn, succeeds, text};
 
-const FILES: [&str; 5] = [
+const FILES: [&str; 6] = [
     "planar_2r.urdf",
+    "rounded_2r.urdf",
     "spatial_3r.urdf",
     "rp.xml",
     "prr.xml",
@@ -218,7 +219,7 @@ fn the_command_writes_what_other_commands_take() {
     let file = fixture("planar_2r.urdf");
     let said = succeeds(&["new", "--from-urdf", text(&file), "--out", text(&out)]);
     assert!(
-        said.ends_with("arm.toml: planar_2r, 2 joint(s)\n"),
+        said.ends_with("arm.toml: model of planar_2r, joints: 2\n"),
         "{said}"
     );
     let json = succeeds(&["new", "--from-urdf", text(&file), "--json"]);
@@ -329,7 +330,7 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
             "planar_2r.urdf",
             "xyz=\"0 1 0\"",
             "xyz=\"0 1\"",
-            &["line 9, column 16", "3 number(s), found 2"],
+            &["line 9, column 16", "takes 3 numbers, found 2"],
         ),
         (
             "planar_2r.urdf",
@@ -432,27 +433,15 @@ fn the_other_format_is_met_with_its_option() {
 }
 
 #[test]
-fn angles_that_were_rounded_are_meant_and_noted() {
-    let contents = fs::read_to_string(fixture("planar_2r.urdf")).unwrap();
+fn angles_that_were_rounded_are_taken_as_written_and_noted() {
+    let notes = chain("rounded_2r.urdf").notes;
+    let note = "line 23: `rpy`: 1.5708 is taken as written; if 1.5707963267948966 is meant, that makes shorter equations";
+    assert!(notes.contains(&note.to_owned()), "{notes:?}");
+    let contents = fs::read_to_string(fixture("rounded_2r.urdf")).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("turned.urdf");
-    let origin = "<origin xyz=\"0 0 -0.6\" rpy=\"0 0 0\"/>";
-    fs::write(
-        &file,
-        contents.replacen(origin, "<origin xyz=\"0 0 -0.6\" rpy=\"0 1.5708 0\"/>", 1),
-    )
-    .unwrap();
-    let chain = read_urdf(&file).unwrap();
-    assert!(
-        chain
-            .notes
-            .contains(&"line 23: `rpy`: 1.5708 is taken as 6/12 pi".to_owned()),
-        "{:?}",
-        chain.notes
-    );
-    let text = model_text(&chain);
-    assert!(
-        text.contains("M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\""),
-        "{text}"
-    );
+    let file = folder.path().join("exact.urdf");
+    fs::write(&file, contents.replacen("1.5708", "1.5707963268", 1)).unwrap();
+    let text = model_text(&read_urdf(&file).unwrap());
+    let short = "M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\"";
+    assert!(text.contains(short), "{text}");
 }

@@ -49,7 +49,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         inputs::print(&format!("{value:#}\n"))?;
     } else if let Some(out) = &arguments.out {
         inputs::print(&format!(
-            "{}: {}, {} joint(s)\n",
+            "{}: model of {}, joints: {}\n",
             out.display(),
             system.name,
             system.joints

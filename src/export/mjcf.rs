@@ -42,7 +42,7 @@ pub(super) const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJo
 
 fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
     let rig = Rig::of(model).map_err(|reason| refused(model, "MJCF", reason))?;
-    let about = format!("a mechanism of {} joint(s)", rig.joints.len());
+    let about = "a mechanism with the same equations".to_owned();
     let bytes = text(model, &rig).into_bytes();
     Ok(vec![File {
         path: path.to_owned(),

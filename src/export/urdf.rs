@@ -62,7 +62,7 @@ fn limits(model: &Portable) -> Vec<String> {
 
 fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
     let rig = Rig::of(model).map_err(|reason| refused(model, "URDF", reason))?;
-    let about = format!("a mechanism of {} joint(s)", rig.joints.len());
+    let about = "a mechanism with the same equations".to_owned();
     let bytes = text(model, &rig).into_bytes();
     Ok(vec![File {
         path: path.to_owned(),

@@ -11,6 +11,8 @@ use super::series::{Series, rounded};
 /// Lines of formulas are broken beyond this many characters.
 const WIDTH: usize = 110;
 
+const ABOUT: &str = "equations derived from the description of a serial mechanism";
+
 /// The text of a model file for a chain: its equations in closed form with the parameters that the motion shows, and
 /// damping, dry friction, rotors, springs and limits of the drives as effects.
 pub fn model_text(chain: &Chain) -> String {
@@ -80,15 +82,11 @@ impl Equations<'_> {
         for note in &chain.notes {
             let _ = writeln!(text, "# {note}");
         }
-        let about = format!(
-            "serial mechanism of {} joint(s), equations derived from its description",
-            self.joints()
-        );
         let _ = write!(
             text,
             "\n[system]\nname = {}\nabout = {}\njoints = {}\n",
             quoted(&chain.name),
-            quoted(&about),
+            quoted(ABOUT),
             self.joints()
         );
         let slides: Vec<String> = (chain.joints.iter().enumerate())

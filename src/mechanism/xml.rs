@@ -141,12 +141,13 @@ impl<'x> Source<'x> {
             return Ok(None);
         };
         list.try_into().map(Some).map_err(|list: Vec<f64>| {
-            let message = format!("`{key}` is {N} number(s), found {}", list.len());
+            let message = format!("`{key}` takes {N} numbers, found {}", list.len());
             self.attribute_error(node, key, message)
         })
     }
 
-    /// Angles (rad) of an attribute, if it is there, as they are [meant](angle_meant).
+    /// Angles (rad) of an attribute, if it is there. One that is a usual fraction of a turn to many digits is taken as
+    /// that; one that was rounded to a few is taken as it is written, with a note: it fills equations with small terms.
     pub fn angles<const N: usize>(
         &self,
         node: Node<'_, '_>,
@@ -158,14 +159,14 @@ impl<'x> Source<'x> {
         let words = node.attribute(key).unwrap_or_default().split_whitespace();
         for (angle, word) in angles.iter_mut().zip(words) {
             let meant = angle_meant(word, *angle);
-            if (meant - *angle).abs() > 1e-12 {
-                let twelfths = (meant / (PI / 12.0)).round();
+            if (meant - *angle).abs() < ROUNDING {
+                *angle = meant;
+            } else {
                 self.note(
                     node,
-                    format!("`{key}`: {word} is taken as {twelfths}/12 pi"),
+                    format!("`{key}`: {word} is taken as written; if {meant} is meant, that makes shorter equations"),
                 );
             }
-            *angle = meant;
         }
         Ok(Some(angles))
     }
@@ -238,9 +239,11 @@ pub(super) fn named<'a, 'x>(
     elements(node).filter(move |child| child.has_tag_name(name))
 }
 
-/// The angles in `text` (rad), where one that is a usual fraction of a turn rounded to a few digits stands for the
-/// fraction itself: `1.5708` is a quarter turn. Files are full of such, and the difference would put terms of 1e-6 into
-/// equations where there are none.
+/// A difference (rad) that no use of the equations can show.
+const ROUNDING: f64 = 1e-10;
+
+/// The fraction of a turn that an angle stands for, where it is one rounded to some digits: `1.5708` is a quarter turn.
+/// The angle itself elsewhere.
 pub(super) fn angle_meant(word: &str, value: f64) -> f64 {
     let digits = word.split_once('.').map_or(0, |(_, digits)| digits.len());
     let fraction = match digits {
