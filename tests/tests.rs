@@ -13,6 +13,7 @@ mod demo;
 mod effects;
 mod experiments;
 mod export;
+mod export_c;
 mod functions;
 mod gradients;
 mod identify;

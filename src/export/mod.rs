@@ -2,6 +2,7 @@
 //! what it cannot carry; and what a reader of the written files predicts beside what the program itself does.
 
 mod answers;
+mod c;
 mod description;
 mod format;
 mod held;
@@ -25,6 +26,7 @@ pub use samples::Samples;
 
 /// Every format, by name.
 pub const FORMATS: &[&Format] = &[
+    &c::FORMAT,
     &description::JSON,
     &latex::FORMAT,
     &mjcf::FORMAT,
