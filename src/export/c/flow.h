@@ -2,11 +2,11 @@
 /* The derivatives of the rates by what the derivatives `of_state` are by: the rows of states, to which the torques
    belong as they are. */
 static inline void model_flow(const model_parameters *parameters,
-                              const model_real state[MODEL_STATES],
-                              const model_real torque[MODEL_JOINTS], model_real time,
-                              model_real of_state[MODEL_STATES][MODEL_COLUMNS],
-                              model_real rates[MODEL_STATES],
-                              model_real of_rates[MODEL_STATES][MODEL_COLUMNS])
+        const model_real state[MODEL_STATES],
+        const model_real torque[MODEL_JOINTS], model_real time,
+        model_real of_state[MODEL_STATES][MODEL_COLUMNS],
+        model_real rates[MODEL_STATES],
+        model_real of_rates[MODEL_STATES][MODEL_COLUMNS])
 {
     model_real by_state[MODEL_STATES][MODEL_STATES], by_torque[MODEL_STATES][MODEL_JOINTS];
     int i, k, c;

@@ -1,7 +1,7 @@
 
 /* y = weight x + bias */
 static inline void model_affine(int outputs, int inputs, const float *weight, const float *bias,
-                                const model_real *x, model_real *y)
+        const model_real *x, model_real *y)
 {
     int i, k;
     for (i = 0; i < outputs; i++) {
@@ -13,7 +13,7 @@ static inline void model_affine(int outputs, int inputs, const float *weight, co
 
 /* The derivatives of y from those of x, one row of numbers for each. */
 static inline void model_linear(int outputs, int inputs, const float *weight, const model_real *dx,
-                                model_real *dy)
+        model_real *dy)
 {
     int i, k, c;
     for (i = 0; i < outputs; i++)

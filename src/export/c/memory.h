@@ -34,17 +34,17 @@ static inline int model_place(const model_memory *memory, int age)
 
 /* The torque commanded in the step `age` steps ago; age 0 is the step that begins. */
 static inline model_real model_commanded(const model_memory *memory, int joint, int age,
-                                         model_real now)
+        model_real now)
 {
     if (age == 0)
         return now;
     return age > memory->steps ? memory->before[joint]
-                               : memory->torque[model_place(memory, age)][joint];
+        : memory->torque[model_place(memory, age)][joint];
 }
 
 /* T dx/dt + x = command over `length`: x moves on, and its integral is returned. */
 static inline model_real model_lag(model_real *x, model_real command, model_real T,
-                                   model_real length)
+        model_real length)
 {
     const model_real gap = *x - command;
     if (T <= 0) {
@@ -58,8 +58,8 @@ static inline model_real model_lag(model_real *x, model_real command, model_real
 /* The mean torque on one joint in each part of a step under `command`, delayed by `delay` s and smoothed with the
    time constant `T` s. */
 static inline void model_filter(model_memory *memory, int joint, model_real delay, model_real T,
-                                model_real command, model_real step,
-                                model_real acting[MODEL_PARTS][MODEL_JOINTS])
+        model_real command, model_real step,
+        model_real acting[MODEL_PARTS][MODEL_JOINTS])
 {
     const model_real length = step / MODEL_PARTS;
     model_real left = delay; /* until the torque changes that acts by the delay */
@@ -75,13 +75,13 @@ static inline void model_filter(model_memory *memory, int joint, model_real dela
         model_real rest = length, integral = 0;
         while (age > 0 && left < rest) {
             integral += model_lag(&memory->lagged[joint],
-                                  model_commanded(memory, joint, age, command), T, left);
+        model_commanded(memory, joint, age, command), T, left);
             rest -= left;
             age--;
             left = age > 0 ? memory->length[model_place(memory, age)] : 0;
         }
         integral += model_lag(&memory->lagged[joint],
-                              model_commanded(memory, joint, age, command), T, rest);
+        model_commanded(memory, joint, age, command), T, rest);
         left -= rest;
         acting[part][joint] = integral / length;
     }
@@ -89,7 +89,7 @@ static inline void model_filter(model_memory *memory, int joint, model_real dela
 
 /* Put a step that is over among those of the past. */
 static inline void model_remember(model_memory *memory, const model_real torque[MODEL_JOINTS],
-                                  model_real step)
+        model_real step)
 {
     int j;
     const int place = (memory->newest + 1) % MODEL_PAST;
@@ -107,8 +107,8 @@ static inline void model_remember(model_memory *memory, const model_real torque[
 
 /* The torques that act, as means over each part of a step; the memory moves on by the step. */
 static inline void model_acting(const model_parameters *parameters, model_memory *memory,
-                                const model_real torque[MODEL_JOINTS], model_real step,
-                                model_real acting[MODEL_PARTS][MODEL_JOINTS])
+        const model_real torque[MODEL_JOINTS], model_real step,
+        model_real acting[MODEL_PARTS][MODEL_JOINTS])
 {
     const model_real delay[MODEL_JOINTS] = {@DELAYS@};
     const model_real lag[MODEL_JOINTS] = {@LAGS@};

@@ -11,8 +11,8 @@ static inline void model_reset(model_memory *memory)
 
 /* The torques that act in each part of a step: those commanded. */
 static inline void model_acting(const model_parameters *parameters, model_memory *memory,
-                                const model_real torque[MODEL_JOINTS], model_real step,
-                                model_real acting[MODEL_PARTS][MODEL_JOINTS])
+        const model_real torque[MODEL_JOINTS], model_real step,
+        model_real acting[MODEL_PARTS][MODEL_JOINTS])
 {
     int part, j;
     (void)parameters;

@@ -1,7 +1,7 @@
 
 /* The scaled features that the network takes. */
 static inline void model_NETWORK_features(const model_real state[MODEL_STATES],
-                                          const model_real torque[MODEL_JOINTS], model_real *x)
+        const model_real torque[MODEL_JOINTS], model_real *x)
 {
     int i;
     for (i = 0; i < MODEL_JOINTS; i++) {
@@ -15,7 +15,7 @@ static inline void model_NETWORK_features(const model_real state[MODEL_STATES],
 
 /* Their derivatives by state and torque. */
 static inline void model_NETWORK_features_linear(const model_real state[MODEL_STATES],
-                                                 model_real *dx)
+        model_real *dx)
 {
     int i, c;
     (void)state;
@@ -32,7 +32,7 @@ static inline void model_NETWORK_features_linear(const model_real state[MODEL_ST
 }
 
 static inline void model_NETWORK(const model_real state[MODEL_STATES],
-                                 const model_real torque[MODEL_JOINTS], model_real y[OUTPUTS])
+        const model_real torque[MODEL_JOINTS], model_real y[OUTPUTS])
 {
     model_real x[2][WIDTH];
     model_NETWORK_features(state, torque, x[0]);
@@ -41,8 +41,8 @@ LAYERS
 
 /* Derivatives of the outputs by state and torque. */
 static inline void model_NETWORK_jacobian(const model_real state[MODEL_STATES],
-                                          const model_real torque[MODEL_JOINTS],
-                                          model_real dy[OUTPUTS * MODEL_COLUMNS])
+        const model_real torque[MODEL_JOINTS],
+        model_real dy[OUTPUTS * MODEL_COLUMNS])
 {
     model_real x[2][WIDTH], dx[2][WIDTH * MODEL_COLUMNS];
     model_NETWORK_features(state, torque, x[0]);

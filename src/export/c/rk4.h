@@ -1,12 +1,12 @@
 
 /* The classical Runge-Kutta method: weight of each stage's slope, and how far the next stage is. */
 static const model_real model_weight[4] = {MODEL_(1.0) / 6, MODEL_(1.0) / 3, MODEL_(1.0) / 3,
-                                           MODEL_(1.0) / 6};
+        MODEL_(1.0) / 6};
 static const model_real model_reach[4] = {MODEL_(0.5), MODEL_(0.5), 1, 0};
 
 static inline void model_advance(const model_parameters *parameters, model_real state[MODEL_STATES],
-                                 const model_real torque[MODEL_JOINTS], model_real time,
-                                 model_real h)
+        const model_real torque[MODEL_JOINTS], model_real time,
+        model_real h)
 {
     model_real inner[MODEL_STATES], sum[MODEL_STATES], rates[MODEL_STATES], now = time;
     int stage, i;
@@ -27,10 +27,10 @@ static inline void model_advance(const model_parameters *parameters, model_real 
 
 /* The same, and the derivatives of the state. */
 static inline void model_advance_jacobian(const model_parameters *parameters,
-                                          model_real state[MODEL_STATES],
-                                          model_real of_state[MODEL_STATES][MODEL_COLUMNS],
-                                          const model_real torque[MODEL_JOINTS], model_real time,
-                                          model_real h)
+        model_real state[MODEL_STATES],
+        model_real of_state[MODEL_STATES][MODEL_COLUMNS],
+        const model_real torque[MODEL_JOINTS], model_real time,
+        model_real h)
 {
     model_real inner[MODEL_STATES], sum[MODEL_STATES], rates[MODEL_STATES], now = time;
     model_real of_inner[MODEL_STATES][MODEL_COLUMNS], of_sum[MODEL_STATES][MODEL_COLUMNS],

@@ -1,8 +1,8 @@
 
 /* v' = v + h f_v, q' = q + h (f_q + h f_v) */
 static inline void model_advance(const model_parameters *parameters, model_real state[MODEL_STATES],
-                                 const model_real torque[MODEL_JOINTS], model_real time,
-                                 model_real h)
+        const model_real torque[MODEL_JOINTS], model_real time,
+        model_real h)
 {
     model_real rates[MODEL_STATES];
     int j;
@@ -16,10 +16,10 @@ static inline void model_advance(const model_parameters *parameters, model_real 
 
 /* The same, and the derivatives of the state. */
 static inline void model_advance_jacobian(const model_parameters *parameters,
-                                          model_real state[MODEL_STATES],
-                                          model_real of_state[MODEL_STATES][MODEL_COLUMNS],
-                                          const model_real torque[MODEL_JOINTS], model_real time,
-                                          model_real h)
+        model_real state[MODEL_STATES],
+        model_real of_state[MODEL_STATES][MODEL_COLUMNS],
+        const model_real torque[MODEL_JOINTS], model_real time,
+        model_real h)
 {
     model_real rates[MODEL_STATES], of_rates[MODEL_STATES][MODEL_COLUMNS];
     int j, c;
