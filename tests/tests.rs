@@ -14,6 +14,7 @@ mod effects;
 mod experiments;
 mod export;
 mod export_c;
+mod export_fmu;
 mod functions;
 mod gradients;
 mod identify;

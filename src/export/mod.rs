@@ -4,6 +4,7 @@
 mod answers;
 mod c;
 mod description;
+mod fmu;
 mod format;
 mod held;
 mod latex;
@@ -27,6 +28,7 @@ pub use samples::Samples;
 /// Every format, by name.
 pub const FORMATS: &[&Format] = &[
     &c::FORMAT,
+    &fmu::FORMAT,
     &description::JSON,
     &latex::FORMAT,
     &mjcf::FORMAT,

@@ -6,6 +6,7 @@ mod names;
 mod networks;
 mod reader;
 
+pub(super) use compiler::{compile, compiler};
 pub(super) use names::Names;
 
 use super::{ExportError, File, Format, Portable, Reader};

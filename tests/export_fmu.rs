@@ -1,0 +1,129 @@
+//! The FMU in FMPy: what it predicts, and that a simulator can do with it what the standard promises.
+
+use std::io::{Cursor, Read};
+
+use residyn::export::{Portable, find};
+use serde_json::json;
+use zip::ZipArchive;
+
+use crate::clients::{client, python};
+use crate::common::rng;
+use crate::models;
+
+fn model(name: &str) -> Portable {
+    let mut models = models::all().into_iter();
+    models.find(|(known, _)| *known == name).unwrap().1
+}
+
+#[test]
+fn a_simulator_predicts_what_the_program_does() {
+    if python("FMPy").is_none() {
+        return;
+    }
+    let (folder, format) = (tempfile::tempdir().unwrap(), find("fmu").unwrap());
+    for (name, model) in models::all() {
+        let path = folder.path().join("model.fmu");
+        format.write(&model, &path).unwrap();
+        let samples = model.samples(&mut rng(3)).unwrap();
+        let own = model.answers(&samples).unwrap();
+        let theirs = format.ask(&path, &samples).unwrap();
+        let difference = own.difference(&theirs);
+        println!("{name} {difference:?}");
+        assert!(difference.pointwise() <= 1e-9, "{name} {difference:?}");
+        assert!(difference.rollout.unwrap() <= 1e-9, "{name} {difference:?}");
+        assert_eq!(
+            difference.derivative.is_some(),
+            model.equations.filters.is_empty(),
+            "{name}"
+        );
+    }
+}
+
+/// What a solver of its own may differ by is the step's own error, and that of straight lines through a delay.
+#[test]
+fn a_simulator_can_tune_keep_and_differentiate_it() {
+    for (name, parameter, tuned, solver_tolerance) in [
+        (
+            "pendulum_effects",
+            "joint[1].coulomb_friction.F_c1",
+            0.05,
+            2e-3,
+        ),
+        (
+            "acrobot_effects",
+            "joint[1].stribeck_friction.F_s1",
+            0.3,
+            2e-3,
+        ),
+        ("cartpole_hybrid", "m_p", 0.2, 1e-4),
+    ] {
+        let model = model(name);
+        let samples = model.samples(&mut rng(5)).unwrap();
+        let own = parameter.rsplit('.').next().unwrap();
+        let mut other = model.clone();
+        let mut parameters = other.equations.parameters.iter_mut();
+        let changed = parameters.find(|parameter| parameter.name == own).unwrap();
+        let (value, unit) = (changed.value, changed.unit.clone());
+        changed.value = tuned;
+        let case = json!({
+            "samples": samples, "parameter": parameter, "value": value, "unit": unit,
+            "other_value": tuned, "other_rollout": other.answers(&samples).unwrap().rollout,
+            "solver_tolerance": solver_tolerance,
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let (path, question) = (
+            folder.path().join("model.fmu"),
+            folder.path().join("case.json"),
+        );
+        find("fmu").unwrap().write(&model, &path).unwrap();
+        std::fs::write(&question, case.to_string()).unwrap();
+        client("simulator.py", &[&path, &question]);
+    }
+}
+
+#[test]
+fn the_description_names_units_effects_and_intervals() {
+    let format = find("fmu").unwrap();
+    let model = model("pendulum_effects");
+    let files = (format.files)(&model, "model.fmu".as_ref()).unwrap();
+    let mut archive = ZipArchive::new(Cursor::new(&files[0].bytes)).unwrap();
+    let mut text = String::new();
+    archive
+        .by_name("modelDescription.xml")
+        .unwrap()
+        .read_to_string(&mut text)
+        .unwrap();
+    let xml = roxmltree::Document::parse(&text).unwrap();
+    let named = |name: &str| {
+        let mut nodes = xml.descendants();
+        nodes
+            .find(|node| node.attribute("name") == Some(name))
+            .unwrap()
+    };
+    let friction = named("joint[1].coulomb_friction.F_c1");
+    assert_eq!(friction.attribute("start"), Some("0.16"));
+    let about = friction.attribute("description").unwrap();
+    assert!(
+        about.contains("-F_c1 * sign(qd1)") && about.contains("0.15 to 0.17"),
+        "{about}"
+    );
+    let base = named("N m").first_element_child().unwrap();
+    let exponents = ["kg", "m", "s"].map(|unit| base.attribute(unit));
+    assert_eq!(exponents, [Some("1"), Some("2"), Some("-2")]);
+    assert_eq!(
+        named("joint[1].lagged_torque").attribute("unit"),
+        Some("N m")
+    );
+    let limits = (format.limits)(&model);
+    assert!(
+        limits.iter().any(|limit| limit.contains("delay")),
+        "{limits:?}"
+    );
+}
+
+#[test]
+fn the_same_model_is_the_same_unit() {
+    let format = find("fmu").unwrap();
+    let files = || (format.files)(&model("pendulum"), "model.fmu".as_ref()).unwrap();
+    assert!(files() == files());
+}
