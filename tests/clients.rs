@@ -1,6 +1,5 @@
 //! Real clients read what the program writes: Python with the packages of `tests/clients`.
 
-use std::ffi::OsString;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -34,20 +33,12 @@ fn demo() -> &'static Path {
     report
 }
 
-/// The interpreter that the tests may use; without one, say so where nobody misses it.
-pub fn python(what: &str) -> Option<OsString> {
-    let python = std::env::var_os("RESIDYN_PYTHON");
-    if python.is_none() {
-        let note = format!("SKIPPED {what}: RESIDYN_PYTHON is not set; run tests/run\n");
+/// Run one of the scripts in `tests/clients`; without an interpreter, say so where nobody misses it.
+pub fn client(script: &str, arguments: &[&Path]) {
+    let Some(python) = std::env::var_os("RESIDYN_PYTHON") else {
+        let note = format!("SKIPPED {script}: RESIDYN_PYTHON is not set; run tests/run\n");
         // Not eprintln!, which the test harness swallows.
         let _ = std::io::stderr().write_all(note.as_bytes());
-    }
-    python
-}
-
-/// Run one of the scripts in `tests/clients`.
-pub fn client(script: &str, arguments: &[&Path]) {
-    let Some(python) = python(script) else {
         return;
     };
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -74,20 +74,31 @@ impl Header {
     }
 }
 
-fn succeeds(command: &mut Command, what: &str) {
+pub fn succeeds(command: &mut Command, what: &str) {
     let run = command.output().unwrap();
     let said = String::from_utf8_lossy(&run.stderr);
     assert!(run.status.success(), "{what}: {command:?}\n{said}");
 }
 
-/// Every model's header, or none, said aloud, where a tool is missing.
+/// Whether these tools start; where one does not, say so where nobody misses it.
+pub fn there_are(tools: &[&str]) -> bool {
+    let starts = |tool: &&str| Command::new(tool).arg("--version").output().is_ok();
+    let missing: Vec<&str> = tools.iter().copied().filter(|tool| !starts(tool)).collect();
+    if !missing.is_empty() {
+        let missing = missing.join(", ");
+        // Not eprintln!, which the test harness swallows.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED a test of exported C: there is no {missing}"
+        );
+    }
+    missing.is_empty()
+}
+
+/// Every model's header, or none where a tool is missing.
 fn headers(tools: &[&str]) -> Vec<Header> {
-    for tool in tools {
-        if Command::new(tool).arg("--version").output().is_err() {
-            let note = format!("SKIPPED a test of exported C: there is no {tool}\n");
-            let _ = std::io::stderr().write_all(note.as_bytes());
-            return Vec::new();
-        }
+    if !there_are(tools) {
+        return Vec::new();
     }
     let header = |(name, model)| {
         let header = Header {

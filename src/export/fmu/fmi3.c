@@ -83,7 +83,7 @@ enum {
 };
 
 /* For each joint its lagged torque among the states, or -1. */
-static const int LAG_STATE[JOINTS] = {@LAG_STATES@};
+static const int LAG_STATE[JOINTS] = {@LAG_STATE@};
 
 typedef struct {
     model_parameters parameters;
@@ -105,6 +105,7 @@ typedef struct {
 static double *parameter(Data *data, int k)
 {
     double *const all[PARAMETERS + 1] = {@ADDRESSES@};
+    (void)data;
     return all[k];
 }
 
@@ -174,6 +175,15 @@ static double delayed(const Data *data, int joint, double delay)
     return data->points < POINTS ? 0 : torque;
 }
 
+/* How much of the torque that is set now the delay lets through: what lies between the last accepted point and now. */
+static double share_of_now(const Data *data, double delay)
+{
+    const double last = data->point_time[data->newest], when = data->time - delay;
+    if (delay <= 0)
+        return 1;
+    return data->points > 0 && when > last ? (when - last) / (data->time - last) : 0;
+}
+
 static void rates(const Data *data, double rate[STATES])
 {
     double delay[JOINTS], lag[JOINTS], acting[JOINTS];
@@ -207,7 +217,7 @@ static void jacobian(const Data *data, double of_rates[STATES][STATES + JOINTS])
     for (j = 0; j < JOINTS; j++) {
         const int k = LAG_STATE[j];
         const bool lags = k >= 0 && lag[j] > 0;
-        const double now = delay[j] > 0 ? 0 : 1; /* what of the torque acts at once */
+        const double now = share_of_now(data, delay[j]);
         for (i = 0; i < MODEL_STATES; i++) {
             if (lags)
                 of_rates[i][k] = by_torque[i][j];
