@@ -153,7 +153,6 @@ fn the_compiled_header_predicts_what_the_program_does() {
         let own = header.model.answers(&samples).unwrap();
         let theirs = find("c").unwrap().ask(&header.path(), &samples).unwrap();
         let difference = own.difference(&theirs);
-        println!("{} {difference:?}", header.name);
         assert!(
             difference.pointwise() <= 1e-9,
             "{} {difference:?}",
@@ -175,7 +174,6 @@ fn in_single_precision_it_is_as_close_as_that_allows() {
         let own = header.model.answers(&samples).unwrap();
         let float = format!("-D{}_FLOAT", header.model.name().to_uppercase());
         let difference = own.difference(&answers(&header, &["-O2", &float], &samples));
-        println!("{} {difference:?}", header.name);
         assert!(
             difference.pointwise() <= 1e-5,
             "{} {difference:?}",
@@ -245,7 +243,6 @@ fn jacobians_are_the_slopes() {
         let worst = header.ask("tests/clients/jacobian.c", &["-O2"], &question(&samples));
         assert_eq!(worst.len(), samples.states.len());
         let worst = worst.concat().into_iter().fold(0.0, f64::max);
-        println!("{} {worst:e}", header.name);
         assert!(worst <= 1e-6, "{}: {worst:e}", header.name);
     }
 }

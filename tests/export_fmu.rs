@@ -30,7 +30,6 @@ fn a_simulator_predicts_what_the_program_does() {
             continue;
         };
         let difference = own.difference(&theirs);
-        println!("{name} {difference:?}");
         assert!(difference.pointwise() <= 1e-9, "{name} {difference:?}");
         assert!(difference.rollout.unwrap() <= 1e-9, "{name} {difference:?}");
         assert_eq!(

@@ -127,7 +127,7 @@ for k, (state, torque) in enumerate(zip(samples["states"][:32], samples["torques
     directional = np.array(model.getDirectionalDerivative(unknowns, knowns, seed))
     assert np.all(np.abs(directional - slope) <= 1e-5 * (1 + np.abs(slope))), (directional, slope)
     other = generator.uniform(-1, 1, len(unknowns))
-    adjoint = np.array(model.getAdjointDerivative(unknowns, knowns, other))
+    adjoint = np.array(model.getAdjointDerivative(unknowns, knowns, other, len(knowns)))
     assert np.isclose(other @ directional, adjoint @ seed, rtol=1e-9, atol=1e-9)
 model.terminate()
 model.freeInstance()

@@ -14,8 +14,14 @@ pub(in crate::export) struct Names {
     inputs: HashMap<String, String>,
 }
 
-/// What no variable may be called: keywords of C and C++, and names that the functions use.
+/// What no variable may be called: keywords of C and C++, names that the functions use, and macros.
 const TAKEN: &[&str] = &[
+    "HUGE_VAL",
+    "INFINITY",
+    "M_E",
+    "M_PI",
+    "NAN",
+    "NULL",
     "alignas",
     "alignof",
     "and",

@@ -233,6 +233,8 @@ static void jacobian(const Data *data, double of_rates[STATES][STATES + JOINTS])
 
 /* ---- life ---- */
 
+static const char *const OTHER_COUNT = "variables have one value each: another number of them is given";
+
 static Instance *instantiate(fmi3String token, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {
     Instance *instance = (Instance *)calloc(1, sizeof *instance);
@@ -341,7 +343,8 @@ FMI(GetFloat64)(fmi3Instance instance, const fmi3ValueReference references[], si
     Data *const data = &((Instance *)instance)->data;
     double rate[STATES];
     size_t k;
-    (void)valueCount;
+    if (valueCount != count)
+        return complain((Instance *)instance, OTHER_COUNT);
     rates(data, rate);
     for (k = 0; k < count; k++) {
         const fmi3ValueReference r = references[k];
@@ -366,7 +369,8 @@ FMI(SetFloat64)(fmi3Instance instance, const fmi3ValueReference references[], si
 {
     Data *const data = &((Instance *)instance)->data;
     size_t k;
-    (void)valueCount;
+    if (valueCount != count)
+        return complain((Instance *)instance, OTHER_COUNT);
     for (k = 0; k < count; k++) {
         const fmi3ValueReference r = references[k];
         if (r >= TORQUE && r < STATE)
@@ -531,7 +535,8 @@ FMI(GetDirectionalDerivative)(fmi3Instance instance, const fmi3ValueReference un
 {
     double of_rates[STATES][STATES + JOINTS], value;
     size_t u, k;
-    (void)seedCount, (void)sensitivityCount;
+    if (seedCount != knownCount || sensitivityCount != unknownCount)
+        return complain((Instance *)instance, OTHER_COUNT);
     jacobian(&((Instance *)instance)->data, of_rates);
     for (u = 0; u < unknownCount; u++) {
         sensitivity[u] = 0;
@@ -550,7 +555,8 @@ FMI(GetAdjointDerivative)(fmi3Instance instance, const fmi3ValueReference unknow
 {
     double of_rates[STATES][STATES + JOINTS], value;
     size_t u, k;
-    (void)seedCount, (void)sensitivityCount;
+    if (seedCount != unknownCount || sensitivityCount != knownCount)
+        return complain((Instance *)instance, OTHER_COUNT);
     jacobian(&((Instance *)instance)->data, of_rates);
     for (k = 0; k < knownCount; k++) {
         sensitivity[k] = 0;
