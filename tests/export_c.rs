@@ -8,11 +8,43 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use residyn::export::{Answers, Portable, Samples, find};
 use residyn::lanes::Row;
-use residyn::model::{Commands, Integrator, StepTorque};
+use residyn::model::{Commands, Integrator, Library, ModelWeights, StepTorque, System};
+use serde_json::json;
 use tempfile::TempDir;
 
 use crate::common::rng;
 use crate::models;
+
+/// Every function of formulas, names that C has taken, and text that would end a comment.
+const ODD: &str = r#"
+[system]
+name = "Rig"
+about = "not the end: */, nor another beginning: /*, nor ??/"
+joints = 1
+
+[parameters]
+int = { value = 2.0, unit = "*/", about = "the end \\" }
+NAN = { value = 0.5 }
+"größe" = { value = 0.25 }
+
+[dynamics]
+let.double = "where(q1 < 0.2, atan2(qd1, 1 + q1^2), max(q1, min(qd1, 0.5)))"
+let.state = "log(2 + sin(q1)) + abs(qd1)^1.5 + tan(0.3 * tanh(qd1)) + sqrt(1 + cos(q1)^2)"
+let.time = "clamp(state, -1, 1) * sign(q1) * exp(-q1^2) - where(qd1, größe, 2)^2"
+let.int_ = "(double < time) * (q1 >= 0.1) + where(q1 <= 1, 1, 0)"
+qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 0.1 * t"
+"#;
+
+fn odd() -> Portable {
+    let library = Library::built_in();
+    let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
+    let numbers = ModelWeights {
+        parameters: system.dynamics(&system.sign()).values(),
+        prior: None,
+        residual: None,
+    };
+    Portable::new(&system, numbers, Integrator::Rk4, 0.01, json!("*/ \\"))
+}
 
 /// A model's header in a folder of its own.
 struct Header {
@@ -28,7 +60,7 @@ impl Header {
 
     /// Arguments that every client is compiled with.
     fn arguments(&self) -> Vec<String> {
-        let lower = self.model.name();
+        let lower = self.model.name().to_lowercase();
         let upper = lower.to_uppercase();
         vec![
             "-include".into(),
@@ -39,8 +71,8 @@ impl Header {
         ]
     }
 
-    /// The rows of numbers that a client prints which is compiled with these flags.
-    fn ask(&self, client: &str, flags: &[&str], question: &str) -> Vec<Vec<f64>> {
+    /// A client as a program, compiled with these flags.
+    fn program(&self, client: &str, flags: &[&str]) -> PathBuf {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let program = self.folder.path().join("client");
         let mut command = Command::new("cc");
@@ -54,24 +86,40 @@ impl Header {
             .arg(&program)
             .arg("-lm");
         succeeds(&mut command, self.name);
-        let mut run = Command::new(&program)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let (mut stdin, question) = (run.stdin.take().unwrap(), question.to_owned());
-        let writer = std::thread::spawn(move || stdin.write_all(question.as_bytes()));
-        let output = run.wait_with_output().unwrap();
-        assert!(output.status.success(), "{}: {client} stops", self.name);
-        writer.join().unwrap().unwrap();
-        let said = String::from_utf8(output.stdout).unwrap();
-        let row = |line: &str| {
-            line.split_whitespace()
-                .map(|x| x.parse().unwrap())
-                .collect()
-        };
-        said.lines().map(row).collect()
+        program
     }
+
+    /// The rows of numbers that a client prints which is compiled with these flags.
+    fn ask(&self, client: &str, flags: &[&str], question: &str) -> Vec<Vec<f64>> {
+        rows(
+            Command::new(self.program(client, flags)),
+            question,
+            self.name,
+        )
+    }
+}
+
+/// The rows of numbers that a program prints.
+fn rows(mut program: Command, question: &str, what: &str) -> Vec<Vec<f64>> {
+    let mut run = program
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (mut stdin, question) = (run.stdin.take().unwrap(), question.to_owned());
+    let writer = std::thread::spawn(move || stdin.write_all(question.as_bytes()));
+    let output = run.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{what}: {program:?} stops\n{said}");
+    writer.join().unwrap().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let row = |line: &str| {
+        line.split_whitespace()
+            .map(|x| x.parse().unwrap())
+            .collect()
+    };
+    said.lines().map(row).collect()
 }
 
 pub fn succeeds(command: &mut Command, what: &str) {
@@ -112,7 +160,8 @@ fn headers(tools: &[&str]) -> Vec<Header> {
             .unwrap();
         header
     };
-    models::all().into_iter().map(header).collect()
+    let odd = [("odd", odd())];
+    models::all().into_iter().chain(odd).map(header).collect()
 }
 
 fn question(samples: &Samples) -> String {
@@ -198,6 +247,21 @@ fn nothing_is_read_or_written_where_it_must_not_be() {
             "{} {difference:?}",
             header.name
         );
+    }
+}
+
+#[test]
+fn nothing_is_read_before_it_is_written() {
+    for header in headers(&["cc", "valgrind"]) {
+        let mut samples = header.model.samples(&mut rng(5)).unwrap();
+        samples.states.truncate(16);
+        samples.torques.truncate(16);
+        samples.held.truncate(100);
+        let mut checked = Command::new("valgrind");
+        checked.args(["-q", "--error-exitcode=1"]);
+        checked.arg(header.program(CLIENT, &["-g", "-O1"]));
+        let printed = rows(checked, &question(&samples), header.name);
+        assert_eq!(printed.len(), 116, "{}", header.name);
     }
 }
 

@@ -24,7 +24,7 @@ pub(super) const FORMAT: Format = Format {
             about: "derivative, step and Jacobians in C".into(),
         }])
     },
-    reader: Reader::Own(|path, samples| reader::answers(path, samples)),
+    reader: Reader::Own(reader::answers),
     tolerance: 1e-9,
 };
 
