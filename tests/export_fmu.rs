@@ -4,7 +4,7 @@ use std::io::{Cursor, Read};
 use std::process::Command;
 
 use residyn::export::{Portable, find};
-use serde_json::json;
+use serde_json::{Value, json};
 use zip::ZipArchive;
 
 use crate::clients::client;
@@ -154,6 +154,35 @@ fn the_description_names_units_effects_and_intervals() {
         limits.iter().any(|limit| limit.contains("delay")),
         "{limits:?}"
     );
+}
+
+#[test]
+fn without_a_compiler_a_unit_holds_its_sources() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("acrobot.fmu");
+    let run = Command::new(env!("CARGO_BIN_EXE_residyn"))
+        .env("CC", "no-such-compiler")
+        .args([
+            "export", "--model", "acrobot", "--format", "fmu", "--json", "--out",
+        ])
+        .arg(&path)
+        .output()
+        .unwrap();
+    assert_eq!(
+        run.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    let said: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let limit = said["not_carried"][0].as_str().unwrap();
+    assert!(limit.contains("source") && limit.contains("CC"), "{limit}");
+    assert!(
+        said["not_measured"].as_str().unwrap().contains("CC"),
+        "{said}"
+    );
+    let archive = ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
+    assert_eq!(archive.len(), 4);
 }
 
 #[test]

@@ -134,7 +134,7 @@ impl Portable {
         operands.any(|node| Some(node.index()) == time)
     }
 
-    /// Unit, meaning and interval of each parameter, for a comment beside it.
+    /// Meaning and interval of each parameter, as far as they are known, for a comment beside it.
     pub(super) fn parameter_notes(&self) -> Vec<String> {
         let file: toml::Table = toml::from_str(&self.model_toml).unwrap_or_default();
         let about = |name: &str| {
@@ -156,13 +156,9 @@ impl Portable {
             let known = parameter
                 .ci95
                 .map(|[low, high]| format!("95 % interval {low} to {high}"));
-            let unit = (!parameter.unit.is_empty()).then(|| parameter.unit.clone());
-            let parts = [
-                unit,
-                about(&parameter.name).or_else(|| acts(&parameter.name)),
-                known,
-            ];
-            parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
+            let meaning = about(&parameter.name).or_else(|| acts(&parameter.name));
+            let parts = meaning.into_iter().chain(known);
+            parts.collect::<Vec<_>>().join("; ")
         };
         self.equations.parameters.iter().map(note).collect()
     }

@@ -121,7 +121,11 @@ fn parameters(model: &Portable, names: &Names) -> String {
     let fields: String = (parameters.iter().zip(notes))
         .map(|(parameter, note)| {
             let field = names.field(&parameter.name);
-            format!("    model_real {field}; /* {} */\n", comment(&note))
+            let known = [parameter.unit.clone(), note]
+                .into_iter()
+                .filter(|text| !text.is_empty());
+            let known = known.collect::<Vec<_>>().join("; ");
+            format!("    model_real {field}; /* {} */\n", comment(&known))
         })
         .collect();
     let values: Vec<String> = parameters.iter().map(|p| names.number(p.value)).collect();

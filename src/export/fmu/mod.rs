@@ -5,12 +5,13 @@ mod unit;
 mod variables;
 
 use std::io::{Cursor, Write};
+use std::path::Path;
 
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::c::{Names, compile, compiler, header};
-use super::{ExportError, File, Format, Portable, PythonClient, Reader, Unread};
+use super::{Answers, ExportError, File, Format, Portable, PythonClient, Reader, Samples, Unread};
 use crate::model::CommandFilter;
 
 pub(super) const FORMAT: Format = Format {
@@ -24,13 +25,33 @@ pub(super) const FORMAT: Format = Format {
             about: "functional mock-up unit".into(),
         }])
     },
-    reader: Reader::Python(PythonClient {
-        name: "fmu.py",
-        script: include_str!("../../../docs/clients/fmu.py"),
-        packages: "fmpy",
-    }),
+    reader: Reader::Own(ask),
     tolerance: 1e-9,
 };
+
+const CLIENT: PythonClient = PythonClient {
+    name: "fmu.py",
+    script: include_str!("../../../docs/clients/fmu.py"),
+    packages: "fmpy",
+};
+
+/// What FMPy predicts, where the unit holds a library that can run.
+fn ask(path: &Path, samples: &Samples) -> Result<Answers, Unread> {
+    let refused =
+        |error: &dyn std::error::Error| Unread::Refused(format!("{}: {error}", path.display()));
+    let file = std::fs::File::open(path).map_err(|error| refused(&error))?;
+    let archive = ZipArchive::new(file).map_err(|error| refused(&error))?;
+    let runs = archive
+        .file_names()
+        .flatten()
+        .any(|name| name.starts_with("binaries/"));
+    match runs {
+        true => CLIENT.ask(path, samples),
+        false => Err(Unread::NoReader(
+            "the unit holds no library; name a C compiler in CC".to_owned(),
+        )),
+    }
+}
 
 fn limits(model: &Portable) -> Vec<String> {
     let delay = delays(model).then(|| {
