@@ -13,6 +13,8 @@ mod demo;
 mod effects;
 mod experiments;
 mod export;
+mod export_c;
+mod export_fmu;
 mod functions;
 mod gradients;
 mod identify;

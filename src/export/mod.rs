@@ -2,7 +2,9 @@
 //! what it cannot carry; and what a reader of the written files predicts beside what the program itself does.
 
 mod answers;
+mod c;
 mod description;
+mod fmu;
 mod format;
 mod held;
 mod latex;
@@ -25,6 +27,8 @@ pub use samples::Samples;
 
 /// Every format, by name.
 pub const FORMATS: &[&Format] = &[
+    &c::FORMAT,
+    &fmu::FORMAT,
     &description::JSON,
     &latex::FORMAT,
     &mjcf::FORMAT,

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::{Answers, Samples};
 use crate::expr::SignForm;
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, System,
+    CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
     nothing_but, with_residual,
 };
 use crate::plant::Environment;
@@ -132,6 +132,35 @@ impl Portable {
         );
         let mut operands = program.ops().iter().flat_map(|op| op.operands());
         operands.any(|node| Some(node.index()) == time)
+    }
+
+    /// Meaning and interval of each parameter, as far as they are known, for a comment beside it.
+    pub(super) fn parameter_notes(&self) -> Vec<String> {
+        let file: toml::Table = toml::from_str(&self.model_toml).unwrap_or_default();
+        let about = |name: &str| {
+            let about = file.get("parameters")?.get(name)?.get("about")?;
+            about.as_str().map(str::to_owned)
+        };
+        let acts = |name: &str| {
+            let mut effects = self.effects.iter();
+            let effect = effects.find(|effect| effect.parameters.iter().any(|p| p == name))?;
+            let CarriedEffect {
+                name,
+                joint,
+                expression,
+                ..
+            } = effect;
+            Some(format!("{name} on joint {joint}: {expression}"))
+        };
+        let note = |parameter: &Parameter| {
+            let known = parameter
+                .ci95
+                .map(|[low, high]| format!("95 % interval {low} to {high}"));
+            let meaning = about(&parameter.name).or_else(|| acts(&parameter.name));
+            let parts = meaning.into_iter().chain(known);
+            parts.collect::<Vec<_>>().join("; ")
+        };
+        self.equations.parameters.iter().map(note).collect()
     }
 
     /// What no format carries of a sensor that shows something else than the rig's own angle.

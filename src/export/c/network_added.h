@@ -1,0 +1,7 @@
+    {
+        model_real y[OUTPUTS];
+        int i;
+        model_NETWORK(state, torque, y);
+        for (i = 0; i < OUTPUTS; i++)
+            rates[MODEL_STATES - OUTPUTS + i] += y[i];
+    }

@@ -1,0 +1,349 @@
+//! The C header, compiled: what it predicts, its Jacobians, and that no compiler has anything to say about it.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use rand::RngExt;
+use residyn::export::{Answers, Portable, Samples, find};
+use residyn::lanes::Row;
+use residyn::model::{Commands, Integrator, Library, ModelWeights, StepTorque, System};
+use serde_json::json;
+use tempfile::TempDir;
+
+use crate::common::rng;
+use crate::models;
+
+/// Every function of formulas, names that C has taken, and text that would end a comment.
+const ODD: &str = r#"
+[system]
+name = "Rig"
+about = "not the end: */, nor another beginning: /*, nor ??/"
+joints = 1
+
+[parameters]
+int = { value = 2.0, unit = "*/", about = "the end \\" }
+NAN = { value = 0.5 }
+"größe" = { value = 0.25 }
+
+[dynamics]
+let.double = "where(q1 < 0.2, atan2(qd1, 1 + q1^2), max(q1, min(qd1, 0.5)))"
+let.state = "log(2 + sin(q1)) + abs(qd1)^1.5 + tan(0.3 * tanh(qd1)) + sqrt(1 + cos(q1)^2)"
+let.time = "clamp(state, -1, 1) * sign(q1) * exp(-q1^2) - where(qd1, größe, 2)^2"
+let.int_ = "(double < time) * (q1 >= 0.1) + where(q1 <= 1, 1, 0)"
+qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 0.1 * t"
+"#;
+
+fn odd() -> Portable {
+    let library = Library::built_in();
+    let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
+    let numbers = ModelWeights {
+        parameters: system.dynamics(&system.sign()).values(),
+        prior: None,
+        residual: None,
+    };
+    Portable::new(&system, numbers, Integrator::Rk4, 0.01, json!("*/ \\"))
+}
+
+/// A model's header in a folder of its own.
+struct Header {
+    name: &'static str,
+    model: Portable,
+    folder: TempDir,
+}
+
+impl Header {
+    fn path(&self) -> PathBuf {
+        self.folder.path().join("model.h")
+    }
+
+    /// Arguments that every client is compiled with.
+    fn arguments(&self) -> Vec<String> {
+        let lower = self.model.name().to_lowercase();
+        let upper = lower.to_uppercase();
+        vec![
+            "-include".into(),
+            self.path().to_string_lossy().into_owned(),
+            format!("-DMODEL(name)={lower}_##name"),
+            format!("-DJOINTS={upper}_JOINTS"),
+            format!("-DPARTS={upper}_PARTS"),
+        ]
+    }
+
+    /// A client as a program, compiled with these flags.
+    fn program(&self, client: &str, flags: &[&str]) -> PathBuf {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let program = self.folder.path().join("client");
+        let mut command = Command::new("cc");
+        command
+            .args(["-std=c99"])
+            .args(flags)
+            .args(self.arguments());
+        command
+            .arg(root.join(client))
+            .arg("-o")
+            .arg(&program)
+            .arg("-lm");
+        succeeds(&mut command, self.name);
+        program
+    }
+
+    /// The rows of numbers that a client prints which is compiled with these flags.
+    fn ask(&self, client: &str, flags: &[&str], question: &str) -> Vec<Vec<f64>> {
+        rows(
+            Command::new(self.program(client, flags)),
+            question,
+            self.name,
+        )
+    }
+}
+
+/// The rows of numbers that a program prints.
+fn rows(mut program: Command, question: &str, what: &str) -> Vec<Vec<f64>> {
+    let mut run = program
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (mut stdin, question) = (run.stdin.take().unwrap(), question.to_owned());
+    let writer = std::thread::spawn(move || stdin.write_all(question.as_bytes()));
+    let output = run.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{what}: {program:?} stops\n{said}");
+    writer.join().unwrap().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    let row = |line: &str| {
+        line.split_whitespace()
+            .map(|x| x.parse().unwrap())
+            .collect()
+    };
+    said.lines().map(row).collect()
+}
+
+pub fn succeeds(command: &mut Command, what: &str) {
+    let run = command.output().unwrap();
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success(), "{what}: {command:?}\n{said}");
+}
+
+/// Whether these tools start; where one does not, say so where nobody misses it.
+pub fn there_are(tools: &[&str]) -> bool {
+    let starts = |tool: &&str| Command::new(tool).arg("--version").output().is_ok();
+    let missing: Vec<&str> = tools.iter().copied().filter(|tool| !starts(tool)).collect();
+    if !missing.is_empty() {
+        let missing = missing.join(", ");
+        // Not eprintln!, which the test harness swallows.
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED a test of exported C: there is no {missing}"
+        );
+    }
+    missing.is_empty()
+}
+
+/// Every model's header, or none where a tool is missing.
+fn headers(tools: &[&str]) -> Vec<Header> {
+    if !there_are(tools) {
+        return Vec::new();
+    }
+    let header = |(name, model)| {
+        let header = Header {
+            name,
+            model,
+            folder: tempfile::tempdir().unwrap(),
+        };
+        find("c")
+            .unwrap()
+            .write(&header.model, &header.path())
+            .unwrap();
+        header
+    };
+    let odd = [("odd", odd())];
+    models::all().into_iter().chain(odd).map(header).collect()
+}
+
+fn question(samples: &Samples) -> String {
+    let (points, steps) = (samples.states.len(), samples.held.len());
+    let mut text = format!("{points} {steps} {}", samples.step_s);
+    let rows = samples.states.iter().zip(&samples.torques);
+    let rows = rows.flat_map(|(state, torque)| [state, torque]);
+    for number in rows.chain([&samples.start]).chain(&samples.held).flatten() {
+        let _ = write!(text, " {number:?}");
+    }
+    text
+}
+
+const CLIENT: &str = "docs/clients/c.c";
+
+/// What the client answers under these flags.
+fn answers(header: &Header, flags: &[&str], samples: &Samples) -> Answers {
+    let rows = header.ask(CLIENT, flags, &question(samples));
+    let (points, rollout) = rows.split_at(samples.states.len());
+    let (next, derivative) = points
+        .iter()
+        .map(|row| {
+            let (next, derivative) = row.split_at(2 * samples.joints);
+            (next.to_vec(), derivative.to_vec())
+        })
+        .unzip();
+    Answers {
+        next: Some(next),
+        derivative: Some(derivative),
+        rollout: Some(rollout.to_vec()),
+    }
+}
+
+#[test]
+fn the_compiled_header_predicts_what_the_program_does() {
+    for header in headers(&["cc"]) {
+        let samples = header.model.samples(&mut rng(3)).unwrap();
+        let own = header.model.answers(&samples).unwrap();
+        let theirs = find("c").unwrap().ask(&header.path(), &samples).unwrap();
+        let difference = own.difference(&theirs);
+        assert!(
+            difference.pointwise() <= 1e-9,
+            "{} {difference:?}",
+            header.name
+        );
+        assert!(
+            difference.rollout.unwrap() <= 1e-9,
+            "{} {difference:?}",
+            header.name
+        );
+        assert!(difference.next.is_some() && difference.derivative.is_some());
+    }
+}
+
+#[test]
+fn in_single_precision_it_is_as_close_as_that_allows() {
+    for header in headers(&["cc"]) {
+        let samples = header.model.samples(&mut rng(4)).unwrap();
+        let own = header.model.answers(&samples).unwrap();
+        let float = format!("-D{}_FLOAT", header.model.name().to_uppercase());
+        let difference = own.difference(&answers(&header, &["-O2", &float], &samples));
+        assert!(
+            difference.pointwise() <= 1e-5,
+            "{} {difference:?}",
+            header.name
+        );
+    }
+}
+
+#[test]
+fn nothing_is_read_or_written_where_it_must_not_be() {
+    let flags = [
+        "-g",
+        "-fsanitize=address,undefined",
+        "-fno-sanitize-recover=all",
+    ];
+    for header in headers(&["cc"]) {
+        let samples = header.model.samples(&mut rng(5)).unwrap();
+        let own = header.model.answers(&samples).unwrap();
+        let difference = own.difference(&answers(&header, &flags, &samples));
+        assert!(
+            difference.pointwise() <= 1e-9,
+            "{} {difference:?}",
+            header.name
+        );
+    }
+}
+
+#[test]
+fn nothing_is_read_before_it_is_written() {
+    for header in headers(&["cc", "valgrind"]) {
+        let mut samples = header.model.samples(&mut rng(5)).unwrap();
+        samples.states.truncate(16);
+        samples.torques.truncate(16);
+        samples.held.truncate(100);
+        let mut checked = Command::new("valgrind");
+        checked.args(["-q", "--error-exitcode=1"]);
+        checked.arg(header.program(CLIENT, &["-g", "-O1"]));
+        let printed = rows(checked, &question(&samples), header.name);
+        assert_eq!(printed.len(), 116, "{}", header.name);
+    }
+}
+
+#[test]
+fn no_compiler_warns() {
+    for header in headers(&["cc", "c++"]) {
+        let main = header.folder.path().join("main.c");
+        std::fs::write(&main, "int main(void) { return 0; }\n").unwrap();
+        let float = format!("-D{}_FLOAT", header.model.name().to_uppercase());
+        for precision in ["-DDOUBLE", &float] {
+            let strict = [
+                "-Wall",
+                "-Wextra",
+                "-Werror",
+                "-pedantic",
+                "-Wdouble-promotion",
+                precision,
+            ];
+            for language in [["cc", "-std=c99", "-xc"], ["c++", "-std=c++11", "-xc++"]] {
+                let mut command = Command::new(language[0]);
+                command
+                    .args(&language[1..])
+                    .args(strict)
+                    .args(header.arguments());
+                for source in [
+                    main.clone(),
+                    Path::new(env!("CARGO_MANIFEST_DIR")).join(CLIENT),
+                ] {
+                    let mut one = Command::new(language[0]);
+                    one.args(command.get_args()).arg("-c").arg(source);
+                    one.arg("-o").arg(header.folder.path().join("main.o"));
+                    succeeds(&mut one, header.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn jacobians_are_the_slopes() {
+    for header in headers(&["cc"]) {
+        let samples = header.model.samples(&mut rng(6)).unwrap();
+        let worst = header.ask("tests/clients/jacobian.c", &["-O2"], &question(&samples));
+        assert_eq!(worst.len(), samples.states.len());
+        let worst = worst.concat().into_iter().fold(0.0, f64::max);
+        assert!(worst <= 1e-6, "{}: {worst:e}", header.name);
+    }
+}
+
+/// Steps of any length, so that a delay spans now few of them and now many.
+#[test]
+fn torques_act_as_the_filters_say_whatever_the_steps() {
+    let filtered = |header: &Header| !header.model.equations.filters.is_empty();
+    for header in headers(&["cc"]).into_iter().filter(filtered) {
+        let (mut random, n, steps) = (rng(8), header.model.joints(), 200);
+        let (mut time, mut tau) = (vec![-1.0], vec![vec![0.0]; n]);
+        let (mut now, mut question) = (0.0, format!("{steps}"));
+        for _ in 0..steps {
+            let length = header.model.step_s * random.random_range(0.6..3.0);
+            time.push(now);
+            now += length;
+            let _ = write!(question, " {length:?}");
+            for tau in &mut tau {
+                tau.push(random.random_range(-1.0..1.0));
+                let _ = write!(question, " {:?}", tau.last().unwrap());
+            }
+        }
+        time.push(now);
+        let equations = &header.model.equations;
+        let commands = Commands::new(equations, &equations.values(), &time[..=steps], &tau);
+        let parts = match header.model.integrator {
+            Integrator::Fine { steps } => steps.get() as usize,
+            _ => 1,
+        };
+        let rows = header.ask("tests/clients/acting.c", &[], &question);
+        for (k, row) in rows.iter().enumerate() {
+            let held: Vec<_> = tau.iter().map(|tau| Row([tau[k + 1]])).collect();
+            let ends = [time[k + 1], time[k + 2]].map(|time| Row([time]));
+            let acting = StepTorque::new([&commands], &held, ends[0], ends[1], parts).mean;
+            for (a, Row([b])) in row.iter().zip(acting) {
+                assert!((a - b).abs() < 1e-9, "{} step {k}: {a} {b}", header.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! The FMU in FMPy: what it predicts, and that a simulator can do with it what the standard promises.
+
+use std::io::{Cursor, Read};
+use std::process::Command;
+
+use residyn::export::{Portable, find};
+use serde_json::{Value, json};
+use zip::ZipArchive;
+
+use crate::clients::client;
+use crate::common::rng;
+use crate::export::answers;
+use crate::export_c::{succeeds, there_are};
+use crate::models;
+
+fn model(name: &str) -> Portable {
+    let mut models = models::all().into_iter();
+    models.find(|(known, _)| *known == name).unwrap().1
+}
+
+#[test]
+fn a_simulator_predicts_what_the_program_does() {
+    let (folder, format) = (tempfile::tempdir().unwrap(), find("fmu").unwrap());
+    for (name, model) in models::all() {
+        let path = folder.path().join("model.fmu");
+        format.write(&model, &path).unwrap();
+        let samples = model.samples(&mut rng(3)).unwrap();
+        let own = model.answers(&samples).unwrap();
+        let Some(theirs) = answers(name, || format.ask(&path, &samples)) else {
+            continue;
+        };
+        let difference = own.difference(&theirs);
+        assert!(difference.pointwise() <= 1e-9, "{name} {difference:?}");
+        assert!(difference.rollout.unwrap() <= 1e-9, "{name} {difference:?}");
+        assert_eq!(
+            difference.derivative.is_some(),
+            model.equations.filters.is_empty(),
+            "{name}"
+        );
+    }
+}
+
+/// What a solver of its own may differ by is the step's own error, and that of straight lines through a delay.
+#[test]
+fn a_simulator_can_tune_keep_and_differentiate_it() {
+    for (name, parameter, tuned, solver_tolerance) in [
+        (
+            "pendulum_effects",
+            "joint[1].coulomb_friction.F_c1",
+            0.05,
+            2e-3,
+        ),
+        (
+            "acrobot_effects",
+            "joint[1].stribeck_friction.F_s1",
+            0.3,
+            2e-3,
+        ),
+        ("cartpole_hybrid", "m_p", 0.2, 1e-4),
+    ] {
+        let model = model(name);
+        let samples = model.samples(&mut rng(5)).unwrap();
+        let own = parameter.rsplit('.').next().unwrap();
+        let mut other = model.clone();
+        let mut parameters = other.equations.parameters.iter_mut();
+        let changed = parameters.find(|parameter| parameter.name == own).unwrap();
+        let (value, unit) = (changed.value, changed.unit.clone());
+        changed.value = tuned;
+        let case = json!({
+            "samples": samples, "parameter": parameter, "value": value, "unit": unit,
+            "other_value": tuned, "other_rollout": other.answers(&samples).unwrap().rollout,
+            "solver_tolerance": solver_tolerance,
+        });
+        let folder = tempfile::tempdir().unwrap();
+        let (path, question) = (
+            folder.path().join("model.fmu"),
+            folder.path().join("case.json"),
+        );
+        find("fmu").unwrap().write(&model, &path).unwrap();
+        std::fs::write(&question, case.to_string()).unwrap();
+        client("simulator.py", &[&path, &question]);
+    }
+}
+
+/// Names and bytes of what is in the unit.
+fn unpacked(model: &Portable) -> Vec<(String, Vec<u8>)> {
+    let files = (find("fmu").unwrap().files)(model, "model.fmu".as_ref()).unwrap();
+    let mut archive = ZipArchive::new(Cursor::new(&files[0].bytes)).unwrap();
+    let mut unpacked = Vec::new();
+    for k in 0..archive.len() {
+        let mut file = archive.by_index(k).unwrap();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        unpacked.push((file.name().unwrap().into_owned(), bytes));
+    }
+    unpacked
+}
+
+#[test]
+fn no_compiler_warns_of_its_sources() {
+    if !there_are(&["cc"]) {
+        return;
+    }
+    for (name, model) in models::all() {
+        let folder = tempfile::tempdir().unwrap();
+        for (file, bytes) in unpacked(&model) {
+            if let Some(file) = file.strip_prefix("sources/") {
+                std::fs::write(folder.path().join(file), bytes).unwrap();
+            }
+        }
+        let mut command = Command::new("cc");
+        command.args([
+            "-std=c99",
+            "-fsyntax-only",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-pedantic",
+        ]);
+        succeeds(command.arg(folder.path().join("fmi3.c")), name);
+    }
+}
+
+#[test]
+fn the_description_names_units_effects_and_intervals() {
+    let format = find("fmu").unwrap();
+    let model = model("pendulum_effects");
+    let (file, text) = unpacked(&model).remove(0);
+    assert_eq!(file, "modelDescription.xml");
+    let text = String::from_utf8(text).unwrap();
+    let xml = roxmltree::Document::parse(&text).unwrap();
+    let named = |name: &str| {
+        let mut nodes = xml.descendants();
+        nodes
+            .find(|node| node.attribute("name") == Some(name))
+            .unwrap()
+    };
+    let friction = named("joint[1].coulomb_friction.F_c1");
+    assert_eq!(friction.attribute("start"), Some("0.16"));
+    let about = friction.attribute("description").unwrap();
+    assert!(
+        about.contains("-F_c1 * sign(qd1)") && about.contains("0.15 to 0.17"),
+        "{about}"
+    );
+    let base = named("N m").first_element_child().unwrap();
+    let exponents = ["kg", "m", "s"].map(|unit| base.attribute(unit));
+    assert_eq!(exponents, [Some("1"), Some("2"), Some("-2")]);
+    assert_eq!(
+        named("joint[1].lagged_torque").attribute("unit"),
+        Some("N m")
+    );
+    let limits = (format.limits)(&model);
+    assert!(
+        limits.iter().any(|limit| limit.contains("delay")),
+        "{limits:?}"
+    );
+}
+
+#[test]
+fn without_a_compiler_a_unit_holds_its_sources() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("acrobot.fmu");
+    let run = Command::new(env!("CARGO_BIN_EXE_residyn"))
+        .env("CC", "no-such-compiler")
+        .args([
+            "export", "--model", "acrobot", "--format", "fmu", "--json", "--out",
+        ])
+        .arg(&path)
+        .output()
+        .unwrap();
+    assert_eq!(
+        run.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    let said: Value = serde_json::from_slice(&run.stdout).unwrap();
+    let limit = said["not_carried"][0].as_str().unwrap();
+    assert!(limit.contains("source") && limit.contains("CC"), "{limit}");
+    assert!(
+        said["not_measured"].as_str().unwrap().contains("CC"),
+        "{said}"
+    );
+    let archive = ZipArchive::new(std::fs::File::open(&path).unwrap()).unwrap();
+    assert_eq!(archive.len(), 4);
+}
+
+#[test]
+fn the_same_model_is_the_same_unit() {
+    assert!(unpacked(&model("pendulum")) == unpacked(&model("pendulum")));
+}
