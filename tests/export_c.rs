@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use residyn::export::{Answers, Portable, Samples, find};
 use residyn::lanes::Row;
-use residyn::model::{Commands, Integrator, Library, ModelWeights, StepTorque, System};
+use residyn::model::{Commands, Integrator, Library, StepTorque, System};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -38,12 +38,7 @@ qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 
 fn odd() -> Portable {
     let library = Library::built_in();
     let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
-    let numbers = ModelWeights {
-        parameters: system.dynamics(&system.sign()).values(),
-        prior: None,
-        residual: None,
-    };
-    Portable::new(&system, numbers, Integrator::Rk4, 0.01, json!("*/ \\"))
+    Portable::stated(&system, Integrator::Rk4, 0.01, json!("*/ \\"))
 }
 
 /// A model's header in a folder of its own.

@@ -114,15 +114,13 @@ fn system(name: &str, effects: &str) -> System {
 }
 
 fn physics(system: &System, integrator: Integrator, step_s: f64) -> Portable {
-    portable(system, declared(system), integrator, step_s)
+    Portable::stated(system, integrator, step_s, origin(system))
 }
 
 fn hybrid(system: &System, residual: &MlpWeights, integrator: Integrator, step_s: f64) -> Portable {
-    let numbers = ModelWeights {
-        residual: Some(residual.clone()),
-        ..declared(system)
-    };
-    portable(system, numbers, integrator, step_s)
+    let mut model = physics(system, integrator, step_s);
+    model.residual = Some(residual.clone());
+    model
 }
 
 fn data_driven(
@@ -136,26 +134,11 @@ fn data_driven(
         prior: Some(prior.clone()),
         residual: None,
     };
-    portable(system, numbers, integrator, step_s)
+    Portable::new(system, numbers, integrator, step_s, origin(system))
 }
 
-/// The equations with the values of the file.
-fn declared(system: &System) -> ModelWeights {
-    ModelWeights {
-        parameters: system.dynamics(&system.sign()).values(),
-        prior: None,
-        residual: None,
-    }
-}
-
-fn portable(
-    system: &System,
-    numbers: ModelWeights,
-    integrator: Integrator,
-    step_s: f64,
-) -> Portable {
-    let origin = json!({"config": {"model": system.name}, "seed": 7});
-    Portable::new(system, numbers, integrator, step_s, origin)
+fn origin(system: &System) -> serde_json::Value {
+    json!({"config": {"model": system.name}, "seed": 7})
 }
 
 fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {

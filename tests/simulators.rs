@@ -5,7 +5,7 @@ use std::path::Path;
 use residyn::export::{Portable, find};
 use residyn::expr::SignForm;
 use residyn::mechanism::{model_text, read_mjcf, read_urdf};
-use residyn::model::{Integrator, Library, ModelWeights, System};
+use residyn::model::{Integrator, Library, System};
 use serde_json::json;
 
 use crate::common::{assert_near, dynamics, points, rng};
@@ -27,12 +27,7 @@ fn portable(name: &str, integrator: Integrator, effects: &[String]) -> Portable 
 fn of_text(text: &str, integrator: Integrator) -> Portable {
     let library = Library::built_in();
     let system = System::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
-    let numbers = ModelWeights {
-        parameters: system.dynamics(&system.sign()).values(),
-        prior: None,
-        residual: None,
-    };
-    Portable::new(&system, numbers, integrator, 0.01, json!({}))
+    Portable::stated(&system, integrator, 0.01, json!({}))
 }
 
 /// What both formats carry.
@@ -218,7 +213,8 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
             let mut chain = chain.unwrap();
             // URDF says nothing of gravity.
             let down = chain.gravity.normalize();
-            let own = model.declared.parameters.iter().find(|p| p.unit == "m/s^2");
+            let own = model.declared().parameters;
+            let own = own.iter().find(|p| p.unit == "m/s^2");
             chain.gravity = own.map_or(chain.gravity, |g| down * g.value);
             let text = model_text(&chain);
             let back = System::from_text(Path::new(name), &text, library.effects()).unwrap();

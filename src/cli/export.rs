@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::export::{Difference, File, Format, Portable, Unread, find};
-use crate::model::{Integrator, Library, ModelWeights};
+use crate::model::{Integrator, Library};
 use crate::train::Manifest;
 
 /// Write a model for other programs, and measure how far what they predict is from here
@@ -112,14 +112,8 @@ fn step_of(config: &Value) -> Option<f64> {
 
 fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Portable> {
     let system = library.system(file)?;
-    let declared = ModelWeights {
-        parameters: system.dynamics(&system.sign()).values(),
-        prior: None,
-        residual: None,
-    };
-    Ok(Portable::new(
+    Ok(Portable::stated(
         &system,
-        declared,
         arguments.integrator.unwrap_or(Integrator::Rk4),
         arguments.step.unwrap_or(STEP_S),
         json!({"config": {"model": file}, "seed": arguments.common.seed}),

@@ -156,13 +156,13 @@ fn pair(model: &Portable, description: &Path, weights: &Path) -> Result<Vec<File
     let text = Description {
         residyn_model: VERSION,
         residyn: env!("CARGO_PKG_VERSION").to_owned(),
-        about: model.about.clone(),
+        about: model.system.about.clone(),
         shape,
-        prismatic: model.prismatic.clone(),
+        prismatic: model.system.prismatic.clone(),
         integrator: model.integrator,
         step_s: model.step_s,
         weights: weights.file_name().map(PathBuf::from).unwrap_or_default(),
-        model_toml: model.model_toml.clone(),
+        model_toml: model.system.text.clone(),
         origin: model.origin.clone(),
         equations: Equations::of(model),
     };

@@ -38,8 +38,8 @@ fn document(model: &Portable) -> String {
         model.provenance(),
         escaped(model.name())
     );
-    if !model.about.is_empty() {
-        let _ = writeln!(out, "{}.\n", sentence(&model.about));
+    if !model.system.about.is_empty() {
+        let _ = writeln!(out, "{}.\n", sentence(&model.system.about));
     }
     motion(&mut out, model);
     effects(&mut out, model);

@@ -54,7 +54,7 @@ impl Rig {
         if model.depends_on_time() {
             return Err("its motion depends on time".into());
         }
-        let found = recover(&model.declared, &model.prismatic)?;
+        let found = recover(&model.declared(), &model.system.prismatic)?;
         let still = Drive {
             gain: 1.0,
             gear: 1.0,
@@ -191,9 +191,9 @@ fn at_zero(joint: &Joint) -> Pose {
 
 /// For each joint the speed over which dry friction reverses; 0 where it does so at once.
 pub(super) fn friction_widths(model: &Portable) -> String {
-    let widths = model.sign.iter().map(|sign| match sign {
+    let widths = model.system.sign().into_iter().map(|sign| match sign {
         SignForm::Exact => 0.0,
-        SignForm::Smooth { width } => *width,
+        SignForm::Smooth { width } => width,
     });
     numbers(widths)
 }

@@ -3,7 +3,6 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{Answers, Samples};
-use crate::expr::SignForm;
 use crate::model::{
     CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
     nothing_but, with_residual,
@@ -14,29 +13,19 @@ use crate::plant::Environment;
 /// derivative, and how both become steps.
 #[derive(Debug, Clone)]
 pub struct Portable {
-    /// One line.
-    pub about: String,
+    /// What the model file says.
+    pub system: System,
     /// What stands around the networks, its parameters at the values to export.
     pub equations: Dynamics,
-    /// The same without the file's effects.
-    pub declared: Dynamics,
-    /// For each joint how dry friction is written.
-    pub sign: Vec<SignForm>,
     /// The network that stands in place of equations, where one does.
     pub prior: Option<MlpWeights>,
     /// The network for what the equations or the prior lack.
     pub residual: Option<MlpWeights>,
     /// What the equations carry of the library of effects.
     pub effects: Vec<CarriedEffect>,
-    /// For each joint whether it slides (m, N) rather than turns (rad, N m).
-    pub prismatic: Vec<bool>,
     pub integrator: Integrator,
     /// How long a torque is held, in s.
     pub step_s: f64,
-    /// Text of the model file.
-    pub model_toml: String,
-    /// What the model file says.
-    pub system: System,
     /// The configuration and the seed that the model came of.
     pub origin: serde_json::Value,
 }
@@ -71,23 +60,37 @@ impl Portable {
             None => system.dynamics(&system.sign()).with_values(parameters),
         };
         keep_intervals(&mut equations);
-        let sign = system.sign();
-        let declared = system.dynamics_with(&[], &sign);
         Self {
-            declared: declared.with_values(equations.values()),
-            sign,
-            about: system.about.clone(),
+            system: system.clone(),
             effects: carried(system, &equations),
-            prismatic: system.prismatic.clone(),
             equations,
             prior,
             residual,
             integrator,
             step_s,
-            model_toml: system.text.clone(),
-            system: system.clone(),
             origin,
         }
+    }
+
+    /// The model that a file states, with its own values.
+    pub fn stated(
+        system: &System,
+        integrator: Integrator,
+        step_s: f64,
+        origin: serde_json::Value,
+    ) -> Self {
+        let numbers = ModelWeights {
+            parameters: system.dynamics(&system.sign()).values(),
+            prior: None,
+            residual: None,
+        };
+        Self::new(system, numbers, integrator, step_s, origin)
+    }
+
+    /// The equations without the file's effects, where no network takes their place.
+    pub fn declared(&self) -> Dynamics {
+        let declared = self.system.dynamics_with(&[], &self.system.sign());
+        declared.with_values(self.equations.values())
     }
 
     /// Name of the system.
@@ -117,7 +120,7 @@ impl Portable {
 
     /// Unit of a joint's (counted from 0) position, and of its torque.
     pub fn units(&self, joint: usize) -> [&'static str; 2] {
-        if self.prismatic[joint] {
+        if self.system.prismatic[joint] {
             ["m", "N"]
         } else {
             ["rad", "N m"]
@@ -136,7 +139,7 @@ impl Portable {
 
     /// Meaning and interval of each parameter, as far as they are known, for a comment beside it.
     pub(super) fn parameter_notes(&self) -> Vec<String> {
-        let file: toml::Table = toml::from_str(&self.model_toml).unwrap_or_default();
+        let file: toml::Table = toml::from_str(&self.system.text).unwrap_or_default();
         let about = |name: &str| {
             let about = file.get("parameters")?.get(name)?.get("about")?;
             about.as_str().map(str::to_owned)

@@ -41,7 +41,13 @@ impl Samples {
     /// accelerations about as much as the state does.
     pub(super) fn draw(model: &Portable, whole: &Dynamics, rng: &mut impl Rng) -> Self {
         let n = model.joints();
-        let reach = |k: usize| if model.prismatic[k % n] { 1.0 } else { PI };
+        let reach = |k: usize| {
+            if model.system.prismatic[k % n] {
+                1.0
+            } else {
+                PI
+            }
+        };
         let reach: Vec<f64> = (0..2 * n).map(reach).collect();
         let states = rows(POINTS, &reach, rng);
         let torque = torque_scale(whole, &states);

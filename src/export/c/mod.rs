@@ -58,7 +58,7 @@ pub(super) fn header(model: &Portable) -> Result<String, ExportError> {
 /// What a reader of the file has to know.
 fn head(model: &Portable, names: &Names) -> String {
     let mut lines = vec![
-        format!("{}: {}", model.name(), model.about),
+        format!("{}: {}", model.name(), model.system.about),
         format!(
             "Written by residyn {}, integrator {}, steps of {} s.",
             env!("CARGO_PKG_VERSION"),

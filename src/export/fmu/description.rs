@@ -32,7 +32,7 @@ pub(super) fn description(
 </fmiModelDescription>
 "#,
         name = escaped(model.name()),
-        about = escaped(&model.about),
+        about = escaped(&model.system.about),
         version = env!("CARGO_PKG_VERSION"),
         units = units(variables),
         step = model.step_s,

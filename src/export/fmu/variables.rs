@@ -75,7 +75,7 @@ fn states(model: &Portable) -> Vec<Variable> {
 }
 
 fn torque(model: &Portable, joint: usize, prefix: &str, about: &str, role: Role) -> Variable {
-    let what = if model.prismatic[joint] {
+    let what = if model.system.prismatic[joint] {
         "force"
     } else {
         "torque"

@@ -116,7 +116,7 @@ fn packed(model: &Portable, graph: Graph) -> Vec<u8> {
         ir_version: IR_VERSION,
         producer_name: "residyn".to_owned(),
         producer_version: env!("CARGO_PKG_VERSION").to_owned(),
-        doc_string: model.about.clone(),
+        doc_string: model.system.about.clone(),
         graph: Some(graph),
         opset_import: vec![OperatorSet {
             domain: String::new(),

@@ -94,7 +94,7 @@ fn head(model: &Portable) -> String {
             )
         })
         .collect();
-    let about = json!(model.about).to_string();
+    let about = json!(model.system.about).to_string();
     let provenance = json!(model.provenance().to_string());
     format!(
         "\"\"\"A model of {}: step and derivative for numpy.\n\n\
