@@ -1,14 +1,13 @@
 """Run an exported Python module: python module.py MODEL.py SAMPLES.json prints what it predicts at the samples."""
 
-import importlib.util
 import json
 import pathlib
+import runpy
 import sys
+import types
 
 # What `import model` does, for a file anywhere.
-specification = importlib.util.spec_from_file_location("model", sys.argv[1])
-model = importlib.util.module_from_spec(specification)
-specification.loader.exec_module(model)
+model = types.SimpleNamespace(**runpy.run_path(sys.argv[1]))
 samples = json.loads(pathlib.Path(sys.argv[2]).read_text())
 
 # Any number of rows at once.

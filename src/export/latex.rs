@@ -33,7 +33,7 @@ fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
 
 fn document(model: &Portable) -> String {
     let mut out = format!(
-        "% {}\n\\documentclass{{article}}\n\\usepackage{{amsmath}}\n\\usepackage[margin=25mm]{{geometry}}\n\
+        "% {}\n\\documentclass{{article}}\n\\usepackage[T1]{{fontenc}}\n\\usepackage{{amsmath}}\n\\usepackage[margin=25mm]{{geometry}}\n\
          \\begin{{document}}\n\n\\section*{{{}}}\n\n",
         model.provenance(),
         escaped(model.name())

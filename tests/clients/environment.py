@@ -1,16 +1,15 @@
 """Put the environment of an exported Python module through gymnasium's checker, and compare its rewards."""
 
-import importlib.util
 import json
 import pathlib
+import runpy
 import sys
+import types
 
 import numpy as np
 from gymnasium.utils.env_checker import check_env
 
-specification = importlib.util.spec_from_file_location("model", sys.argv[1])
-model = importlib.util.module_from_spec(specification)
-specification.loader.exec_module(model)
+model = types.SimpleNamespace(**runpy.run_path(sys.argv[1]))
 expected = json.loads(pathlib.Path(sys.argv[2]).read_text())
 
 environment = model.Environment()
