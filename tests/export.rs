@@ -282,7 +282,7 @@ fn latex_is_parsed_and_holds_equations_values_and_intervals() {
                 r"\ddot{q}_{1} &= C_{g} \,\sin\left(q_{1}\right) + C_{i} \,\tau_{1}",
                 r"-F_{\mathrm{c1}} \,\operatorname{sign}\left(\dot{q}_{1}\right)",
                 r"$F_{\mathrm{c1}}$ & $0.160$ & $\mathrm{N\,m}$ & $0.150$ to $0.170$",
-                r"$C_{i}$ & $3.0000$ & $\mathrm{1/(kg\,m^{2})}$ & not fitted",
+                r"$C_{i}$ & $3$ & $\mathrm{1/(kg\,m^{2})}$ & not fitted",
             ]);
         }
         let expected = folder.path().join("expected.json");

@@ -130,10 +130,10 @@ fn parameters(out: &mut String, parameters: &[Parameter]) {
              symbol & value & unit & 95\\,\\% interval \\\\\n\\hline\n";
     for parameter in parameters {
         let (value, ends) = digits(parameter);
-        let interval = match ends {
-            Some([low, high]) => format!("${low}$ to ${high}$"),
-            None if parameter.fixed => "fixed".to_owned(),
-            None => "not fitted".to_owned(),
+        let (value, interval) = match ends {
+            Some([low, high]) => (value, format!("${low}$ to ${high}$")),
+            None if parameter.fixed => (plain(&value), "fixed".to_owned()),
+            None => (plain(&value), "not fitted".to_owned()),
         };
         let _ = writeln!(
             out,
@@ -143,6 +143,15 @@ fn parameters(out: &mut String, parameters: &[Parameter]) {
         );
     }
     *out += "\\end{tabular}\n\n";
+}
+
+/// Without zeros at the end, which would tell of digits that nobody found.
+fn plain(value: &str) -> String {
+    if value.contains('.') {
+        let value = value.trim_end_matches('0');
+        return value.trim_end_matches('.').to_owned();
+    }
+    value.to_owned()
 }
 
 /// `1/(kg m^2)` with raised powers and thin spaces.
