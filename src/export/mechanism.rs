@@ -76,7 +76,7 @@ impl Rig {
             rig.limits
                 .push("the network for what the equations lack".into());
         }
-        rig.limits.extend(model.reading_limit());
+        rig.limits.extend(model.sensor_limits());
         Ok(rig)
     }
 

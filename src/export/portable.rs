@@ -166,12 +166,17 @@ impl Portable {
         self.equations.parameters.iter().map(note).collect()
     }
 
-    /// What no format carries of a sensor that shows something else than the rig's own angle.
-    pub(super) fn reading_limit(&self) -> Option<String> {
-        let shown = self.equations.reading.as_ref();
-        shown.map(|_| {
+    /// What no format carries of sensors that show something else than the rig's own angle.
+    pub(super) fn sensor_limits(&self) -> Vec<String> {
+        let shown = self.equations.reading.as_ref().map(|_| {
             "what the sensors show: positions are the rig's own, before play shifts them".to_owned()
-        })
+        });
+        let parameters = self.equations.parameters.iter().filter(|p| p.per_log);
+        let own = parameters.map(|p| {
+            let Parameter { name, value, .. } = p;
+            format!("values of {name} that single logs have of their own: it is {value} for all")
+        });
+        shown.into_iter().chain(own).collect()
     }
 
     /// The time constant of a filter on a joint (counted from 0) in s, where the model has such a filter.

@@ -16,7 +16,7 @@ use crate::model::{CommandFilter, Integrator};
 pub(super) const FORMAT: Format = Format {
     name: "c",
     about: "one C99 header with its Jacobians, in double or float, without allocation",
-    limits: |model| model.reading_limit().into_iter().collect(),
+    limits: Portable::sensor_limits,
     files: |model, path| {
         Ok(vec![File {
             path: path.to_owned(),

@@ -66,7 +66,7 @@ fn limits(model: &Portable) -> Vec<String> {
         )),
     };
     model
-        .reading_limit()
+        .sensor_limits()
         .into_iter()
         .chain(delay)
         .chain(binary)

@@ -41,7 +41,7 @@ fn limits(model: &Portable) -> Vec<String> {
             "another step than {step} s: delay and lag are written for it; their memory is an input and an output"
         ));
     }
-    limits.extend(model.reading_limit());
+    limits.extend(model.sensor_limits());
     limits
 }
 

@@ -47,7 +47,7 @@ fn limits(model: &Portable) -> Vec<String> {
             model.step_s
         ));
     }
-    limits.extend(model.reading_limit());
+    limits.extend(model.sensor_limits());
     limits
 }
 
