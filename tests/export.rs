@@ -5,6 +5,7 @@ use std::path::Path;
 
 use residyn::control::{Meter, Task};
 use residyn::export::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
+use residyn::model::Integrator;
 use serde_json::{Value, json};
 
 use crate::clients::client;
@@ -289,5 +290,33 @@ fn latex_is_parsed_and_holds_equations_values_and_intervals() {
         let json = json!({"environments": environments, "pieces": pieces});
         std::fs::write(&expected, json.to_string()).unwrap();
         client("latex.py", &[&path, &expected]);
+    }
+}
+
+#[test]
+fn what_sensors_show_is_said_not_to_be_carried() {
+    let effects = r#"
+[[effect]]
+name = "sensor_offset"
+joint = 1
+q_z = 0.01
+
+[[effect]]
+name = "backlash"
+joint = 1
+delta = 0.005
+driven = 1
+"#;
+    let system = models::system("pendulum", effects);
+    let model = Portable::stated(&system, Integrator::Rk4, 0.01, Value::Null);
+    for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
+        let limits = (find(name).unwrap().limits)(&model);
+        for piece in [
+            "what the sensors show",
+            "values of q_z1 that single logs have",
+        ] {
+            let said = limits.iter().any(|limit| limit.starts_with(piece));
+            assert!(said, "{name}: {piece:?} is not in {limits:?}");
+        }
     }
 }

@@ -102,7 +102,7 @@ pub fn all() -> Vec<(&'static str, Portable)> {
 }
 
 /// A built-in system with effects appended to its file.
-fn system(name: &str, effects: &str) -> System {
+pub fn system(name: &str, effects: &str) -> System {
     let library = Library::built_in();
     let declared = library.system(Path::new(name)).unwrap();
     System::from_text(
