@@ -134,10 +134,7 @@ impl Standard {
     }
 
     fn library_path(&self, fmu: &Fmu) -> String {
-        let ending = match std::env::consts::OS {
-            "macos" => ".dylib",
-            _ => std::env::consts::DLL_SUFFIX,
-        };
+        let ending = std::env::consts::DLL_SUFFIX;
         format!("binaries/{}/{}{ending}", (self.platform)(), fmu.identifier)
     }
 }
