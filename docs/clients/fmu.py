@@ -1,4 +1,4 @@
-"""Run an exported FMU: python fmu.py MODEL.fmu SAMPLES.json prints what it predicts at the samples."""
+"""Run an exported FMU of FMI 2.0 or 3.0: python fmu.py MODEL.fmu SAMPLES.json prints what it predicts at the samples."""
 
 import json
 import pathlib
@@ -6,7 +6,6 @@ import shutil
 import sys
 
 import fmpy
-from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
 
 path, samples = sys.argv[1], json.loads(pathlib.Path(sys.argv[2]).read_text())
@@ -21,15 +20,22 @@ rates = [reference[f"der({joint}.{what})"] for what in ("position", "velocity") 
 torques = [reference.get(f"{joint}.torque", reference.get(f"{joint}.force")) for joint in joints]
 
 
-def instance(kind, interface):
-    fmu = kind(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier=interface.modelIdentifier, instanceName="model")
-    fmu.instantiate()
-    return fmu
+fmi2 = description.fmiVersion == "2.0"
+
+
+def read(fmu, references):
+    return list((fmu.getReal if fmi2 else fmu.getFloat64)(references))
+
+
+def write(fmu, references, values):
+    (fmu.setReal if fmi2 else fmu.setFloat64)(references, values)
 
 
 def start(fmu, state):
-    fmu.setFloat64(states, state)
-    fmu.enterInitializationMode(startTime=0)
+    write(fmu, states, state)
+    if fmi2:
+        fmu.setupExperiment(startTime=0)
+    fmu.enterInitializationMode()
     fmu.exitInitializationMode()
 
 
@@ -38,22 +44,22 @@ def rollout(fmu, state, held):
     fmu.reset()
     start(fmu, state)
     for k, torque in enumerate(held):
-        fmu.setFloat64(torques, torque)
+        write(fmu, torques, torque)
         fmu.doStep(k * samples["step_s"], samples["step_s"])
-        yield list(fmu.getFloat64(states))
+        yield read(fmu, states)
 
 
 def derivatives(fmu):
     """Rates of model exchange."""
     start(fmu, samples["start"])
-    fmu.updateDiscreteStates()
+    fmu.newDiscreteStates() if fmi2 else fmu.updateDiscreteStates()
     fmu.enterContinuousTimeMode()
     for state, torque in zip(samples["states"], samples["torques"]):
-        fmu.setFloat64(states + torques, state + torque)
-        yield list(fmu.getFloat64(rates))
+        write(fmu, states + torques, state + torque)
+        yield read(fmu, rates)
 
 
-slave = instance(FMU3Slave, description.coSimulation)
+slave = fmpy.instantiate_fmu(folder, description, "CoSimulation")
 points = zip(samples["states"], samples["torques"])
 answers = {
     "next": [next(rollout(slave, state, [torque])) for state, torque in points],
@@ -65,7 +71,7 @@ slave.freeInstance()
 # Where torques are delayed or lag behind, what is set is not what acts.
 exchange = description.modelExchange
 if not exchange.needsCompletedIntegratorStep and len(description.derivatives) == len(rates):
-    model = instance(FMU3Model, exchange)
+    model = fmpy.instantiate_fmu(folder, description, "ModelExchange")
     answers["derivative"] = list(derivatives(model))
     model.terminate()
     model.freeInstance()

@@ -28,7 +28,8 @@ pub use samples::Samples;
 /// Every format, by name.
 pub const FORMATS: &[&Format] = &[
     &c::FORMAT,
-    &fmu::FORMAT,
+    &fmu::fmi3::FORMAT,
+    &fmu::fmi2::FORMAT,
     &description::JSON,
     &latex::FORMAT,
     &mjcf::FORMAT,

@@ -1,8 +1,10 @@
-//! FMI 3.0: the model with its C code as a unit of other simulators, for model exchange and for co-simulation.
+//! FMI: the model with its C code as a unit of other simulators, for model exchange and for co-simulation.
 
-mod description;
+pub(super) mod fmi2;
+pub(super) mod fmi3;
 mod unit;
 mod variables;
+mod xml;
 
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -10,24 +12,41 @@ use std::path::Path;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
+use self::variables::Variable;
 use super::c::{Names, compile, compiler, header};
 use super::{Answers, ExportError, File, Format, Portable, PythonClient, Reader, Samples, Unread};
 use crate::model::CommandFilter;
 
-pub(super) const FORMAT: Format = Format {
-    name: "fmu",
-    about: "FMI 3.0 for model exchange and co-simulation, physical parameters tunable",
-    limits,
-    files: |model, path| {
-        Ok(vec![File {
-            path: path.to_owned(),
-            bytes: archive(model)?,
-            about: "functional mock-up unit".into(),
-        }])
-    },
-    reader: Reader::Own(ask),
-    tolerance: 1e-9,
-};
+/// What one standard has of its own.
+struct Standard {
+    /// The name of its source file, and what that holds.
+    source: (&'static str, &'static str),
+    /// The folder of libraries for this machine.
+    platform: fn() -> String,
+    /// Files that describe the unit.
+    descriptions: fn(&Fmu) -> Vec<(&'static str, String)>,
+}
+
+/// A model as every standard sees it.
+struct Fmu<'m> {
+    model: &'m Portable,
+    identifier: String,
+    token: String,
+    variables: Vec<Variable>,
+}
+
+type Files = fn(&Portable, &Path) -> Result<Vec<File>, ExportError>;
+
+const fn format(name: &'static str, about: &'static str, files: Files) -> Format {
+    Format {
+        name,
+        about,
+        limits,
+        files,
+        reader: Reader::Own(ask),
+        tolerance: 1e-9,
+    }
+}
 
 const CLIENT: PythonClient = PythonClient {
     name: "fmu.py",
@@ -84,28 +103,44 @@ fn delays(model: &Portable) -> bool {
     (0..model.joints()).any(|joint| model.filter(joint, CommandFilter::Delay).is_some())
 }
 
-fn archive(model: &Portable) -> Result<Vec<u8>, ExportError> {
-    let names = Names::new(model);
-    let header = header(model)?;
-    let token = format!("{}-{:08x}", names.lower, crc32c::crc32c(header.as_bytes()));
-    let variables = variables::variables(model, &names);
-    let source = source(model, &names, &token);
-    let build = include_str!("buildDescription.xml").replace("@IDENTIFIER@", &names.lower);
-    let description = description::description(model, &names.lower, &token, &variables);
-    let mut files = vec![
-        ("modelDescription.xml".to_owned(), description.into_bytes()),
-        (
-            "sources/buildDescription.xml".to_owned(),
-            build.into_bytes(),
-        ),
-        ("sources/fmi3.c".to_owned(), source.clone().into_bytes()),
-        ("sources/model.h".to_owned(), header.clone().into_bytes()),
-    ];
-    files.extend(binary(model, &names, &source, &header)?);
-    Ok(zipped(&files))
+impl Standard {
+    fn files(&self, model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+        Ok(vec![File {
+            path: path.to_owned(),
+            bytes: self.archive(model)?,
+            about: "functional mock-up unit".into(),
+        }])
+    }
+
+    fn archive(&self, model: &Portable) -> Result<Vec<u8>, ExportError> {
+        let names = Names::new(model);
+        let header = header(model)?;
+        let fmu = Fmu {
+            model,
+            identifier: names.lower.clone(),
+            token: format!("{}-{:08x}", names.lower, crc32c::crc32c(header.as_bytes())),
+            variables: variables::variables(model, &names),
+        };
+        let sources = [
+            (self.source.0, self.source.1.to_owned()),
+            ("unit.h", code(model, &names, &fmu.token)),
+            ("model.h", header),
+        ];
+        let library = library(model, &sources)?.map(|bytes| (self.library_path(&fmu), bytes));
+        let described = (self.descriptions)(&fmu).into_iter();
+        let files = described.map(|(path, text)| (path.to_owned(), text.into_bytes()));
+        let sources = sources.map(|(name, text)| (format!("sources/{name}"), text.into_bytes()));
+        Ok(zipped(files.chain(sources).chain(library)))
+    }
+
+    fn library_path(&self, fmu: &Fmu) -> String {
+        let ending = std::env::consts::DLL_SUFFIX;
+        format!("binaries/{}/{}{ending}", (self.platform)(), fmu.identifier)
+    }
 }
 
-fn source(model: &Portable, names: &Names, token: &str) -> String {
+/// The model as a unit, before any standard.
+fn code(model: &Portable, names: &Names, token: &str) -> String {
     let (n, lags) = (model.joints(), variables::lags(model));
     let parameters = &model.equations.parameters;
     let addresses = parameters
@@ -117,7 +152,7 @@ fn source(model: &Portable, names: &Names, token: &str) -> String {
         None => "-1".to_owned(),
     };
     let each = |of: &dyn Fn(usize) -> String| (0..n).map(of).collect::<Vec<_>>().join(", ");
-    let filled = include_str!("fmi3.c")
+    let filled = include_str!("unit.h")
         .replace("@TOKEN@", token)
         .replace("@LAGS@", &lags.len().to_string())
         .replace("@PARAMETERS@", &parameters.len().to_string())
@@ -136,13 +171,8 @@ fn source(model: &Portable, names: &Names, token: &str) -> String {
     names.fill(&filled)
 }
 
-/// The shared library for this machine, where there is a compiler.
-fn binary(
-    model: &Portable,
-    names: &Names,
-    source: &str,
-    header: &str,
-) -> Result<Option<(String, Vec<u8>)>, ExportError> {
+/// The shared library of sources, the first of which includes the others, where there is a compiler.
+fn library(model: &Portable, sources: &[(&str, String)]) -> Result<Option<Vec<u8>>, ExportError> {
     let refused = |reason: String| ExportError::Model {
         format: "FMU",
         system: model.name().to_owned(),
@@ -151,8 +181,9 @@ fn binary(
     let io = |error: std::io::Error| refused(format!("there is no place to compile it: {error}"));
     let folder = tempfile::tempdir().map_err(io)?;
     let at = |name: &str| folder.path().join(name);
-    std::fs::write(at("fmi3.c"), source).map_err(io)?;
-    std::fs::write(at("model.h"), header).map_err(io)?;
+    for (name, text) in sources {
+        std::fs::write(at(name), text).map_err(io)?;
+    }
     let mut command = compiler();
     command.args([
         "-std=c99",
@@ -162,28 +193,16 @@ fn binary(
         "-fvisibility=hidden",
         "-o",
     ]);
-    command.args([&at("library"), &at("fmi3.c")]).arg("-lm");
+    command.args([&at("library"), &at(sources[0].0)]).arg("-lm");
     match compile(command) {
-        Ok(()) => {}
-        Err(Unread::NoReader(_)) => return Ok(None),
-        Err(Unread::Refused(said)) => return Err(refused(said)),
+        Ok(()) => std::fs::read(at("library")).map(Some).map_err(io),
+        Err(Unread::NoReader(_)) => Ok(None),
+        Err(Unread::Refused(said)) => Err(refused(said)),
     }
-    let bytes = std::fs::read(at("library")).map_err(io)?;
-    Ok(Some((binary_path(names), bytes)))
-}
-
-fn binary_path(names: &Names) -> String {
-    let system = match std::env::consts::OS {
-        "macos" => "darwin",
-        other => other,
-    };
-    let (arch, ending) = (std::env::consts::ARCH, std::env::consts::DLL_SUFFIX);
-    let ending = if system == "darwin" { ".dylib" } else { ending };
-    format!("binaries/{arch}-{system}/{}{ending}", names.lower)
 }
 
 /// The same bytes for the same files: they carry no date.
-fn zipped(files: &[(String, Vec<u8>)]) -> Vec<u8> {
+fn zipped(files: impl Iterator<Item = (String, Vec<u8>)>) -> Vec<u8> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
         .last_modified_time(DateTime::default());
@@ -191,7 +210,7 @@ fn zipped(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     for (path, bytes) in files {
         let written = writer
             .start_file(path, options)
-            .map(|()| writer.write_all(bytes));
+            .map(|()| writer.write_all(&bytes));
         written
             .expect("memory takes everything")
             .expect("memory takes everything");

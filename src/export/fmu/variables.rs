@@ -36,7 +36,7 @@ pub(super) fn lags(model: &Portable) -> Vec<usize> {
         .collect()
 }
 
-/// In the order of `fmi3.c`: time, torques, states, their rates, parameters.
+/// In the order of `unit.h`: time, torques, states, their rates, parameters.
 pub(super) fn variables(model: &Portable, names: &Names) -> Vec<Variable> {
     let time = Variable {
         name: "time".into(),
