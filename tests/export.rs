@@ -5,7 +5,7 @@ use std::path::Path;
 
 use residyn::control::{Meter, Task};
 use residyn::export::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
-use residyn::model::Integrator;
+use residyn::model::{Integrator, System};
 use serde_json::{Value, json};
 
 use crate::clients::client;
@@ -264,6 +264,11 @@ fn what_cannot_be_exported_is_refused_before_anything_is_written() {
         "no/such/folder/m.json",
     ]);
     assert_eq!(nowhere.status.code(), Some(2));
+    let said = String::from_utf8(nowhere.stderr).unwrap();
+    assert!(
+        said.contains("m.json cannot be written: its folder does not exist"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -318,5 +323,22 @@ driven = 1
             let said = limits.iter().any(|limit| limit.starts_with(piece));
             assert!(said, "{name}: {piece:?} is not in {limits:?}");
         }
+    }
+}
+
+#[test]
+fn names_and_units_of_files_do_not_break_a_module() {
+    let text = "[system]\nname = 'a \"\"\" \\ b'\nabout = \"two\\nlines \\\"\\\"\\\"\"\njoints = 1\n[parameters]\n\
+                lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
+                [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
+    let system = System::from_text(Path::new("odd.toml"), text, &[]).unwrap();
+    let model = Portable::stated(&system, Integrator::Rk4, 0.01, json!("\"\"\"\n\\"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("odd.module");
+    let format = find("python").unwrap();
+    format.write(&model, &path).unwrap();
+    let (samples, own) = question(&model);
+    if let Some(theirs) = answers("odd", || format.ask(&path, &samples)) {
+        agree("odd", &own, &theirs, format.tolerance);
     }
 }

@@ -183,7 +183,7 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) 
 /// Two digits are enough to compare.
 fn share(difference: f64) -> String {
     if difference == 0.0 {
-        return "none".to_owned();
+        return "0".to_owned();
     }
     format!("{difference:.1e}")
 }

@@ -1,4 +1,4 @@
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
@@ -37,6 +37,10 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
         .parent()
         .filter(|p| !p.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        let missing = std::io::Error::new(ErrorKind::NotFound, "its folder does not exist");
+        return Err(failed(missing));
+    }
     let mut file = readable_by_all().tempfile_in(folder).map_err(failed)?;
     file.write_all(contents).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;

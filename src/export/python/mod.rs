@@ -105,7 +105,7 @@ fn head(model: &Portable) -> String {
          ABOUT = {about}\n\
          # The program that wrote this module, and the configuration that the model came of.\n\
          PROVENANCE = json.loads({provenance})\n",
-        model.name(),
+        plain(model.name()),
         units.join(", "),
         s = if n == 1 { "" } else { "s" },
     )
@@ -144,8 +144,17 @@ fn constants(out: &mut String, model: &Portable) {
     }
 }
 
-fn unit(unit: &str) -> &str {
-    if unit.is_empty() { "1" } else { unit }
+fn unit(unit: &str) -> String {
+    if unit.is_empty() {
+        return "1".to_owned();
+    }
+    plain(unit)
+}
+
+/// Text of a file as part of a comment or of a docstring.
+fn plain(text: &str) -> String {
+    text.replace(['"', '\\'], "'")
+        .replace(char::is_control, " ")
 }
 
 fn networks(model: &Portable) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
