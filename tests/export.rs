@@ -9,7 +9,7 @@ use residyn::model::{Integrator, System};
 use serde_json::{Value, json};
 
 use crate::clients::client;
-use crate::common::rng;
+use crate::common::{USER_EFFECT, rng, system};
 use crate::models;
 use crate::support::{refuses, residyn, succeeds, text};
 
@@ -341,4 +341,42 @@ fn names_and_units_of_files_do_not_break_a_module() {
     if let Some(theirs) = answers("odd", || format.ask(&path, &samples)) {
         agree("odd", &own, &theirs, format.tolerance);
     }
+}
+
+#[test]
+fn a_description_needs_no_effect_files_to_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text(&folder.path().join(name)).to_owned();
+    std::fs::create_dir(at("effects")).unwrap();
+    std::fs::write(at("effects/eddy_brake.toml"), USER_EFFECT).unwrap();
+    let effect = "[[effect]]\nname = \"eddy_brake\"\njoint = 1\nT_m = 0.3\nv_m = 2.0\n";
+    std::fs::write(
+        at("braked.toml"),
+        format!("{}\n{effect}", system("pendulum").text),
+    )
+    .unwrap();
+    let export = [
+        "export",
+        "--model",
+        &at("braked.toml"),
+        "--effects",
+        &at("effects"),
+    ];
+    let json = ["--format", "json", "--out", &at("braked.json"), "--json"];
+    let printed = succeeds(&[&export[..], &json].concat());
+    let printed: Value = serde_json::from_str(&printed).unwrap();
+    for what in ["next", "derivative", "rollout"] {
+        let difference = printed["difference"][what].as_f64().unwrap();
+        assert!(difference < 1e-12, "{what}: {difference:e}");
+    }
+    let import = [
+        "import",
+        "--file",
+        &at("braked.json"),
+        "--out",
+        &at("braked"),
+    ];
+    let unknown = refuses(&import);
+    assert!(unknown.contains("unknown effect `eddy_brake`"), "{unknown}");
+    succeeds(&[&import[..], &["--effects", &at("effects")]].concat());
 }

@@ -9,12 +9,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use thiserror::Error;
 
-use super::{
-    Answers, CarriedEffect, ExportError, File, Format, HeldFilter, Portable, Reader, Samples,
-    Unread,
-};
+use super::{CarriedEffect, ExportError, File, Format, HeldFilter, Portable, Reader, rebuilt};
 use crate::expr::{Op, Program};
-use crate::model::{CommandFilter, Effect, HybridError, Integrator, Library, ModelWeights, System};
+use crate::model::{Effect, HybridError, Integrator, ModelWeights, System};
 use crate::train::weights::{from_bytes, to_bytes};
 use crate::train::{
     Backend, CheckpointError, FitSettings, Origin, Shape, TrainError, Training, save,
@@ -25,7 +22,7 @@ pub(super) const JSON: Format = Format {
     about: "the whole model as a description, its weights beside it as safetensors",
     limits: |_| Vec::new(),
     files: |model, path| pair(model, path, &path.with_extension(WEIGHTS)),
-    reader: Reader::Own(answers),
+    reader: Reader::Own(rebuilt::answers),
     tolerance: 1e-12,
 };
 
@@ -33,7 +30,9 @@ pub(super) const SAFETENSORS: Format = Format {
     name: "safetensors",
     about: "weights, the description of the whole model beside them as JSON",
     files: |model, path| pair(model, &path.with_extension(DESCRIPTION), path),
-    reader: Reader::Own(|path, samples| answers(&path.with_extension(DESCRIPTION), samples)),
+    reader: Reader::Own(|path, samples| {
+        rebuilt::answers(&path.with_extension(DESCRIPTION), samples)
+    }),
     ..JSON
 };
 
@@ -196,12 +195,8 @@ impl Equations {
             effects: model.effects.clone(),
             filters: (equations.filters.iter())
                 .map(|filter| {
-                    let kind = match filter.kind {
-                        CommandFilter::Delay => "delay",
-                        CommandFilter::Lag => "lag",
-                    };
                     let name = &equations.parameters[filter.parameter].name;
-                    json!({"joint": filter.joint + 1, "kind": kind, "parameter": name})
+                    json!({"joint": filter.joint + 1, "kind": filter.kind, "parameter": name})
                 })
                 .collect(),
             held: HeldFilter::all(model),
@@ -258,23 +253,6 @@ impl Imported {
             system,
             numbers,
         })
-    }
-
-    /// The model for other formats.
-    pub fn portable(&self) -> Portable {
-        let Description {
-            integrator,
-            step_s,
-            ref origin,
-            ..
-        } = self.description;
-        Portable::new(
-            &self.system,
-            self.numbers.clone(),
-            integrator,
-            step_s,
-            origin.clone(),
-        )
     }
 
     /// Write the model as a checkpoint that has not been trained any further. `seed` orders minibatches, should it be.
@@ -348,13 +326,4 @@ fn check(
         file: file.join(", "),
         weights: weights.join(", "),
     })
-}
-
-/// What a model predicts that is rebuilt from its files.
-fn answers(path: &Path, samples: &Samples) -> Result<Answers, Unread> {
-    let refused = |error: &dyn std::error::Error| Unread::Refused(error.to_string());
-    let library = Library::built_in();
-    let imported = Imported::read(path, library.effects());
-    let model = imported.map_err(|error| refused(&error))?.portable();
-    model.answers(samples).map_err(|error| refused(&error))
 }

@@ -12,8 +12,10 @@ mod mechanism;
 mod mjcf;
 mod onnx;
 mod portable;
+mod prediction;
 mod python;
 mod python_client;
+mod rebuilt;
 mod samples;
 mod urdf;
 

@@ -2,12 +2,12 @@ use rand::Rng;
 use serde::Serialize;
 use serde_json::json;
 
+use super::prediction::Prediction;
 use super::{Answers, Samples};
 use crate::model::{
     CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
     nothing_but, with_residual,
 };
-use crate::plant::Environment;
 
 /// A model as every format reads it: the equations with their values, the networks whose outputs are added to their
 /// derivative, and how both become steps.
@@ -186,14 +186,19 @@ impl Portable {
         Some(self.equations.parameters[filter.parameter].value)
     }
 
-    /// The whole model, networks included, as one program.
+    /// The whole model as one program, and its steps.
     ///
     /// # Errors
     /// A network that is not one for the model's joints.
-    pub fn whole(&self) -> Result<Dynamics, HybridError> {
+    pub(super) fn prediction(&self) -> Result<Prediction, HybridError> {
         let mut networks = self.networks();
-        networks.try_fold(self.equations.clone(), |dynamics, network| {
+        let whole = networks.try_fold(self.equations.clone(), |dynamics, network| {
             with_residual(&dynamics, network)
+        });
+        Ok(Prediction {
+            whole: whole?,
+            integrator: self.integrator,
+            step_s: self.step_s,
         })
     }
 
@@ -211,53 +216,21 @@ impl Portable {
     /// Points and a rollout at which readers of the model can be asked.
     ///
     /// # Errors
-    /// As [`Portable::whole`].
+    /// A network that is not one for the model's joints.
     pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, HybridError> {
-        Ok(Samples::draw(self, &self.whole()?, rng))
+        Ok(Samples::draw(
+            &self.prediction()?,
+            &self.system.prismatic,
+            rng,
+        ))
     }
 
     /// What the program itself predicts there, in f64.
     ///
     /// # Errors
-    /// As [`Portable::whole`].
+    /// A network that is not one for the model's joints.
     pub fn answers(&self, samples: &Samples) -> Result<Answers, HybridError> {
-        let whole = self.whole()?;
-        let values = whole.values();
-        let environment = || Environment::new(&whole, &values, self.integrator, self.step_s);
-        let points = || samples.states.iter().zip(&samples.torques);
-        let next = points().map(|(state, tau)| {
-            let mut state = state.clone();
-            environment().step(&mut state, tau, 0.0);
-            state
-        });
-        let derivative = points().map(|(state, tau)| {
-            let inputs = [state.as_slice(), tau, &[0.0], &values].concat();
-            whole.program.eval(&inputs)
-        });
-        Ok(Answers {
-            next: Some(next.collect()),
-            derivative: Some(derivative.collect()),
-            rollout: Some(self.rollout(&whole, &samples.start, &samples.held)),
-        })
-    }
-}
-
-impl Portable {
-    /// The state after each step from `start` under torques `held`; `whole` is the model as one program.
-    pub(super) fn rollout(
-        &self,
-        whole: &Dynamics,
-        start: &[f64],
-        held: &[Vec<f64>],
-    ) -> Vec<Vec<f64>> {
-        let values = whole.values();
-        let mut environment = Environment::new(whole, &values, self.integrator, self.step_s);
-        let mut state = start.to_vec();
-        let steps = held.iter().enumerate().map(|(k, tau)| {
-            environment.step(&mut state, tau, k as f64 * self.step_s);
-            state.clone()
-        });
-        steps.collect()
+        Ok(self.prediction()?.answers(samples))
     }
 }
 

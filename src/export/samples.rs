@@ -3,8 +3,8 @@ use std::f64::consts::PI;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::Portable;
 use super::answers::difference;
+use super::prediction::Prediction;
 use crate::model::Dynamics;
 
 /// Points in the space of states and torques, and a rollout. Every number is exactly an f32, so that readers in single
@@ -39,18 +39,12 @@ const NUDGE: f64 = 1e-6;
 impl Samples {
     /// Points over a whole turn (or a metre either way) and speeds as large per second, with torques that change the
     /// accelerations about as much as the state does.
-    pub(super) fn draw(model: &Portable, whole: &Dynamics, rng: &mut impl Rng) -> Self {
-        let n = model.joints();
-        let reach = |k: usize| {
-            if model.system.prismatic[k % n] {
-                1.0
-            } else {
-                PI
-            }
-        };
+    pub(super) fn draw(model: &Prediction, prismatic: &[bool], rng: &mut impl Rng) -> Self {
+        let n = prismatic.len();
+        let reach = |k: usize| if prismatic[k % n] { 1.0 } else { PI };
         let reach: Vec<f64> = (0..2 * n).map(reach).collect();
         let states = rows(POINTS, &reach, rng);
-        let torque = torque_scale(whole, &states);
+        let torque = torque_scale(&model.whole, &states);
         let steps = (ROLLOUT_S / model.step_s).ceil().max(1.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a number of steps
         let steps = steps as usize;
@@ -65,7 +59,7 @@ impl Samples {
                 .zip(&reach)
                 .map(|(x, r)| x + NUDGE * r)
                 .collect();
-            let [there, here] = [&nudged, start].map(|start| model.rollout(whole, start, &held));
+            let [there, here] = [&nudged, start].map(|start| model.rollout(start, &held));
             difference(&here, &there)
         };
         let growths = starts.iter().map(|start| growth(start));

@@ -1,12 +1,15 @@
 //! Effects with memory between a commanded torque and the torque that acts: pure filters of the command,
 //! independent of the rig's state.
 
+use serde::{Deserialize, Serialize};
+
 use super::Dynamics;
 use crate::data::Log;
 use crate::lanes::Row;
 
 /// How a command is filtered; each kind has one parameter, in s. At zero both leave the command as it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum CommandFilter {
     /// tau(t) -> tau(t - d)
     Delay,

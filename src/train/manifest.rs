@@ -167,7 +167,7 @@ impl SavedParameter {
     }
 
     /// The parameter as it was trained, with this value.
-    fn restore(&self, value: f64) -> Parameter {
+    pub(crate) fn restore(&self, value: f64) -> Parameter {
         Parameter {
             name: self.name.clone(),
             value,

@@ -30,7 +30,8 @@ pub(super) const FORMAT: Format = Format {
 
 /// The text of the header.
 pub(super) fn header(model: &Portable) -> Result<String, ExportError> {
-    model.whole()?;
+    // Networks that do not belong to the model are refused first.
+    model.prediction()?;
     let names = Names::new(model);
     let code = [
         include_str!("types.h").to_owned(),
