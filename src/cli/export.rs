@@ -51,9 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     let files = format.write(&model, &arguments.out)?;
     let measured = measure(format, &model, arguments);
-    let json = printed(format, &files, &limits, &measured);
     inputs::print(&match arguments.common.json {
-        true => serde_json::to_string_pretty(&json)? + "\n",
+        true => format!("{:#}\n", printed(format, &files, &limits, &measured)),
         false => text(format, &files, &measured),
     })?;
     if let Err(Unread::Refused(said)) = &measured {

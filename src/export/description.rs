@@ -189,7 +189,6 @@ impl Equations {
             .flat_map(|stem| (1..=model.joints()).map(move |j| format!("d({stem}{j})/dt")))
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let prefixes = [(&model.prior, "prior."), (&model.residual, "")];
         Self {
             parameters: equations.parameters.iter().map(parameter).collect(),
             effects: model.effects.clone(),
@@ -204,9 +203,7 @@ impl Equations {
             inputs: program.inputs().to_vec(),
             operations: operations(program),
             outputs: program.outputs().iter().map(|node| node.index()).collect(),
-            networks: (prefixes.into_iter())
-                .filter_map(|(network, prefix)| network.as_ref().map(|_| prefix))
-                .collect(),
+            networks: model.prefixed().map(|(prefix, _)| prefix).collect(),
         }
     }
 }

@@ -1,6 +1,6 @@
 use serde::{Serialize, Serializer};
 
-use crate::model::{CommandFilter, Integrator};
+use crate::model::CommandFilter;
 
 use super::Portable;
 
@@ -40,16 +40,12 @@ const LEAST_REST: f64 = 1e-9;
 impl HeldFilter {
     /// The filters of a model, one for each joint that has any.
     pub fn all(model: &Portable) -> Vec<Self> {
-        let parts = match model.integrator {
-            Integrator::Fine { steps } => steps.get() as usize,
-            Integrator::SemiImplicitEuler | Integrator::Rk4 => 1,
-        };
         let of_joint = |joint: usize| {
             let delay = model.filter(joint, CommandFilter::Delay);
             let lag = model.filter(joint, CommandFilter::Lag);
             (delay.is_some() || lag.is_some()).then(|| {
                 let delay = delay.unwrap_or(0.0);
-                Self::new(joint, delay, lag, model.step_s, parts)
+                Self::new(joint, delay, lag, model.step_s, model.integrator.parts())
             })
         };
         (0..model.joints()).filter_map(of_joint).collect()

@@ -2,10 +2,11 @@
 //! that a joint or a drive has there.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{CarriedEffect, ExportError, Portable};
+use super::{CarriedEffect, ExportError, File, Portable};
 use crate::expr::SignForm;
 use crate::mechanism::{Inertia, Joint, Pose, Spring, recover, rounded};
 
@@ -232,10 +233,22 @@ pub(super) fn head(model: &Portable) -> String {
     format!("<?xml version=\"1.0\"?>\n<!-- {origin} -->\n")
 }
 
-pub(super) fn refused(model: &Portable, format: &'static str, reason: String) -> ExportError {
-    ExportError::Model {
+/// The one file of a format, from what it writes of the mechanism.
+pub(super) fn file(
+    model: &Portable,
+    path: &Path,
+    format: &'static str,
+    text: fn(&Portable, &Rig) -> String,
+) -> Result<Vec<File>, ExportError> {
+    let refused = |reason| ExportError::Model {
         format,
         system: model.name().to_owned(),
         reason,
-    }
+    };
+    let rig = Rig::of(model).map_err(refused)?;
+    Ok(vec![File {
+        path: path.to_owned(),
+        bytes: text(model, &rig).into_bytes(),
+        about: "a mechanism with the same equations".to_owned(),
+    }])
 }

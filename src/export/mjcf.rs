@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::mechanism::{Drive, Link, Rig, escaped, friction_widths, head, numbers, refused};
+use super::mechanism::{Drive, Link, Rig, escaped, file, friction_widths, head, numbers};
 use super::{ExportError, File, Format, Portable, PythonClient, Reader};
 use crate::mechanism::Joint;
 use crate::model::Integrator;
@@ -41,14 +41,7 @@ fn limits(model: &Portable) -> Vec<String> {
 pub(super) const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
 
 fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
-    let rig = Rig::of(model).map_err(|reason| refused(model, "MJCF", reason))?;
-    let about = "a mechanism with the same equations".to_owned();
-    let bytes = text(model, &rig).into_bytes();
-    Ok(vec![File {
-        path: path.to_owned(),
-        bytes,
-        about,
-    }])
+    file(model, path, "MJCF", text)
 }
 
 fn text(model: &Portable, rig: &Rig) -> String {
@@ -78,15 +71,14 @@ fn text(model: &Portable, rig: &Rig) -> String {
 
 /// Gravity, and steps as the model makes them.
 pub(super) fn option(model: &Portable, rig: &Rig) -> String {
-    let (integrator, parts) = match model.integrator {
-        Integrator::SemiImplicitEuler => ("Euler", 1),
-        Integrator::Rk4 => ("RK4", 1),
-        Integrator::Fine { steps } => ("RK4", steps.get()),
+    let integrator = match model.integrator {
+        Integrator::SemiImplicitEuler => "Euler",
+        Integrator::Rk4 | Integrator::Fine { .. } => "RK4",
     };
     format!(
         "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{integrator}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
         numbers([0.0, 0.0, -rig.gravity]),
-        model.step_s / f64::from(parts)
+        model.step_s / model.integrator.parts() as f64
     )
 }
 

@@ -106,7 +106,13 @@ impl Portable {
     /// The networks in the order in which they are evaluated. Each gives n or `2n` outputs, added to the last of the
     /// rates.
     pub fn networks(&self) -> impl Iterator<Item = &MlpWeights> {
-        self.prior.iter().chain(&self.residual)
+        self.prefixed().map(|(_, network)| network)
+    }
+
+    /// The same, each with the prefix of its tensors' names.
+    pub(super) fn prefixed(&self) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
+        let prior = self.prior.iter().map(|network| ("prior.", network));
+        prior.chain(self.residual.iter().map(|network| ("", network)))
     }
 
     /// Every learnable number.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::{Rotation3, Vector3};
 
-use super::mechanism::{Link, Rig, escaped, friction_widths, head, numbers, refused};
+use super::mechanism::{Link, Rig, escaped, file, friction_widths, head, numbers};
 use super::mjcf::{DRY_FRICTION, option};
 use super::{ExportError, File, Format, Portable, PythonClient, Reader};
 use crate::mechanism::Joint;
@@ -61,14 +61,7 @@ fn limits(model: &Portable) -> Vec<String> {
 }
 
 fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
-    let rig = Rig::of(model).map_err(|reason| refused(model, "URDF", reason))?;
-    let about = "a mechanism with the same equations".to_owned();
-    let bytes = text(model, &rig).into_bytes();
-    Ok(vec![File {
-        path: path.to_owned(),
-        bytes,
-        about,
-    }])
+    file(model, path, "URDF", text)
 }
 
 fn text(model: &Portable, rig: &Rig) -> String {

@@ -25,6 +25,14 @@ pub enum Integrator {
 impl Integrator {
     /// How it is written on a command line.
     const USAGE: &str = "semi_implicit_euler, rk4, or fine:N for N substeps of rk4";
+
+    /// The equal parts of a step that are integrated one after the other.
+    pub fn parts(self) -> usize {
+        match self {
+            Self::SemiImplicitEuler | Self::Rk4 => 1,
+            Self::Fine { steps } => steps.get() as usize,
+        }
+    }
 }
 
 impl FromStr for Integrator {

@@ -103,10 +103,7 @@ fn comment(text: &str) -> String {
 
 fn sizes(model: &Portable) -> String {
     let n = model.joints();
-    let parts = match model.integrator {
-        Integrator::Fine { steps } => steps.get(),
-        Integrator::SemiImplicitEuler | Integrator::Rk4 => 1,
-    };
+    let parts = model.integrator.parts();
     format!(
         "#define MODEL_JOINTS {n}\n#define MODEL_STATES {} /* positions, then velocities */\n\
          #define MODEL_COLUMNS {} /* states and torques, which derivatives are by */\n\

@@ -35,9 +35,7 @@ impl<'m> Flow<'m> {
         inputs.push(time);
         inputs.extend_from_slice(&self.parameters);
         let mut rates = self.equations(builder, &inputs);
-        let names = [(&self.model.prior, "prior."), (&self.model.residual, "")];
-        for (network, prefix) in names {
-            let Some(network) = network else { continue };
+        for (prefix, network) in self.model.prefixed() {
             let parts = write_network(builder, network, prefix, state, torque);
             let first = rates.len() - parts.len();
             for (rate, part) in rates[first..].iter_mut().zip(&parts) {

@@ -46,8 +46,7 @@ pub fn graph(model: &Portable) -> Graph {
     };
     let next = match model.integrator {
         Integrator::SemiImplicitEuler => step.semi_implicit(&inputs, &acting[0]),
-        Integrator::Rk4 => step.rk4(&inputs.state, &acting[0], inputs.time.as_ref(), 0),
-        Integrator::Fine { .. } => {
+        Integrator::Rk4 | Integrator::Fine { .. } => {
             step.h /= acting.len() as f64;
             let mut state = inputs.state.clone();
             for (k, torque) in acting.iter().enumerate() {
@@ -65,11 +64,7 @@ pub fn graph(model: &Portable) -> Graph {
 /// output.
 fn act(builder: &mut Builder, model: &Portable, inputs: &Inputs) -> Vec<Vec<Value>> {
     let filters = HeldFilter::all(model);
-    let parts = match model.integrator {
-        Integrator::Fine { steps } => steps.get() as usize,
-        Integrator::SemiImplicitEuler | Integrator::Rk4 => 1,
-    };
-    let mut acting = vec![inputs.torque.clone(); parts];
+    let mut acting = vec![inputs.torque.clone(); model.integrator.parts()];
     let width: usize = filters.iter().map(HeldFilter::memory).sum();
     if width == 0 {
         return acting;
@@ -173,8 +168,10 @@ impl Step<'_, '_> {
         time: Option<&Value>,
         after: f64,
     ) -> Vec<Value> {
-        let after = self.builder.constant(after);
-        let time = time.map(|time| self.builder.apply("Add", &[time, &after]));
+        let time = time.map(|time| {
+            let after = self.builder.constant(after);
+            self.builder.apply("Add", &[time, &after])
+        });
         self.flow.write(self.builder, state, torque, time.as_ref())
     }
 

@@ -112,10 +112,7 @@ fn head(model: &Portable) -> String {
 }
 
 fn constants(out: &mut String, model: &Portable) {
-    let substeps = match model.integrator {
-        Integrator::Fine { steps } => steps.get(),
-        Integrator::SemiImplicitEuler | Integrator::Rk4 => 1,
-    };
+    let substeps = model.integrator.parts();
     let _ = write!(
         out,
         "\nJOINTS = {}\n# How long a torque is held, in s.\nSTEP = {}\nSUBSTEPS = {substeps}\n",
