@@ -93,11 +93,11 @@ impl Rig {
         let k = effect.joint - 1;
         let (joint, drive) = (&mut self.joints[k], &mut self.drives[k]);
         match (effect.name.as_str(), &values[..]) {
-            ("viscous_friction", [b]) => joint.damping += b,
-            ("coulomb_friction", [level]) => joint.friction += level,
-            ("rotor_inertia", [inertia]) => joint.armature += inertia,
+            ("viscous_friction", [b]) => joint.drivetrain.damping += b,
+            ("coulomb_friction", [level]) => joint.drivetrain.friction += level,
+            ("rotor_inertia", [inertia]) => joint.drivetrain.armature += inertia,
             ("joint_spring", [stiffness, rest]) => {
-                joint.spring = Some(Spring {
+                joint.drivetrain.spring = Some(Spring {
                     stiffness: *stiffness,
                     rest: *rest,
                 });

@@ -26,7 +26,11 @@ fn limits(model: &Portable) -> Vec<String> {
         return Vec::new();
     };
     let mut limits = rig.limits;
-    if rig.joints.iter().any(|joint| joint.friction > 0.0) {
+    if rig
+        .joints
+        .iter()
+        .any(|joint| joint.drivetrain.friction > 0.0)
+    {
         limits.push(DRY_FRICTION.into());
     }
     if rig.drives.iter().any(|drive| drive.lag.is_some()) {
@@ -132,12 +136,13 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
 /// What the joint has beside its axis.
 fn of_joint(joint: &Joint) -> String {
     let spring = joint
+        .drivetrain
         .spring
         .map_or([0.0, 0.0], |spring| [spring.stiffness, spring.rest]);
     attributes(&[
-        ("damping", joint.damping, 0.0),
-        ("frictionloss", joint.friction, 0.0),
-        ("armature", joint.armature, 0.0),
+        ("damping", joint.drivetrain.damping, 0.0),
+        ("frictionloss", joint.drivetrain.friction, 0.0),
+        ("armature", joint.drivetrain.armature, 0.0),
         ("stiffness", spring[0], 0.0),
         ("springref", spring[1], 0.0),
     ])

@@ -47,14 +47,18 @@ fn limits(model: &Portable) -> Vec<String> {
                 limits.push(format!("{what} of joint {number}"));
             }
         };
-        lost(joint.armature > 0.0, "the rotor's inertia");
-        lost(joint.spring.is_some(), "the spring");
+        lost(joint.drivetrain.armature > 0.0, "the rotor's inertia");
+        lost(joint.drivetrain.spring.is_some(), "the spring");
         lost(drive.lag.is_some(), "the drive's lag");
         lost(drive.constant != 0.0, "the constant torque");
         #[allow(clippy::float_cmp)] // as set
         lost(drive.gain != 1.0 || drive.gear != 1.0, "the drive's gain");
     }
-    if rig.joints.iter().any(|joint| joint.friction > 0.0) {
+    if rig
+        .joints
+        .iter()
+        .any(|joint| joint.drivetrain.friction > 0.0)
+    {
         limits.push(DRY_FRICTION.into());
     }
     limits
@@ -120,8 +124,8 @@ fn of_joint(joint: &Joint, link: &Link, parent: &str, limit: Option<f64>) -> Str
         xyz(&link.pose.origin),
         numbers([roll, pitch, yaw]),
         xyz(&link.axis),
-        joint.damping,
-        joint.friction,
+        joint.drivetrain.damping,
+        joint.drivetrain.friction,
     );
     let effort = limit.unwrap_or(NO_LIMIT);
     if joint.slides {

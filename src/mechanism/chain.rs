@@ -11,6 +11,20 @@ pub struct Spring {
     pub rest: f64,
 }
 
+/// What a joint has beside its axis and the bodies that it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Drivetrain {
+    /// N m s/rad, or N s/m.
+    pub damping: f64,
+    /// Dry friction, N m or N.
+    pub friction: f64,
+    /// Inertia of the rotor seen by the joint, kg m^2 or kg.
+    pub armature: f64,
+    pub spring: Option<Spring>,
+    /// The largest torque or force that the drive gives, N m or N.
+    pub effort: Option<f64>,
+}
+
 /// One joint of a serial chain with all that moves with it up to the next joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
@@ -30,15 +44,7 @@ pub struct Joint {
     pub axis: Vector3<f64>,
     /// In the joint's frame.
     pub inertia: Inertia,
-    /// N m s/rad, or N s/m.
-    pub damping: f64,
-    /// Dry friction, N m or N.
-    pub friction: f64,
-    /// Inertia of the rotor seen by the joint, kg m^2 or kg.
-    pub armature: f64,
-    pub spring: Option<Spring>,
-    /// The largest torque or force that the drive gives, N m or N.
-    pub effort: Option<f64>,
+    pub drivetrain: Drivetrain,
 }
 
 /// A serial mechanism: from 1 to [`MOST_JOINTS`](super::MOST_JOINTS) joints, each carrying the next.

@@ -78,7 +78,7 @@ impl Kind {
             Self::Tensor(a, b) => (inertia.tensor[(a, b)], size),
             Self::Moment(a) => (inertia.moment[a], (inertia.mass * size).sqrt()),
             Self::Mass => (inertia.mass, inertia.mass),
-            Self::Rotor => (joint.armature, joint.armature),
+            Self::Rotor => (joint.drivetrain.armature, joint.drivetrain.armature),
         };
         if value.abs() > 1e-12 * size {
             value

@@ -350,13 +350,13 @@ fn effects(chain: &Chain, rotors: &[Base]) -> String {
                 let _ = writeln!(text, "{parameter} = {value:?}");
             }
         };
-        if joint.damping > 0.0 {
-            effect("viscous_friction", &[("b", joint.damping)]);
+        if joint.drivetrain.damping > 0.0 {
+            effect("viscous_friction", &[("b", joint.drivetrain.damping)]);
         }
-        if joint.friction > 0.0 {
-            effect("coulomb_friction", &[("F_c", joint.friction)]);
+        if joint.drivetrain.friction > 0.0 {
+            effect("coulomb_friction", &[("F_c", joint.drivetrain.friction)]);
         }
-        if let Some(spring) = joint.spring {
+        if let Some(spring) = joint.drivetrain.spring {
             effect(
                 "joint_spring",
                 &[("k", spring.stiffness), ("q_0", spring.rest)],
@@ -365,7 +365,7 @@ fn effects(chain: &Chain, rotors: &[Base]) -> String {
         if let Some(rotor) = rotors.iter().find(|rotor| rotor.column.joint == k) {
             effect("rotor_inertia", &[("J", rounded(rotor.value))]);
         }
-        if let Some(effort) = joint.effort {
+        if let Some(effort) = joint.drivetrain.effort {
             effect("actuator_saturation", &[("m", effort)]);
             text += "fixed = true\n";
         }

@@ -19,7 +19,7 @@ mod tree;
 mod urdf;
 mod xml;
 
-pub use chain::{Chain, Joint, Spring};
+pub use chain::{Chain, Drivetrain, Joint, Spring};
 pub use file::model_text;
 pub use mjcf::read_mjcf;
 pub use recover::{Recovered, recover};

@@ -3,7 +3,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix3, Vector3};
 
-use super::chain::Joint;
+use super::chain::{Drivetrain, Joint};
 use super::series::Series;
 use super::spatial::{turn, with_z_along};
 use super::{Inertia, Pose};
@@ -58,7 +58,7 @@ pub fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, Str
         if *damping < -ROUNDING * largest {
             return Err(format!("{} is driven by its own speed", joint.name));
         }
-        joint.damping = if *damping > ROUNDING * largest {
+        joint.drivetrain.damping = if *damping > ROUNDING * largest {
             *damping
         } else {
             0.0
@@ -371,7 +371,7 @@ fn arm(found: &[f64], gravity: f64) -> Result<Links, String> {
         return Err("the second joint has less inertia for itself than for the first".into());
     }
     let mut outer = joint(2, elbow, link(second, moment_2, mass_2)?);
-    outer.armature = if rotor > ROUNDING * second {
+    outer.drivetrain.armature = if rotor > ROUNDING * second {
         rotor
     } else {
         0.0
@@ -503,11 +503,7 @@ fn plain(number: usize, axis: Vector3<f64>, origin: Vector3<f64>, inertia: Inert
         across: rotation.column(0).into(),
         axis,
         inertia,
-        damping: 0.0,
-        friction: 0.0,
-        armature: 0.0,
-        spring: None,
-        effort: None,
+        drivetrain: Drivetrain::default(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::chain::{Joint, Spring};
+use super::chain::{Drivetrain, Joint};
 use super::equations::without_inertia;
 use super::spatial::{fault, with_z_along};
 use super::xml::Source;
@@ -21,11 +21,7 @@ pub(super) struct Hinge {
     /// A point of the axis, m.
     pub anchor: Vector3<f64>,
     pub reference: f64,
-    pub damping: f64,
-    pub friction: f64,
-    pub armature: f64,
-    pub spring: Option<Spring>,
-    pub effort: Option<f64>,
+    pub drivetrain: Drivetrain,
 }
 
 /// A body with everything that it carries.
@@ -141,11 +137,7 @@ fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Joint {
         across: with_z_along(hinge.axis).column(0).into(),
         axis: hinge.axis,
         inertia: Inertia::none(),
-        damping: hinge.damping,
-        friction: hinge.friction,
-        armature: hinge.armature,
-        spring: hinge.spring,
-        effort: hinge.effort,
+        drivetrain: hinge.drivetrain,
     }
 }
 

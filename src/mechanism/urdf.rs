@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
-use super::chain::Chain;
+use super::chain::{Chain, Drivetrain};
 use super::spatial::turn;
 use super::tree::{self, Body, Hinge};
 use super::xml::{self, Source, named};
@@ -191,11 +191,12 @@ impl<'s, 'x> Robot<'s, 'x> {
             Some(axis) => source.direction(axis, "xyz", Vector3::x())?,
             None => Vector3::x(),
         };
-        let (mut damping, mut friction) = (0.0, 0.0);
+        let mut drivetrain = Drivetrain::default();
         if let Some(dynamics) = named(joint, "dynamics").next() {
-            damping = source.not_negative(dynamics, "damping")?;
-            friction = source.not_negative(dynamics, "friction")?;
+            drivetrain.damping = source.not_negative(dynamics, "damping")?;
+            drivetrain.friction = source.not_negative(dynamics, "friction")?;
         }
+        drivetrain.effort = self.effort(joint)?;
         Ok(Some(Hinge {
             name: name.to_owned(),
             at: joint.range().start,
@@ -203,11 +204,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             axis,
             anchor: Vector3::zeros(),
             reference: 0.0,
-            damping,
-            friction,
-            armature: 0.0,
-            spring: None,
-            effort: self.effort(joint)?,
+            drivetrain,
         }))
     }
 

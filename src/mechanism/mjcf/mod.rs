@@ -11,7 +11,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
-use super::chain::{Chain, Spring};
+use super::chain::{Chain, Drivetrain, Spring};
 use super::tree::{self, Body, Hinge};
 use super::xml::{self, Source, elements, named};
 use super::{Inertia, Pose};
@@ -276,11 +276,13 @@ impl<'s, 'x> Reader<'s, 'x> {
             axis: joint.direction("axis", Vector3::z())?,
             anchor: joint.vector("pos")?,
             reference: position("ref")?,
-            damping: linear(joint, "damping")?,
-            friction: joint.not_negative("frictionloss")?,
-            armature: joint.not_negative("armature")?,
-            spring: (stiffness > 0.0).then_some(Spring { stiffness, rest }),
-            effort: self.effort(joint, &name)?,
+            drivetrain: Drivetrain {
+                damping: linear(joint, "damping")?,
+                friction: joint.not_negative("frictionloss")?,
+                armature: joint.not_negative("armature")?,
+                spring: (stiffness > 0.0).then_some(Spring { stiffness, rest }),
+                effort: self.effort(joint, &name)?,
+            },
             name,
         })
     }
