@@ -9,7 +9,7 @@ fmt:
 
 # Lints, as errors
 lint:
-    cargo clippy --release --all-targets -- -D warnings
+    cargo clippy --release --workspace --all-targets -- -D warnings
 
 # All tests; arguments go to cargo test
 test *arguments:
@@ -17,7 +17,7 @@ test *arguments:
 
 # The library's documentation
 doc:
-    RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps
+    RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps
 
 # Licences, advisories, bans and sources of the dependencies
 deny:

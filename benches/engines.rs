@@ -118,7 +118,7 @@ fn train(c: &mut Criterion) {
         for count in [500, 2000, 5000] {
             let equations = task.equations();
             let segments = transitions(equations.joints, count);
-            let model = HybridModel::physics(&equations, &Backend::Flex.device())
+            let model = HybridModel::physics(&equations, &Backend::NdArray.device())
                 .and_then(|model| model.with_residual(&task.network()))
                 .expect("a model of this system");
             let settings = FitSettings {
@@ -231,7 +231,7 @@ fn lanes(arch: Arch) -> usize {
 /// The logs of `residyn closeloop` without arguments, from declared model to named effect.
 fn identify(c: &mut Criterion) {
     let library = Library::built_in();
-    let demo = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml"));
+    let demo = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs/demo.toml"));
     let rig = Plant::read(demo, &library).expect("the demo's rig");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));

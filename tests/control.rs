@@ -156,9 +156,9 @@ fn trained_again(recipe: &str) -> (f64, tempfile::TempDir) {
 /// What a checkpoint errs on the same data.
 fn error_of(checkpoint: &Checkpoint, recipe: &str) -> f64 {
     let recipe = Recipe::read(&configs().join(recipe)).unwrap();
-    let job = Job::train(recipe, &Library::built_in(), Backend::Flex, 0).unwrap();
+    let job = Job::train(recipe, &Library::built_in(), Backend::NdArray, 0).unwrap();
     let training = checkpoint
-        .training(&job_dynamics(&job), &Backend::Flex.device())
+        .training(&job_dynamics(&job), &Backend::NdArray.device())
         .unwrap();
     let outcome = job.outcome(&training, Path::new("shipped")).unwrap();
     outcome.test_error.unwrap().after
@@ -247,7 +247,7 @@ fn every_experiment_is_sound() {
             let config = Config::read(&entry.unwrap().path()).unwrap();
             assert!(config.seeds >= 10, "{}", config.path.display());
             assert!(
-                Session::open(config, &library, Backend::Flex)
+                Session::open(config, &library, Backend::NdArray)
                     .unwrap()
                     .rounds()
                     > 0

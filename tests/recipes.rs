@@ -20,7 +20,7 @@ fn every_recipe_and_plant_is_sound() {
                 Plant::read(&path, &library).unwrap();
             } else if name.starts_with("train-") {
                 let recipe = Recipe::read(&path).unwrap();
-                Job::train(recipe, &library, Backend::Flex, 0)
+                Job::train(recipe, &library, Backend::NdArray, 0)
                     .map(drop)
                     .unwrap();
             } else if name.starts_with("tune-") {

@@ -32,7 +32,7 @@ fn seeds_give_models_of_their_own_whichever_are_trained_together() {
     assert_eq!(numbers(&found, "seed"), [3.0, 4.0, 5.0, 6.0, 7.0]);
     assert_eq!(found["totals"]["models"], 5);
     assert_eq!(found["totals"]["diverged"], 0);
-    assert_eq!(found["config"]["device"], "flex");
+    assert_eq!(found["config"]["device"], "ndarray");
     let errors = numbers(&found, "error");
     for (error, alone) in errors.iter().zip(numbers(&parted, "error")) {
         assert!((error - alone).abs() <= 1e-2 * alone, "{error} {alone}");

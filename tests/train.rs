@@ -269,9 +269,9 @@ fn the_published_settings_find_the_pendulum() {
         let outcome = train(recipe("train-pendulum.toml"), *backend);
         assert!(worst(&outcome) < 0.01, "{backend}: {outcome:?}");
     }
-    let outcome = train(recipe("train-pendulum-adaptive.toml"), Backend::Flex);
+    let outcome = train(recipe("train-pendulum-adaptive.toml"), Backend::NdArray);
     assert!(worst(&outcome) < 0.01, "{outcome:?}");
-    let outcome = train(recipe("train-pendulum-data-driven.toml"), Backend::Flex);
+    let outcome = train(recipe("train-pendulum-data-driven.toml"), Backend::NdArray);
     assert!(
         outcome.test_error.unwrap().after < 1e-3 * outcome.error.before,
         "{outcome:?}"
@@ -296,7 +296,7 @@ fn only_the_penalty_makes_the_split_unique() {
     let with = |alpha| {
         let mut recipe = recipe("train-pendulum.toml");
         recipe.fit.penalty = Penalty::Fixed { alpha };
-        train(recipe, Backend::Flex)
+        train(recipe, Backend::NdArray)
     };
     assert!(worst(&with(0.0)) > 0.01);
     let (right, strong) = (with(1e-4), with(1e-2));
@@ -307,7 +307,7 @@ fn only_the_penalty_makes_the_split_unique() {
 
 #[test]
 fn the_acrobot_is_found() {
-    let outcome = train(recipe("train-acrobot.toml"), Backend::Flex);
+    let outcome = train(recipe("train-acrobot.toml"), Backend::NdArray);
     assert!(worst(&outcome) < 0.01, "{outcome:?}");
     assert!(
         outcome.test_error.unwrap().after < 1e-3 * outcome.error.before,

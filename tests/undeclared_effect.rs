@@ -11,7 +11,7 @@ use crate::train::configs;
 
 fn lab(path: &Path) -> Lab {
     let experiment = Experiment::read(path).unwrap();
-    Lab::new(experiment, Library::built_in(), Backend::Flex).unwrap()
+    Lab::new(experiment, Library::built_in(), Backend::NdArray).unwrap()
 }
 
 fn smoke() -> PathBuf {
@@ -75,7 +75,7 @@ fn bad_experiments_are_refused_with_their_remedy() {
         assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
         let read = Experiment::read(&path);
-        let lab = read.and_then(|e| Lab::new(e, Library::built_in(), Backend::Flex));
+        let lab = read.and_then(|e| Lab::new(e, Library::built_in(), Backend::NdArray));
         lab.err().unwrap().to_string()
     };
     let cases = [

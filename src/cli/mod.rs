@@ -66,7 +66,7 @@ pub(crate) struct Common {
     /// Seed of everything random; the same seed gives the same result on the same machine
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// What carries out tensor operations: flex or ndarray
+    /// What carries out tensor operations: ndarray, or cuda where the build has it
     #[arg(long, default_value_t)]
     device: Backend,
 }

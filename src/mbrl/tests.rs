@@ -52,7 +52,7 @@ fn setting() -> Setting {
         prior: Prior::Equations(Box::new(dynamics.clone())),
         network,
         fit,
-        backend: Backend::Flex,
+        backend: Backend::NdArray,
     };
     Setting {
         task,

@@ -174,7 +174,7 @@ mod tests {
     fn steps_are_those_of_training() {
         let system = Library::built_in().system(Path::new("acrobot")).unwrap();
         let dynamics = system.dynamics(&[SignForm::DEFAULT; 2]);
-        let device = Backend::Flex.device();
+        let device = Backend::NdArray.device();
         let model = HybridModel::physics(&dynamics, &device).unwrap();
         let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);
         let (start, tau) = ([0.5, -1.0, 2.0, -3.0], [1.0, -2.0]);

@@ -83,7 +83,7 @@ mod tests {
         for name in ["train-acrobot.toml", "train-pendulum-offline.toml"] {
             let job = |seed| {
                 let recipe = Recipe::read(&smoke.join(name)).unwrap();
-                Job::train(recipe, &Library::built_in(), Backend::Flex, seed).unwrap()
+                Job::train(recipe, &Library::built_in(), Backend::NdArray, seed).unwrap()
             };
             let (first, own) = (job(4), job(5));
             let network = |job: &Job| job.model.frame().networks.last().unwrap().clone();

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::{Blocks, TrainError};
+use super::{Backend, Blocks, TrainError};
 use crate::model::{Angles, Frame, InputScaling};
 
 /// Why rows of numbers are no segments.
@@ -233,7 +233,7 @@ impl Segments {
 
     /// The chosen segments for losses on a device.
     pub fn batch(&self, chosen: &[usize], device: &Device) -> Batch {
-        if *device == Device::flex() {
+        if *device == Backend::NdArray.device() {
             Batch::Blocks(Arc::new(self.blocks(chosen)))
         } else {
             Batch::Columns(self.columns(chosen, device))
@@ -315,7 +315,7 @@ mod tests {
             .push_trajectory(&time, &states, &[10.0, 11.0, 12.0, 13.0], 1)
             .unwrap();
         assert_eq!(segments.len(), 2);
-        let batch = segments.columns(&[0, 1], &Backend::Flex.device());
+        let batch = segments.columns(&[0, 1], &Backend::NdArray.device());
         let numbers = |t: &burn::tensor::Tensor<1>| t.to_data().iter::<f32>().collect::<Vec<_>>();
         assert_eq!(numbers(&batch.states[0][1]), [1.0, 3.0]);
         assert_eq!(numbers(&batch.states[2][0]), [4.0, 6.0]);

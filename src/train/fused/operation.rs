@@ -1,11 +1,14 @@
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex};
 
+#[allow(deprecated)] // see `train::Backend`
+use burn::backend::NdArray;
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::flex::FlexTensor;
+use burn::backend::ndarray::NdArrayTensor;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, Flex, backend_extension};
+use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 
 use super::plan::{KEPT, Plan};
@@ -40,7 +43,7 @@ pub(in crate::train) fn loss(
 }
 
 /// The operation as backends know it.
-#[backend_extension(Flex, Autodiff)]
+#[backend_extension(NdArray, Autodiff)]
 pub(super) trait LossOperation: Backend {
     fn fused_loss(
         prior: FloatTensor<Self>,
@@ -50,18 +53,18 @@ pub(super) trait LossOperation: Backend {
     ) -> FloatTensor<Self>;
 }
 
-impl LossOperation for Flex {
+impl LossOperation for NdArray {
     fn fused_loss(
-        prior: FlexTensor,
-        residual: FlexTensor,
+        prior: NdArrayTensor,
+        residual: NdArrayTensor,
         plan: Arc<Plan>,
         crew: Arc<Crew>,
-    ) -> FlexTensor {
+    ) -> NdArrayTensor {
         vector(taken(&prior, &residual, plan, crew).loss.to_vec())
     }
 }
 
-impl<C: CheckpointStrategy> LossOperation for Autodiff<Flex, C> {
+impl<C: CheckpointStrategy> LossOperation for Autodiff<NdArray, C> {
     fn fused_loss(
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
@@ -81,7 +84,7 @@ impl<C: CheckpointStrategy> LossOperation for Autodiff<Flex, C> {
 #[derive(Debug)]
 struct LossBackward;
 
-impl Backward<Flex, 2> for LossBackward {
+impl Backward<NdArray, 2> for LossBackward {
     // Burn asks for a state that can be cloned; it is used once.
     type State = Arc<Mutex<Work>>;
 
@@ -91,29 +94,41 @@ impl Backward<Flex, 2> for LossBackward {
         gradients: &mut Gradients,
         _checkpointer: &mut Checkpointer,
     ) {
-        let by_loss = gradients.consume::<Flex>(&ops.node);
-        let by_loss = numbers(&by_loss.to_contiguous()).try_into();
+        let by_loss = gradients.consume::<NdArray>(&ops.node);
+        let by_loss = (*numbers(&by_loss)).try_into();
         let by_loss = by_loss.expect("the loss is of two numbers");
         let work = ops.state.lock().expect("no other thread uses it");
         for (parent, slopes) in ops.parents.into_iter().zip(work.derivative(by_loss)) {
             // An input without numbers has no gradient.
             if let Some(parent) = parent.filter(|_| !slopes.is_empty()) {
-                gradients.register::<Flex>(parent.id, vector(slopes));
+                gradients.register::<NdArray>(parent.id, vector(slopes));
             }
         }
     }
 }
 
-fn taken(prior: &FlexTensor, residual: &FlexTensor, plan: Arc<Plan>, crew: Arc<Crew>) -> Work {
-    let (prior, residual) = (prior.to_contiguous(), residual.to_contiguous());
-    Work::new(plan, crew, numbers(&prior), numbers(&residual))
+fn taken(
+    prior: &NdArrayTensor,
+    residual: &NdArrayTensor,
+    plan: Arc<Plan>,
+    crew: Arc<Crew>,
+) -> Work {
+    Work::new(plan, crew, &numbers(prior), &numbers(residual))
 }
 
-fn numbers(tensor: &FlexTensor) -> &[f32] {
-    tensor.as_slice().expect("numbers are f32 and in one piece")
+/// The numbers of a tensor of any layout, in order.
+fn numbers(tensor: &NdArrayTensor) -> Cow<'_, [f32]> {
+    let NdArrayTensor::F32(storage) = tensor else {
+        unreachable!("models are f32")
+    };
+    let view = storage.view();
+    match view.to_slice() {
+        Some(numbers) => Cow::Borrowed(numbers),
+        None => Cow::Owned(view.iter().copied().collect()),
+    }
 }
 
-fn vector(numbers: Vec<f32>) -> FlexTensor {
+fn vector(numbers: Vec<f32>) -> NdArrayTensor {
     let shape = [numbers.len()];
-    FlexTensor::from_data(TensorData::new(numbers, shape))
+    NdArrayTensor::from_data(TensorData::new(numbers, shape))
 }

@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn what_is_not_kept_is_worked_out_again_to_the_last_bit() {
         let segments = transitions(1000, -0.5, 1);
-        let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Random);
+        let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Random);
         let Batch::Blocks(blocks) = segments.all(&model.device()) else {
             panic!("the processor's own backend takes blocks");
         };

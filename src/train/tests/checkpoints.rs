@@ -16,7 +16,7 @@ fn origin() -> Origin {
 
 fn trained(c_g: f64) -> Training {
     let segments = transitions(20, 0.0, 1);
-    let model = hybrid((c_g, 2.0), &segments, Backend::Flex, LastLayer::Random);
+    let model = hybrid((c_g, 2.0), &segments, Backend::NdArray, LastLayer::Random);
     let settings = FitSettings {
         epochs: 3,
         ..FitSettings::default()
@@ -66,7 +66,7 @@ fn the_prior_of_a_network_is_saved_too() {
         let scaling = segments.scaling(settings.angles);
         MlpWeights::new(1, &settings, scaling, LastLayer::Random, &mut rng(seed))
     };
-    let model = HybridModel::network("pendulum", 1, &new(1), &Backend::Flex.device())
+    let model = HybridModel::network("pendulum", 1, &new(1), &Backend::NdArray.device())
         .and_then(|model| model.with_residual(&new(2)))
         .unwrap();
     let training = Training::new(model, FitSettings::default(), rng(3)).unwrap();
@@ -75,7 +75,7 @@ fn the_prior_of_a_network_is_saved_too() {
     save(&dir, &training, &origin()).unwrap();
     let checkpoint = Checkpoint::load(&dir).unwrap();
     let restored = checkpoint
-        .training(&pendulum(8.0, 2.0), &Backend::Flex.device())
+        .training(&pendulum(8.0, 2.0), &Backend::NdArray.device())
         .unwrap();
     assert_eq!(restored.model().weights(), training.model().weights());
 }
@@ -185,7 +185,7 @@ fn a_checkpoint_of_another_model_is_refused() {
     let (_parent, dir) = saved();
     let checkpoint = Checkpoint::load(&dir).unwrap();
     let refused = |dynamics| {
-        let model = checkpoint.model(&dynamics, &Backend::Flex.device());
+        let model = checkpoint.model(&dynamics, &Backend::NdArray.device());
         let text = model.unwrap_err().to_string();
         text.split("; use").next().unwrap().to_owned()
     };

@@ -13,7 +13,7 @@ use crate::model::{
     Angles, Dynamics, HybridModel, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
     PRIOR_ID, RESIDUAL_ID, ResidualOn,
 };
-use crate::train::{Backend, Batch, FitSettings, Objective, Segments, Training};
+use crate::train::{Backend, Batch, FitSettings, Objective, Segments, Start, Sweep, Training};
 
 const INTEGRATORS: [Integrator; 3] = [
     Integrator::SemiImplicitEuler,
@@ -142,7 +142,7 @@ fn the_fused_loss_is_the_composed_one_for_every_model_and_integrator() {
     for joints in [1, 2] {
         for steps in [1, 3] {
             let segments = segments(joints, 37, steps);
-            for model in models(joints, &Backend::Flex.device()) {
+            for model in models(joints, &Backend::NdArray.device()) {
                 for integrator in INTEGRATORS {
                     assert_agrees(&model, &segments, integrator);
                 }
@@ -155,7 +155,7 @@ fn the_fused_loss_is_the_composed_one_for_every_model_and_integrator() {
 fn batches_of_any_size_agree() {
     for size in [1, 31, 32, 33, 128, 257, 1000] {
         let segments = transitions(size, -0.5, 1);
-        let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Random);
+        let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Random);
         assert_agrees(&model, &segments, Integrator::default());
     }
 }
@@ -163,7 +163,7 @@ fn batches_of_any_size_agree() {
 #[test]
 fn checkpointing_of_gradients_changes_nothing() {
     let segments = segments(1, 40, 2);
-    for model in models(1, &Backend::Flex.device().gradient_checkpointing()) {
+    for model in models(1, &Backend::NdArray.device().gradient_checkpointing()) {
         assert_agrees(&model, &segments, Integrator::Rk4);
     }
 }
@@ -173,7 +173,7 @@ fn equations_without_parameters_can_have_a_residual() {
     let segments = segments(1, 40, 2);
     let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
-    let model = HybridModel::physics(&dynamics, &Backend::Flex.device())
+    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device())
         .and_then(|model| model.with_residual(&residual))
         .unwrap();
     assert_agrees(&model, &segments, Integrator::Rk4);
@@ -182,7 +182,7 @@ fn equations_without_parameters_can_have_a_residual() {
 #[test]
 fn a_frozen_input_leaves_the_others_gradient_as_it_is() {
     let segments = segments(1, 40, 2);
-    let device = Backend::Flex.device();
+    let device = Backend::NdArray.device();
     let batch = segments.all(&device);
     let objective = Objective::new(Integrator::Rk4, None, 1).unwrap();
     let gradients = |model: &HybridModel| {
@@ -210,7 +210,7 @@ fn what_is_not_finite_stays_so() {
     let segments = segments(1, 40, 3);
     let dynamics = one_joint("C * exp(1000 * q1 * q1)", vec![parameter("C", 3.0)]);
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
-    let model = HybridModel::physics(&dynamics, &Backend::Flex.device()).unwrap();
+    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device()).unwrap();
     let objective = Objective::new(Integrator::Rk4, None, 1).unwrap();
     let batch = segments.all(&model.device());
     for model in [model.clone(), model.with_residual(&residual).unwrap()] {
@@ -223,7 +223,7 @@ fn what_is_not_finite_stays_so() {
 fn the_same_run_twice_has_the_same_bits() {
     let segments = transitions(777, -0.5, 1);
     let run = || {
-        let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Random);
+        let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Random);
         let settings = FitSettings {
             epochs: 50,
             ..FitSettings::default()
@@ -243,18 +243,24 @@ fn the_same_run_twice_has_the_same_bits() {
 #[test]
 fn a_run_by_either_way_reaches_the_same_error() {
     let segments = transitions(500, -0.5, 1);
-    let [fused, composed] = [Backend::Flex, Backend::NdArray].map(|backend| {
-        let model = hybrid((8.0, 2.0), &segments, backend, LastLayer::Zero);
-        let settings = FitSettings {
-            epochs: 300,
-            ..FitSettings::default()
-        };
-        let mut training = Training::new(model, settings, rng(3)).unwrap();
-        training
-            .run(&segments, None, &mut |_| ControlFlow::Continue(()))
-            .unwrap();
-        training.history().last().unwrap().clone()
-    });
+    let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Zero);
+    let settings = FitSettings {
+        epochs: 300,
+        ..FitSettings::default()
+    };
+    let start = Start {
+        network: model.weights().residual.unwrap(),
+        penalty_weight: settings.penalty.initial(),
+        order: rng(3),
+    };
+    // A sweep composes its loss of Burn's operations.
+    let mut sweep = Sweep::new(&model, settings.clone(), vec![start]).unwrap();
+    let composed = sweep.run(&segments, &mut |_| ()).unwrap().remove(0);
+    let mut training = Training::new(model, settings, rng(3)).unwrap();
+    training
+        .run(&segments, None, &mut |_| ControlFlow::Continue(()))
+        .unwrap();
+    let fused = training.history().last().unwrap();
     // Rounding grows over 300 steps of Adam to some 1e-3.
     assert!(
         (fused.error / composed.error - 1.0).abs() < 0.02,

@@ -92,7 +92,7 @@ fn gradients_match_central_differences() {
 #[test]
 fn a_residual_of_zero_has_a_finite_gradient() {
     let segments = transitions(20, -0.5, 1);
-    let model = hybrid((15.0, 3.0), &segments, Backend::Flex, LastLayer::Zero);
+    let model = hybrid((15.0, 3.0), &segments, Backend::NdArray, LastLayer::Zero);
     let gradients = total(&model, &segments, Integrator::default()).backward();
     let [_, residual] = model.tensors();
     let all = residual.unwrap().grad(&gradients).unwrap().into_data();

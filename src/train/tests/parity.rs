@@ -132,7 +132,7 @@ fn two_joints_agree_too() {
         };
         let scaling = InputScaling::identity(8);
         let mlp = MlpWeights::new(2, &settings, scaling, LastLayer::Random, &mut rng);
-        let device = Backend::Flex.device();
+        let device = Backend::NdArray.device();
         let model = HybridModel::physics(&acrobot, &device)
             .and_then(|model| model.with_residual(&mlp))
             .unwrap();
@@ -185,7 +185,7 @@ fn a_new_residual_changes_nothing_to_the_last_bit() {
 #[test]
 fn networks_of_another_shape_are_refused() {
     let mlp = &networks()[0];
-    let device = Backend::Flex.device();
+    let device = Backend::NdArray.device();
     let message = HybridModel::network("arm", 2, mlp, &device)
         .unwrap_err()
         .to_string();
@@ -197,7 +197,7 @@ fn networks_of_another_shape_are_refused() {
     );
     let mut dynamics = pendulum(15.0, 3.0);
     dynamics.parameters[1].scale = 0.0;
-    let error = HybridModel::physics(&dynamics, &Backend::Flex.device()).unwrap_err();
+    let error = HybridModel::physics(&dynamics, &Backend::NdArray.device()).unwrap_err();
     assert!(
         error
             .to_string()

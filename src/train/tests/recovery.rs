@@ -37,7 +37,7 @@ fn the_penalty_splits_physics_from_friction() {
 #[test]
 fn the_adaptive_penalty_reaches_the_same_split() {
     let segments = transitions(500, -0.5, 1);
-    let model = hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Zero);
+    let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Zero);
     let settings = FitSettings {
         penalty: Penalty::Adaptive {
             initial: 1e3,
@@ -58,7 +58,7 @@ fn fixed_parameters_and_frozen_parts_do_not_move_and_bounds_hold() {
     let mut dynamics = super::pendulum(8.0, 2.0);
     dynamics.parameters[0].fixed = true;
     dynamics.parameters[1].bounds = [0.0, 2.5];
-    let device = Backend::Flex.device();
+    let device = Backend::NdArray.device();
     let scaling = segments.scaling(crate::model::Angles::Raw);
     let settings = MlpSettings::for_joints(1);
     let mlp = MlpWeights::new(1, &settings, scaling, LastLayer::Random, &mut rng(7));
@@ -85,7 +85,7 @@ fn a_network_learns_the_whole_and_then_serves_as_prior() {
     let settings = MlpSettings::for_joints(1);
     let scaling = || segments.scaling(settings.angles);
     let new = |last| MlpWeights::new(1, &settings, scaling(), last, &mut rng(7));
-    let device = Backend::Flex.device();
+    let device = Backend::NdArray.device();
     let model = HybridModel::network("pendulum", 1, &new(LastLayer::Random), &device).unwrap();
     let short = FitSettings {
         epochs: 300,
@@ -106,7 +106,7 @@ fn a_network_learns_the_whole_and_then_serves_as_prior() {
 fn the_best_by_validation_is_kept_and_may_be_the_start() {
     let segments = transitions(100, 0.0, 1);
     let spoiled = transitions(100, -3.0, 2);
-    let model = hybrid((15.0, 3.0), &segments, Backend::Flex, LastLayer::Zero);
+    let model = hybrid((15.0, 3.0), &segments, Backend::NdArray, LastLayer::Zero);
     let start = model.weights();
     let settings = FitSettings {
         epochs: 20,
@@ -134,7 +134,7 @@ fn a_diverging_loss_stops_with_place_and_remedy() {
         "C_g * exp(C_i * exp(abs(qd1) * 100))",
         vec![super::parameter("C_g", 8.0), super::parameter("C_i", 2.0)],
     );
-    let model = HybridModel::physics(&dynamics, &Backend::Flex.device()).unwrap();
+    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device()).unwrap();
     let mut training = Training::new(model, FitSettings::default(), rng(3)).unwrap();
     let error = training.run(&segments, None, &mut |_| ControlFlow::Continue(()));
     assert_eq!(
@@ -147,7 +147,7 @@ fn a_diverging_loss_stops_with_place_and_remedy() {
 #[test]
 fn data_and_settings_that_do_not_fit_are_refused() {
     let segments = transitions(5, 0.0, 1);
-    let model = || hybrid((8.0, 2.0), &segments, Backend::Flex, LastLayer::Zero);
+    let model = || hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Zero);
     let mut training = Training::new(model(), FitSettings::default(), rng(3)).unwrap();
     let mut run = |segments: &Segments| {
         let ended = training.run(segments, None, &mut |_| ControlFlow::Continue(()));

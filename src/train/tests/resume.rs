@@ -81,9 +81,3 @@ fn a_resumed_run_equals_an_uninterrupted_one_bit_for_bit() {
         assert_eq!(whole.history().len(), 7);
     }
 }
-
-#[test]
-fn backends_begin_with_the_same_numbers() {
-    let [flex, ndarray] = [Backend::Flex, Backend::NdArray].map(training);
-    assert_eq!(flex.model().weights(), ndarray.model().weights());
-}

@@ -29,7 +29,7 @@ fn settings(epochs: usize) -> FitSettings {
 #[test]
 fn weights_shrink_by_their_share_of_the_rate_and_parameters_do_not() {
     let segments = transitions(20, -0.5, 1);
-    let model = hybrid((14.0, 3.5), &segments, Backend::Flex, LastLayer::Random);
+    let model = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random);
     let decaying = FitSettings {
         weight_decay: 2.0,
         ..settings(1)
@@ -50,8 +50,8 @@ fn weights_shrink_by_their_share_of_the_rate_and_parameters_do_not() {
 #[test]
 fn a_prior_below_a_residual_does_not_shrink() {
     let segments = transitions(20, -0.5, 1);
-    let device = Backend::Flex.device();
-    let network: MlpWeights = hybrid((14.0, 3.5), &segments, Backend::Flex, LastLayer::Random)
+    let device = Backend::NdArray.device();
+    let network: MlpWeights = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random)
         .weights()
         .residual
         .unwrap();
@@ -94,7 +94,7 @@ fn a_prior_below_a_residual_does_not_shrink() {
 #[test]
 fn rates_fall_from_the_whole_to_the_share() {
     let segments = transitions(20, -0.5, 1);
-    let model = hybrid((14.0, 3.5), &segments, Backend::Flex, LastLayer::Random);
+    let model = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random);
     let falling = FitSettings {
         anneal: 1e-9,
         ..settings(2)

@@ -12,7 +12,7 @@ use crate::train::{
     Training,
 };
 
-const BACKENDS: [Backend; 2] = [Backend::Flex, Backend::NdArray];
+const BACKENDS: &[Backend] = Backend::ALL;
 
 fn settings() -> FitSettings {
     FitSettings {
@@ -136,7 +136,7 @@ fn bounded(backend: Backend) -> (HybridModel, Segments) {
     (model, transitions(50, -0.5, 1))
 }
 
-/// On ndarray, where a run of one model is carried out by the composed loss as well.
+/// A run of one model is carried out by the fused loss, a sweep by the composed one.
 #[test]
 fn minibatches_penalties_and_bounds_are_those_of_a_run_alone() {
     let (model, segments) = bounded(Backend::NdArray);
@@ -206,7 +206,7 @@ fn a_model_that_diverges_leaves_the_others_as_they_are() {
 
 #[test]
 fn segments_of_other_joints_are_refused() {
-    let (model, _) = bounded(Backend::Flex);
+    let (model, _) = bounded(Backend::NdArray);
     let starts = starts(&model, LastLayer::Zero);
     let mut sweep = Sweep::new(&model, settings(), starts).unwrap();
     let message = sweep.run(&segments(2, 5, 1), &mut |_| ()).unwrap_err();
