@@ -7,7 +7,8 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 
 use super::{Answer, Common, inputs, progress, told};
-use crate::bench::{Cell, Line, Source, hash, markdown, read, recorded, summarise};
+use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
+use crate::files::{content_id, write_whole};
 use crate::model::Library;
 
 /// Measure the program itself on simulated rigs
@@ -69,8 +70,8 @@ fn effects(arguments: &Effects) -> Result<Answer> {
     let summary = summarise(&lines);
     let text = markdown(&summary);
     let json = serde_json::to_string_pretty(&summary)? + "\n";
-    write(&arguments.out.join("summary.json"), &json)?;
-    write(&arguments.out.join("table.md"), &text)?;
+    write_whole(&arguments.out.join("summary.json"), json.as_bytes())?;
+    write_whole(&arguments.out.join("table.md"), text.as_bytes())?;
     inputs::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }
@@ -109,7 +110,7 @@ impl Store {
         }
         Ok(Self {
             path,
-            program: format!("{:016x}", hash(&program)),
+            program: content_id(&program),
             known,
         })
     }
@@ -175,9 +176,5 @@ fn configuration(cell: &Cell) -> Result<String> {
             bytes.extend(fs::read(log).with_context(|| log.display().to_string())?);
         }
     }
-    Ok(format!("{:016x}", hash(&bytes)))
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
+    Ok(content_id(&bytes))
 }

@@ -10,6 +10,7 @@ use clap::Args;
 
 use super::{Answer, Common, inputs, progress};
 use crate::recipe::Job;
+use crate::runs::RunFolder;
 use crate::train::{Progress, Training, save};
 
 /// Where and how often to save.
@@ -39,11 +40,11 @@ impl Saving {
 
 /// Run `job` to its end and print the outcome.
 pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common) -> Result<Answer> {
-    inputs::check_writable(dir)?;
+    let folder = RunFolder::open(dir)?;
     for note in &job.material.notes {
         eprintln!("note: {note}");
     }
-    let mut training = job.begin(dir)?;
+    let mut training = job.begin(&folder)?;
     if training.epoch() > 0 {
         eprintln!(
             "note: {} goes on from epoch {}",

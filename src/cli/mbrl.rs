@@ -9,8 +9,9 @@ use serde_json::json;
 use super::experiment::message;
 use super::{Answer, Common, inputs, progress};
 use crate::experiment::{Config, Session, Step};
-use crate::mbrl::{Folder, Round};
+use crate::mbrl::Round;
 use crate::report::EventFile;
+use crate::runs::RunFolder;
 
 /// Model-based reinforcement learning: train, control, add what was seen, and again
 ///
@@ -48,9 +49,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         effects,
         common,
     } = arguments;
-    inputs::check_writable(out)?;
+    let folder = RunFolder::open(out)?;
     let library = effects.library()?;
-    let session = Session::open(Config::read(config)?, &library, common.device)?;
+    let session = Session::open(Config::read(config)?, &library, common.device, common.seed)?;
     let events = match tensorboard {
         Some(folder) => Some(Mutex::new(EventFile::create(folder, now_s())?)),
         None => None,
@@ -58,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let rounds = Mutex::new(Vec::new());
     let failed = Mutex::new(None);
     let bar = progress::bar(session.rounds_of(method));
-    let ended = session.run_alone(method, common.seed, out, &|step: &Step<'_>| {
+    let ended = session.run_alone(method, &folder, &|step: &Step<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
         locked(&rounds).push(step.round.clone());
@@ -69,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     });
     bar.finish_and_clear();
-    ended?;
+    let checkpoint = ended?;
     if let Some(error) = locked(&failed).take() {
         return Err(error);
     }
@@ -78,7 +79,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
         inputs::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
-        let checkpoint = Folder::open(out)?.checkpoint();
         inputs::print(&table(&rounds, &checkpoint))?;
     }
     Ok(Answer::Yes)

@@ -5,9 +5,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
+use crate::files::write_whole;
 use crate::mechanism::{Chain, model_text, read_mjcf, read_urdf};
 use crate::model::{Library, System};
-use crate::report::write_whole;
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]

@@ -3,12 +3,12 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 
-use super::{Answer, Common, inputs, progress};
+use super::{Answer, Common, command_line, inputs, progress};
 use crate::recipe::{Job, Member, Recipe, Swept};
-use crate::report::write_whole;
+use crate::runs::RunFolder;
 use crate::train::{SweepProgress, Trained};
 
 /// Train many models by one recipe at once, from other initial networks or with other weights of the penalty
@@ -92,14 +92,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bail!("--alpha is a range of weights, and --seeds 1 trains one model; raise --seeds");
     }
     let library = arguments.effects.library()?;
-    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
+    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?
+        .begun_by(command_line());
+    let folder = RunFolder::open(out)?;
     let members = arguments.members();
     let begun = Instant::now();
     let trained = train(&job, &members, arguments)?;
     let swept = Swept::new(&job, &members, trained, begun.elapsed().as_secs_f64());
     let json = serde_json::to_string_pretty(&swept)? + "\n";
-    std::fs::create_dir_all(out).with_context(|| format!("{} cannot be made", out.display()))?;
-    write_whole(&out.join("sweep.json"), json.as_bytes())?;
+    folder.write_text("sweep.json", &json)?;
     inputs::print(&if common.json { json } else { swept.text() })?;
     let all_diverged = swept.totals.diverged == swept.totals.models;
     Ok(if all_diverged {
@@ -126,7 +127,6 @@ impl Arguments {
 }
 
 fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
-    inputs::check_writable(&arguments.out)?;
     for note in &job.material.notes {
         eprintln!("note: {note}");
     }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::fitting::{Saving, carry_out};
-use super::{Answer, Common, inputs};
+use super::{Answer, Common, command_line, inputs};
 use crate::recipe::{Job, Recipe};
 use crate::train::Checkpoint;
 
@@ -57,5 +57,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     };
     let dir = saving.folder(from, "tuned");
-    carry_out(&job, &dir, saving, common)
+    carry_out(&job.begun_by(command_line()), &dir, saving, common)
 }

@@ -6,7 +6,6 @@ mod episode;
 mod meter;
 mod predictor;
 mod session;
-mod streams;
 mod task;
 
 pub use controller::{Controller, Policy, RandomTorque};
@@ -14,5 +13,4 @@ pub use episode::{Episode, Stretch, drive, episode};
 pub use meter::Meter;
 pub use predictor::Predictor;
 pub use session::with_controller;
-pub use streams::{Purpose, stream};
 pub use task::{Goal, PlantSettings, Task, TaskError};

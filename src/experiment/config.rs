@@ -15,7 +15,7 @@ pub struct Config {
     pub task: PathBuf,
     /// A plant file as seen from here, or the name of a built-in one.
     pub plant: PathBuf,
-    /// Each method is repeated with the seeds 0, 1, ... up to this number, this not included.
+    /// Each method is repeated with so many seeds, which follow each other.
     pub seeds: u64,
     /// Transitions under random torques, before there is a model.
     pub random: usize,
@@ -60,11 +60,6 @@ impl Config {
         path.clone_into(&mut config.path);
         config.check().map_err(|message| config.wrong(message))?;
         Ok(config)
-    }
-
-    /// A file that it names or, where there is none, the name as it is: that of something built in.
-    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        beside_or_named(&self.path, file)
     }
 
     pub(super) fn wrong(&self, message: String) -> ExperimentError {
@@ -123,14 +118,4 @@ pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Experimen
         path: path.to_owned(),
         message: error.to_string(),
     })
-}
-
-/// A file that the one at `path` names or, where there is none, the name as it is: that of something built in.
-pub(super) fn beside_or_named(path: &Path, file: &Path) -> PathBuf {
-    let beside = path.parent().unwrap_or(Path::new("")).join(file);
-    if beside.exists() {
-        beside
-    } else {
-        file.to_owned()
-    }
 }

@@ -1,12 +1,14 @@
-use std::path::Path;
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
+use crate::files::{beside, beside_or_named, content_id};
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
 use crate::model::{Dynamics, HybridModel, Integrator, Library, System};
+use crate::runs::RunFolder;
 use crate::train::{Backend, Checkpoint, Origin};
 
 /// A method with all that it names read.
@@ -16,6 +18,8 @@ pub(super) struct Method {
     /// What the model file beside its weights says, and its text.
     dynamics: Dynamics,
     model_toml: String,
+    /// The files of its prior, with hashes of what they say.
+    pub inputs: Vec<(PathBuf, String)>,
 }
 
 /// What came of a method with one seed.
@@ -23,6 +27,8 @@ pub(super) struct Learnt {
     pub rounds: Vec<Round>,
     /// After the last round.
     pub model: HybridModel,
+    /// Where that is kept.
+    pub checkpoint: PathBuf,
 }
 
 /// A round that is done.
@@ -44,16 +50,19 @@ impl Method {
         backend: Backend,
     ) -> Result<Self, ExperimentError> {
         let mut model_toml = plant.declaration.clone();
+        let mut inputs = Vec::new();
         let mut dynamics = equations(plant);
         let prior = if let Some(file) = &method.model {
-            let system = library.system(&config.beside_or_named(file))?;
+            let system = library.system(&beside_or_named(&config.path, file))?;
             dynamics = equations(&system);
             model_toml.clone_from(&system.declaration);
+            inputs.push((file.clone(), content_id(model_toml.as_bytes())));
             Prior::Equations(Box::new(dynamics.clone()))
         } else if let Some(dir) = &method.checkpoint {
-            let checkpoint = Checkpoint::load(&config.beside_or_named(dir))?;
+            let checkpoint = Checkpoint::load(&beside(&config.path, dir))?;
             let model = checkpoint.model(&dynamics, &backend.device())?;
             model_toml.clone_from(&checkpoint.model_toml);
+            inputs.push((dir.clone(), checkpoint.fingerprint()));
             Prior::Trained(Box::new(model))
         } else {
             Prior::Nothing
@@ -76,6 +85,7 @@ impl Method {
             config: method.clone(),
             dynamics,
             model_toml,
+            inputs,
         })
     }
 
@@ -90,14 +100,14 @@ impl Method {
         Predictor::of_model(model, self.config.fit.integrator)
     }
 
-    /// Do what is left of a run in `dir`.
+    /// Do what is left of a run in its folder.
     pub(super) fn learn(
         &self,
         run: &Run<'_>,
-        dir: &Path,
+        folder: RunFolder,
         observer: Observer<'_>,
     ) -> Result<Learnt, RunError> {
-        let mut folder = Folder::open(dir)?;
+        let mut folder = Folder::open(folder)?;
         let told = |round: &Round, found: bool| {
             observer(&Step {
                 method: &self.config.name,
@@ -128,6 +138,7 @@ impl Method {
         }
         Ok(Learnt {
             rounds: folder.rounds().to_vec(),
+            checkpoint: folder.checkpoint(),
             model: progress.model.expect("there is a round"),
         })
     }

@@ -35,7 +35,7 @@ pub(super) fn compare(
     for (method, runs) in session.methods.iter().zip(learnt) {
         let name = &method.config.name;
         let seen = runs[0].rounds.last().map_or(0, |round| round.transitions);
-        let course = over_horizons(&|seed| method.predictor(&runs[seed].model), seen, name)?;
+        let course = over_horizons(&|k| method.predictor(&runs[k].model), seen, name)?;
         results.methods.insert(name.clone(), course);
     }
     for (name, predictor) in session.fixed()? {

@@ -36,14 +36,14 @@ pub(super) fn bootstrap(
 #[cfg(test)]
 mod tests {
     use super::{bootstrap, deviation, mean};
-    use crate::control::{Purpose, stream};
+    use crate::runs::{Purpose, stream};
 
     #[test]
     fn intervals_are_those_of_the_normal_distribution_where_samples_are_many() {
         // 0, 1, ..., 999: the mean of so many is normal, with a deviation of 288.8 / sqrt(1000).
         let values: Vec<f64> = (0..1000).map(f64::from).collect();
         assert!((deviation(&values) - 288.8).abs() < 0.1);
-        let mut rng = stream(1, Purpose::Other, 0);
+        let mut rng = stream(1, Purpose::Other(0));
         let of = |drawn: &[usize]| drawn.iter().map(|k| values[*k]).sum::<f64>() / 1000.0;
         let [low, high] = bootstrap(values.len(), &mut rng, of);
         let half = 1.96 * deviation(&values) / 1000.0_f64.sqrt();

@@ -101,12 +101,12 @@ pub struct Imported {
 /// Why a description cannot be read.
 #[derive(Debug, Error)]
 pub enum ImportError {
-    #[error("{path} cannot be read: {source}; give the JSON file that `residyn export --format json` wrote", path = .path.display())]
+    #[error("{path} cannot be read: {source}", path = .path.display())]
     Unreadable {
         path: PathBuf,
         source: std::io::Error,
     },
-    #[error("{path}: {source}; it must be the JSON file that `residyn export --format json` wrote", path = .path.display())]
+    #[error("{path} is not an exported description: {source}", path = .path.display())]
     Json {
         path: PathBuf,
         source: serde_json::Error,
@@ -139,7 +139,7 @@ fn pair(model: &Portable, description: &Path, weights: &Path) -> Result<Vec<File
             format: "a pair of files",
             system: model.name().to_owned(),
             reason: format!(
-                "both would be {}; give --out a name that ends in .{DESCRIPTION} or .{WEIGHTS}",
+                "both would be {}; choose a name that ends in .{DESCRIPTION} or .{WEIGHTS}",
                 description.display()
             ),
         });

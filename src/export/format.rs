@@ -4,8 +4,8 @@ use thiserror::Error;
 
 use super::{Answers, FORMATS, Portable, PythonClient, Samples};
 use crate::expr::suggestion;
+use crate::files::{OutputError, write_whole};
 use crate::model::HybridError;
-use crate::report::{WriteError, write_whole};
 
 /// A format that models are written in.
 #[derive(Debug)]
@@ -62,8 +62,8 @@ pub enum ExportError {
         system: String,
         reason: String,
     },
-    #[error(transparent)]
-    Write(#[from] WriteError),
+    #[error("{0}")]
+    Write(#[from] OutputError),
     #[error(transparent)]
     Hybrid(#[from] HybridError),
 }

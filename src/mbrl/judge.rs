@@ -1,8 +1,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use crate::control::{Episode, Predictor, Purpose, Task, episode, stream, with_controller};
+use crate::control::{Episode, Predictor, Task, episode, with_controller};
 use crate::plant::Plant;
+use crate::runs::{Purpose, stream};
 
 /// Lets models drive a plant in episodes that are not learnt from. Start, noise and draws of candidates are the same for
 /// every model, so that models alone make the difference.
@@ -49,10 +50,10 @@ impl Judge<'_> {
         replan: usize,
     ) -> Result<(Episode, usize), RunError> {
         let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
-        let mut rng = stream(self.seed, Purpose::Judge, 0);
+        let mut rng = stream(self.seed, Purpose::Judge(0));
         let start = self.task.draw_start(&mut rng);
         let mut rig = self.task.rig(self.plant, &dynamics, &values, &start);
-        let draws = stream(self.seed, Purpose::JudgePlan, 0);
+        let draws = stream(self.seed, Purpose::JudgePlan(0));
         with_controller(predictor, self.task, replan, &draws, |controller| {
             let episode = episode(self.task, &mut rig, controller, &mut rng)?;
             Ok((episode, controller.diverged()))

@@ -1,8 +1,8 @@
 use std::ops::ControlFlow;
 
 use super::RunError;
-use crate::control::{Purpose, stream};
 use crate::model::{Dynamics, HybridModel, InputScaling, LastLayer, MlpSettings, MlpWeights};
+use crate::runs::{Purpose, stream};
 use crate::train::{Backend, FitSettings, Segments, Training};
 
 /// What a model knows before it has seen the plant.
@@ -62,7 +62,7 @@ impl Learner {
             Some(model) => self.rescaled(model, scaling)?,
             None => self.first(scaling, seed, round)?,
         };
-        let order = stream(seed, Purpose::Order, round);
+        let order = stream(seed, Purpose::Order(round));
         let mut training = Training::new(model, self.fit.clone(), order)?;
         training.run(segments, None, &mut |_| ControlFlow::Continue(()))?;
         Ok(training)
@@ -74,7 +74,7 @@ impl Learner {
         seed: u64,
         round: usize,
     ) -> Result<HybridModel, RunError> {
-        let mut rng = stream(seed, Purpose::Network, round);
+        let mut rng = stream(seed, Purpose::Network(round));
         let mut network =
             |last| MlpWeights::new(self.joints, &self.network, scaling.clone(), last, &mut rng);
         match self.untrained()? {

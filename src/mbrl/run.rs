@@ -1,10 +1,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Experience, Judge, Judged, Learner, RunError};
-use crate::control::{Predictor, Purpose, RandomTorque, Task, drive, stream, with_controller};
+use crate::control::{Predictor, RandomTorque, Task, drive, with_controller};
 use crate::data::Log;
 use crate::model::{Dynamics, HybridModel};
 use crate::plant::{Plant, Rig};
+use crate::runs::{Purpose, stream};
 use crate::train::Training;
 
 /// How much is gathered when.
@@ -63,8 +64,8 @@ impl Run<'_> {
     pub fn begin(&self) -> Result<Progress, RunError> {
         let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
         let mut rig = self.rig(&dynamics, &values, 0);
-        let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random, 0));
-        let mut noise = stream(self.seed, Purpose::Gather, 0);
+        let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
+        let mut noise = stream(self.seed, Purpose::Gather(0));
         let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
         Ok(Progress {
             experience: Experience {
@@ -113,7 +114,8 @@ impl Run<'_> {
     fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
         let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
         let mut rig = self.rig_now(&dynamics, &values, progress)?;
-        let of_round = |purpose| stream(self.seed, purpose, progress.rounds + 1);
+        let of_round =
+            |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(progress.rounds + 1));
         let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
         let steps = self.schedule.gather;
         let stretch = with_controller(predictor, self.task, self.task.replan, &draws, |policy| {
@@ -144,7 +146,7 @@ impl Run<'_> {
     }
 
     fn rig<'d>(&self, dynamics: &'d Dynamics, values: &[f64], number: usize) -> Rig<'d> {
-        let mut rng = stream(self.seed, Purpose::Start, number);
+        let mut rng = stream(self.seed, Purpose::Start(number));
         let start = self.task.draw_start(&mut rng);
         self.task.rig(self.plant, dynamics, values, &start)
     }

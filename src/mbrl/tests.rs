@@ -9,7 +9,12 @@ use crate::control::Task;
 use crate::expr::SignForm;
 use crate::model::{Angles, Dynamics, Library, MlpSettings};
 use crate::plant::{Noise, Plant};
+use crate::runs::RunFolder;
 use crate::train::{Backend, FitSettings, Origin, Penalty};
+
+fn folder(dir: &Path) -> Folder {
+    Folder::open(RunFolder::open(dir).unwrap()).unwrap()
+}
 
 struct Setting {
     task: Task,
@@ -93,11 +98,11 @@ impl Setting {
     fn in_sessions(&self, ends: &[usize]) -> (Vec<Round>, Vec<f64>) {
         let dir = tempfile::tempdir().unwrap();
         for end in ends {
-            let mut folder = Folder::open(dir.path()).unwrap();
+            let mut folder = folder(dir.path());
             let mut progress = folder.progress(&self.run(), &self.dynamics).unwrap();
             self.rounds(&mut progress, &mut folder, *end);
         }
-        let folder = Folder::open(dir.path()).unwrap();
+        let folder = folder(dir.path());
         let progress = folder.progress(&self.run(), &self.dynamics).unwrap();
         let logs = progress.experience.logs;
         (
@@ -126,7 +131,7 @@ fn a_round_without_its_line_is_done_again_from_the_model_before_it() {
     let setting = setting();
     let (killed, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let go_on = |dir: &Path, until| {
-        let mut folder = Folder::open(dir).unwrap();
+        let mut folder = folder(dir);
         let mut progress = folder.progress(&setting.run(), &setting.dynamics).unwrap();
         setting.rounds(&mut progress, &mut folder, until);
         folder

@@ -67,8 +67,8 @@ impl<'x> Source<'x> {
         }
         let found = root.tag_name().name();
         let remedy = match found {
-            "robot" => "; this is URDF, read it with --from-urdf",
-            "mujoco" => "; this is MJCF, read it with --from-mjcf",
+            "robot" => "; this is URDF",
+            "mujoco" => "; this is MJCF",
             _ => "",
         };
         let message = format!("the file begins with <{found}>, expected <{name}>{remedy}");

@@ -139,21 +139,6 @@ impl Recipe {
         Ok(())
     }
 
-    /// A file that the recipe names, as seen from here.
-    pub(super) fn beside(&self, file: &Path) -> PathBuf {
-        self.path.parent().unwrap_or(Path::new("")).join(file)
-    }
-
-    /// A file that the recipe names or, where there is none, the name as it is: that of something built in.
-    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        let beside = self.beside(file);
-        if beside.is_file() {
-            beside
-        } else {
-            file.to_owned()
-        }
-    }
-
     /// Apply `[start]` and `hold`.
     pub(super) fn set_parameters(&self, dynamics: &mut Dynamics) -> Result<(), RecipeError> {
         for (name, value) in &self.start {

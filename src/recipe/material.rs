@@ -1,32 +1,14 @@
 use std::path::PathBuf;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-
 use super::data::{Data, Logged, Simulated};
 use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
+use crate::files::{beside, beside_or_named};
 use crate::model::{Library, System, as_modelled};
 use crate::plant::Plant;
+use crate::runs::{Purpose, stream};
 use crate::train::{Segments, SegmentsError};
-
-/// What a seed is used for: each purpose draws from a stream of its own, so that more draws for one do
-/// not change the others.
-#[derive(Clone, Copy)]
-pub(super) enum Purpose {
-    Training,
-    Test,
-    Network,
-    Order,
-}
-
-/// The random numbers for one purpose.
-pub(super) fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(purpose as u64);
-    rng
-}
 
 /// The data of a recipe, ready for training.
 pub struct Material {
@@ -58,7 +40,8 @@ impl Material {
 }
 
 fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Material, RecipeError> {
-    let read = |path: &PathBuf| Log::read(recipe.beside(path), system.joints, &system.columns);
+    let read =
+        |path: &PathBuf| Log::read(beside(&recipe.path, path), system.joints, &system.columns);
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
         step_s: logged.step_s,
@@ -109,7 +92,7 @@ fn from_plant(
         path: recipe.path.clone(),
         source,
     };
-    let path = recipe.beside_or_named(&simulated.plant);
+    let path = beside_or_named(&recipe.path, &simulated.plant);
     let plant = Plant::read(&path, library).map_err(of_plant)?;
     if plant.system.name != system.name || plant.system.joints != system.joints {
         return Err(recipe.wrong(format!(
@@ -128,8 +111,8 @@ fn from_plant(
     };
     let names = plant.system.parameters.iter().map(|p| p.name.clone());
     Ok(Material {
-        training: draw(Purpose::Training)?,
-        test: Some(draw(Purpose::Test)?),
+        training: draw(Purpose::RecipeTraining)?,
+        test: Some(draw(Purpose::RecipeTest)?),
         truth: names.zip(plant.parameters.iter().copied()).collect(),
         notes: Vec::new(),
     })

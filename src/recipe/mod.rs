@@ -2,7 +2,6 @@
 //! interrupted and go on.
 
 mod data;
-mod difference;
 mod error;
 mod file;
 mod job;
@@ -13,7 +12,6 @@ mod swept;
 mod tune;
 
 pub use data::{Data, Logged, Simulated};
-pub(crate) use difference::first_difference;
 pub use error::RecipeError;
 pub use file::{Kind, Recipe};
 pub use job::Job;

@@ -1,6 +1,6 @@
-use super::material::{Purpose, stream};
 use super::{Job, Kind, Recipe, RecipeError};
 use crate::model::MlpWeights;
+use crate::runs::{Purpose, stream};
 use crate::train::{Penalty, Start, Sweep};
 
 /// What one model of a sweep has of its own.
@@ -36,32 +36,33 @@ impl Job {
 
     fn start(&self, made: &MlpWeights, member: &Member) -> Start {
         let Recipe { kind, fit, .. } = &self.recipe;
-        let mut rng = stream(member.seed, Purpose::Network);
+        let mut rng = stream(member.seed, Purpose::RecipeNetwork);
         Start {
             network: made.redrawn(kind.last_layer(), &mut rng),
             penalty_weight: member.alpha.unwrap_or(fit.penalty.initial()),
-            order: stream(member.seed, Purpose::Order),
+            order: stream(member.seed, Purpose::RecipeOrder),
         }
     }
 
     fn check(&self, members: &[Member]) -> Result<(), RecipeError> {
         let Self { recipe, .. } = self;
         let with_alpha = members.iter().any(|member| member.alpha.is_some());
+        let no_alpha = |reason| RecipeError::NoAlpha {
+            path: recipe.path.clone(),
+            reason,
+        };
         match (recipe.kind, recipe.fit.penalty) {
             (Kind::Physics, _) => Err(recipe.wrong(
                 "kind = \"physics\" has no network, so that all models of a sweep would be the same; take kind = \
-                 \"hybrid\", or `residyn train`"
+                 \"hybrid\", or train one model"
                     .into(),
             )),
-            (Kind::DataDriven, _) if with_alpha => Err(recipe.wrong(
-                "alpha weighs the residual, and kind = \"data_driven\" has none; leave out --alpha, or take kind = \
-                 \"hybrid\""
-                    .into(),
+            (Kind::DataDriven, _) if with_alpha => Err(no_alpha(
+                "alpha weighs the residual, and kind = \"data_driven\" has none; take kind = \"hybrid\"",
             )),
-            (_, Penalty::Adaptive { .. }) if with_alpha => Err(recipe.wrong(
-                "[fit] has the adaptive penalty, which finds its weight itself; leave out --alpha, or take penalty = \
-                 { fixed = { alpha = 1e-4 } }"
-                    .into(),
+            (_, Penalty::Adaptive { .. }) if with_alpha => Err(no_alpha(
+                "[fit] has the adaptive penalty, which finds its weight itself; take penalty = \
+                 { fixed = { alpha = 1e-4 } }",
             )),
             _ => Ok(()),
         }

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::job::{declared, equations, fingerprint, new_network};
+use super::job::{declared, equations, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
 use crate::model::{LastLayer, Library, System};
 use crate::train::{Backend, Checkpoint, Origin};
@@ -80,7 +80,7 @@ fn tuned(
     let config = json!({
         "command": "tune",
         "recipe": recipe,
-        "data": fingerprint(&material),
+        "data": material.training.fingerprint(),
         "device": backend.name(),
         "from": {"config": manifest.config, "seed": manifest.seed, "epoch": manifest.epoch},
     });

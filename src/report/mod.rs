@@ -12,7 +12,7 @@ mod tensorboard;
 mod text;
 
 pub use film::film;
-pub use folder::{WriteError, write, write_whole};
+pub use folder::{WriteError, write};
 pub use json::Report;
 pub use model_file::model_file;
 pub use summary::summary;

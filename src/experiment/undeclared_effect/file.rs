@@ -87,9 +87,4 @@ impl Experiment {
         }
         Ok(())
     }
-
-    /// A file that is named here or, where there is none, the name as it is: that of something built in.
-    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        config::beside_or_named(&self.path, file)
-    }
 }

@@ -1,13 +1,12 @@
-use std::path::Path;
-
 use rayon::prelude::*;
 
-use super::runs::Runs;
 use super::{Case, Experiment, Outcome, Trial};
 use crate::control::Task;
 use crate::experiment::ExperimentError;
+use crate::files::beside_or_named;
 use crate::model::{Library, System};
 use crate::plant::Plant;
+use crate::runs::RunFolder;
 use crate::train::Backend;
 
 /// All that an experiment takes, checked.
@@ -20,6 +19,8 @@ pub struct Lab {
     pub plants: Vec<Plant>,
     /// Where hybrids are trained.
     pub backend: Backend,
+    /// Seeds follow each other from here.
+    pub first_seed: u64,
 }
 
 impl Lab {
@@ -31,10 +32,11 @@ impl Lab {
         experiment: Experiment,
         library: Library,
         backend: Backend,
+        first_seed: u64,
     ) -> Result<Self, ExperimentError> {
-        let model = experiment.beside_or_named(&experiment.model);
+        let model = beside_or_named(&experiment.path, &experiment.model);
         let declared = library.system(&model)?;
-        let task = Task::read(&experiment.beside_or_named(&experiment.task))?;
+        let task = Task::read(&beside_or_named(&experiment.path, &experiment.task))?;
         if task.system != declared.name {
             return Err(experiment.wrong(format!(
                 "the task is for {}, the model is of {}; give those that belong together",
@@ -63,25 +65,27 @@ impl Lab {
             task,
             plants,
             backend,
+            first_seed,
         })
     }
 
-    /// Carry out what is not in `dir` yet, where each trial is a file. `observer` is told of each that is done.
+    /// Carry out the trials that are not in the folder yet. `observer` is told of each that is done.
     ///
     /// # Errors
-    /// A trial that cannot be carried out, or a folder that cannot be written or holds another experiment.
+    /// A trial that cannot be carried out, or a folder that cannot be written or holds another run.
     pub fn run(
         &self,
-        dir: &Path,
+        folder: &RunFolder,
         observer: &(impl Fn(&Trial) + Sync),
     ) -> Result<Outcome, ExperimentError> {
-        let runs = Runs::open(dir)?;
+        folder.claim(&self.identity())?;
+        let runs = folder.within("runs");
         let cases = 0..self.experiment.cases.len();
         let trials: Vec<(usize, u64)> = cases
-            .flat_map(|case| (0..self.experiment.seeds).map(move |seed| (case, seed)))
+            .flat_map(|case| (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k)))
             .collect();
         let trial = |&(case, seed): &(usize, u64)| {
-            let trial = runs.get_or(self, case, seed, || self.trial(case, seed))?;
+            let trial = self.trial_in(&runs, case, seed)?;
             observer(&trial);
             Ok(trial)
         };

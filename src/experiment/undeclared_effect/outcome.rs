@@ -3,8 +3,8 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
-use crate::control::{Purpose, stream};
 use crate::experiment::statistics::{Interval, bootstrap, deviation, mean};
+use crate::runs::{Purpose, stream};
 
 /// Of the return that the declared model loses, this share is to come back after the first number of episodes.
 pub const TARGET: f64 = 0.9;
@@ -32,6 +32,7 @@ pub struct OutcomeOfCase {
     /// Whether the loss stands out of its scatter. Where it does not, there is nothing to win back.
     pub is_lost: bool,
     pub models: Vec<Compared>,
+    pub seeds: Vec<u64>,
     /// What closing the loop found: `[seed][number of episodes]`.
     pub closed: Vec<Vec<Closed>>,
 }
@@ -111,7 +112,7 @@ impl OutcomeOfCase {
                 .map(|&seed| returns[seed] - declared[seed])
                 .sum()
         };
-        let mut rng = stream(0, Purpose::Other, 0);
+        let mut rng = stream(0, Purpose::Other(0));
         let (seeds, all) = (trials.len(), (0..trials.len()).collect::<Vec<_>>());
         let per_seed = 1.0 / seeds as f64;
         let loss_ci95 = bootstrap(seeds, &mut rng, |drawn| per_seed * of(&truth, drawn));
@@ -132,6 +133,7 @@ impl OutcomeOfCase {
             loss_ci95,
             is_lost,
             models,
+            seeds: trials.iter().map(|trial| trial.seed).collect(),
             closed: trials.iter().map(|trial| trial.closed.clone()).collect(),
         }
     }
@@ -158,9 +160,9 @@ impl OutcomeOfCase {
         for model in &self.models {
             model.write(out);
         }
-        for (seed, closed) in self.closed.iter().enumerate() {
+        for (seed, closed) in self.seeds.iter().zip(&self.closed) {
             for found in closed {
-                found.write(out, seed);
+                found.write(out, *seed);
             }
         }
         out.push('\n');
@@ -207,7 +209,7 @@ impl Compared {
 }
 
 impl Closed {
-    fn write(&self, out: &mut String, seed: usize) {
+    fn write(&self, out: &mut String, seed: u64) {
         let values = |values: &[(String, f64)]| {
             let each = values
                 .iter()

@@ -3,11 +3,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Lab;
 use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, close_loop};
-use crate::control::{Predictor, Purpose, stream};
+use crate::control::Predictor;
 use crate::data::Log;
 use crate::experiment::ExperimentError;
 use crate::mbrl::{Experience, Judge, Judged, Learner, Prior, RunError};
 use crate::model::Dynamics;
+use crate::runs::{Purpose, stream};
 
 /// One plant under control by every model, all from the same start, under the same noise and with the same draws of
 /// candidates.
@@ -183,7 +184,7 @@ impl Lab {
 
     /// The log of an episode with a start, noise and candidates of its own.
     fn gather(&self, judge: Judge<'_>, model: &Predictor, number: usize) -> Result<Log, RunError> {
-        let seed = stream(judge.seed, Purpose::Gather, number).next_u64();
+        let seed = stream(judge.seed, Purpose::Gather(number)).next_u64();
         let (episode, _) = Judge { seed, ..judge }.episode(model, self.task.replan)?;
         let mut log = episode.stretch.log;
         log.path = format!("episode{}.csv", number + 1).into();
@@ -199,7 +200,7 @@ impl Lab {
             horizons_s: HORIZONS_S,
             backend: None,
         };
-        let mut rng = stream(seed, Purpose::Other, logs.len());
+        let mut rng = stream(seed, Purpose::Other(logs.len()));
         close_loop(request, &mut rng, &mut |_| {})
     }
 

@@ -1,0 +1,80 @@
+use std::error::Error;
+use std::io::ErrorKind;
+
+use crate::bench::GridError;
+use crate::experiment::ExperimentError;
+use crate::export::ImportError;
+use crate::files::OutputError;
+use crate::model::FileError;
+use crate::recipe::RecipeError;
+use crate::runs::RunFolderError;
+
+/// What to do about an error, in terms of the command line, of which the library knows nothing.
+pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    None.or_else(|| error.downcast_ref().and_then(of_output))
+        .or_else(|| error.downcast_ref().and_then(of_folder))
+        .or_else(|| error.downcast_ref().and_then(of_recipe))
+        .or_else(|| error.downcast_ref().and_then(of_experiment))
+        .or_else(|| error.downcast_ref().and_then(of_grid))
+        .or_else(|| error.downcast_ref().and_then(of_import))
+        .or_else(|| error.downcast_ref().and_then(of_file))
+}
+
+fn of_output(error: &OutputError) -> Option<&'static str> {
+    Some(match error.source.kind() {
+        ErrorKind::InvalidInput => "give the name of a file with --out",
+        _ => "free some space or give another folder with --out",
+    })
+}
+
+fn of_folder(error: &RunFolderError) -> Option<&'static str> {
+    match error {
+        RunFolderError::Busy { .. } => {
+            Some("wait until that has ended, or give another folder with --out")
+        }
+        RunFolderError::OtherRun { .. } | RunFolderError::Damaged { .. } => {
+            Some("give another folder with --out, or remove this one to start anew")
+        }
+        RunFolderError::NotAFolder { .. } | RunFolderError::Io { .. } => {
+            Some("give a folder that can be written with --out")
+        }
+        RunFolderError::Output(_) => None,
+    }
+}
+
+fn of_recipe(error: &RecipeError) -> Option<&'static str> {
+    match error {
+        RecipeError::Open { .. } => Some("give a recipe with --config"),
+        RecipeError::NoAlpha { .. } => Some("or leave out --alpha"),
+        _ => None,
+    }
+}
+
+fn of_experiment(error: &ExperimentError) -> Option<&'static str> {
+    let cannot_open = matches!(error, ExperimentError::Open { .. });
+    cannot_open.then_some("give a file with --config")
+}
+
+fn of_grid(error: &GridError) -> Option<&'static str> {
+    matches!(error, GridError::Open { .. }).then_some("give a grid with --grid")
+}
+
+fn of_import(error: &ImportError) -> Option<&'static str> {
+    let foreign = matches!(
+        error,
+        ImportError::Unreadable { .. } | ImportError::Json { .. }
+    );
+    foreign.then_some("give the JSON file that `residyn export --format json` wrote")
+}
+
+/// A robot description of the other format.
+fn of_file(error: &FileError) -> Option<&'static str> {
+    let ends = |end| error.message.ends_with(end);
+    if ends("this is URDF") {
+        Some("read it with --from-urdf")
+    } else if ends("this is MJCF") {
+        Some("read it with --from-mjcf")
+    } else {
+        None
+    }
+}
