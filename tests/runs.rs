@@ -92,11 +92,7 @@ fn a_recorded_command_gives_the_same_file_again() {
         &[],
     );
     comes_again(
-        &[
-            &["sweep", "--seeds", "2", "--config", &recipe][..],
-            &own,
-        ]
-        .concat(),
+        &[&["sweep", "--seeds", "2", "--config", &recipe][..], &own].concat(),
         "the run/sweep.json",
         |sweep| &sweep["config"]["command_line"],
         &["totals"],
@@ -113,10 +109,21 @@ fn a_log_is_written_through_a_link_and_never_onto_a_device() {
     symlink("logs/run.csv", at("link.csv")).unwrap();
     symlink("/dev/null", at("device.csv")).unwrap();
     let (link, device) = (at("link.csv"), at("device.csv"));
-    let simulate = ["simulate", "--plant", "pendulum", "--duration", "1", "--out"];
+    let simulate = [
+        "simulate",
+        "--plant",
+        "pendulum",
+        "--duration",
+        "1",
+        "--out",
+    ];
     succeeds(&[&simulate[..], &[text(&link)]].concat());
     assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
-    assert!(fs::read_to_string(at("logs/run.csv")).unwrap().starts_with("time,q1"));
+    assert!(
+        fs::read_to_string(at("logs/run.csv"))
+            .unwrap()
+            .starts_with("time,q1")
+    );
     let message = refuses(&[&simulate[..], &[text(&device)]].concat());
     for part in ["device.csv", "a device", "not a regular file", "--out"] {
         assert!(message.contains(part), "{part:?} in {message}");

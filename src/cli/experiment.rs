@@ -10,9 +10,10 @@ use crate::experiment::{Config, Experiment, Session, Step, picture};
 use crate::model::Library;
 use crate::runs::RunFolder;
 
-/// Experiments: return against real transitions, against the receding horizon, and with effects that nobody declared
+/// Experiments: return against real transitions, against the receding horizon, and with undeclared effects
 ///
-/// The same command goes on with an experiment that was interrupted, and ends with the same numbers.
+/// Seeds are counted from --seed. The same command resumes an experiment that was interrupted, and ends with the same
+/// numbers.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn experiment physics-prior --config configs/physics-prior/pendulum.toml --out physics-prior"
@@ -20,7 +21,7 @@ use crate::runs::RunFolder;
 pub(super) struct Arguments {
     #[arg(value_enum)]
     name: Name,
-    /// What is compared, on which task and plant
+    /// The experiment's configuration
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// Folder for the results and all runs
@@ -40,14 +41,14 @@ enum Name {
     UndeclaredEffect,
 }
 
-/// The file that keeps the time taken, s.
+/// The file with the time so far, s.
 const WALL: &str = "wall_s";
 
-/// What there is to say of an experiment.
+/// The results of an experiment, as printed and written.
 struct Finished {
     json: String,
     text: String,
-    /// Whether what it aims at was reached.
+    /// Whether its target was reached.
     answer: Answer,
 }
 
@@ -145,7 +146,7 @@ fn files(out: &Path, names: &[&str]) -> String {
         .collect()
 }
 
-/// For the progress bar.
+/// The text of the progress bar.
 pub(super) fn message(step: &Step<'_>) -> String {
     let Step {
         method,
@@ -157,7 +158,7 @@ pub(super) fn message(step: &Step<'_>) -> String {
     format!("rounds; {method} seed {seed}: {transitions} transitions, return {total:.1}")
 }
 
-/// The time that all sessions of an experiment took.
+/// Measures the total time of an experiment over all interruptions.
 struct Clock<'f> {
     began: Instant,
     before_s: f64,
@@ -185,7 +186,7 @@ impl<'f> Clock<'f> {
         self.before_s + self.began.elapsed().as_secs_f64()
     }
 
-    /// A failure costs no more than a time that is too short.
+    /// If this fails, only the recorded time is too short.
     fn save(&self) {
         let _ = self
             .folder

@@ -13,9 +13,9 @@ use crate::mbrl::Round;
 use crate::report::EventFile;
 use crate::runs::RunFolder;
 
-/// Model-based reinforcement learning: train, control, add what was seen, and again
+/// Model-based reinforcement learning: train a model, control the plant with it, add the new data, repeat
 ///
-/// One run of one method of an experiment's configuration, with --seed. The same command goes on with a run that was
+/// One run of one method of an experiment's configuration, with --seed. The same command resumes a run that was
 /// interrupted, and ends with the same numbers.
 #[derive(Debug, Args)]
 #[command(
@@ -25,13 +25,13 @@ pub(super) struct Arguments {
     /// An experiment's configuration
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Which of its methods
+    /// One of its methods
     #[arg(long, value_name = "NAME", default_value = "hybrid")]
     method: String,
-    /// Folder for rounds.jsonl, the stretches of motion as logs, and the last model as a checkpoint
+    /// Folder for rounds.jsonl, the recorded motion as logs, and the last model as a checkpoint
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder for an event file of the rounds done now, for TensorBoard
+    /// Folder for a TensorBoard event file of the rounds that this command carries out
     #[arg(long, value_name = "DIR")]
     tensorboard: Option<PathBuf>,
     #[command(flatten)]
@@ -90,7 +90,7 @@ fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
         .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// Seconds since 1970, as event files have it.
+/// Seconds since 1970, as in event files.
 fn now_s() -> f64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0.0, |since| since.as_secs_f64())

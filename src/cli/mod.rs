@@ -1,4 +1,4 @@
-//! The command line: parse, call, print; nothing else.
+//! The command line: parse the arguments, call the library, print the results.
 
 mod audit;
 mod bench;
@@ -58,7 +58,7 @@ enum Command {
     Bench(bench::Arguments),
 }
 
-/// What every command takes.
+/// Arguments of every command.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Common {
     /// Print the result as JSON on standard output
@@ -67,12 +67,12 @@ pub(crate) struct Common {
     /// Seed of everything random; the same seed gives the same result on the same machine
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// What carries out tensor operations: ndarray, or cuda where the build has it
+    /// Backend of tensor operations: ndarray, or cuda in a build that has it
     #[arg(long, default_value_t)]
     device: Backend,
 }
 
-/// How a command ended that could run.
+/// The answer of a command that could run.
 enum Answer {
     Yes,
     No,

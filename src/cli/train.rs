@@ -9,7 +9,7 @@ use crate::recipe::{Job, Recipe};
 
 /// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant
 ///
-/// The same command goes on with a run that was interrupted, and ends with the same numbers.
+/// The same command resumes a run that was interrupted, and ends with the same numbers.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn train --config configs/train-pendulum.toml --out pendulum --seed 1"

@@ -11,33 +11,33 @@ use crate::model::{Dynamics, HybridModel, Integrator, Library, System};
 use crate::runs::RunFolder;
 use crate::train::{Backend, Checkpoint, Origin};
 
-/// A method with all that it names read.
+/// A method with everything it refers to read.
 pub(super) struct Method {
     pub config: MethodConfig,
     pub learner: Learner,
-    /// What the model file beside its weights says, and its text.
+    /// The equations of the model file that is saved with its weights, and the file's text.
     dynamics: Dynamics,
     model_toml: String,
-    /// The files of its prior, with hashes of what they say.
+    /// The files of its prior and hashes of their contents.
     pub inputs: Vec<(PathBuf, String)>,
 }
 
-/// What came of a method with one seed.
+/// The result of a method with one seed.
 pub(super) struct Learnt {
     pub rounds: Vec<Round>,
     /// After the last round.
     pub model: HybridModel,
-    /// Where that is kept.
+    /// The checkpoint of that model.
     pub checkpoint: PathBuf,
 }
 
-/// A round that is done.
+/// A finished round.
 #[derive(Debug, Clone, Copy)]
 pub struct Step<'s> {
     pub method: &'s str,
     pub seed: u64,
     pub round: &'s Round,
-    /// Whether it was found done.
+    /// Whether it was carried out before, by a run that was interrupted.
     pub found: bool,
 }
 
@@ -89,18 +89,18 @@ impl Method {
         })
     }
 
-    /// What it plans with before it has seen anything; none where it knows nothing.
+    /// The model it plans with before training; none without a prior.
     pub(super) fn prior(&self, integrator: Integrator) -> Result<Option<Predictor>, RunError> {
         let model = self.learner.untrained()?;
         Ok(model.map(|model| Predictor::of_model(&model, integrator)))
     }
 
-    /// What it plans with once it has learnt.
+    /// The model it plans with after training.
     pub(super) fn predictor(&self, model: &HybridModel) -> Predictor {
         Predictor::of_model(model, self.config.fit.integrator)
     }
 
-    /// Do what is left of a run in its folder.
+    /// Carries out the remaining rounds of a run in its folder.
     pub(super) fn learn(
         &self,
         run: &Run<'_>,

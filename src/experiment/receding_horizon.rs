@@ -1,4 +1,4 @@
-//! The ablation: models that have seen the same plant, under plans that are followed for longer and longer.
+//! The ablation: models trained on the same plant, evaluated with increasing receding horizons.
 
 use super::learning::Learnt;
 use super::results::{Course, Results};
@@ -20,7 +20,7 @@ pub(super) fn check(session: &Session) -> Result<(), String> {
     }
 }
 
-/// Let what was learnt be judged under every receding horizon.
+/// Evaluates the trained models with every receding horizon.
 pub(super) fn compare(
     session: &Session,
     learnt: &[Vec<Learnt>],

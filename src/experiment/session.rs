@@ -14,7 +14,7 @@ use crate::plant::Plant;
 use crate::runs::{Identity, RunFolder};
 use crate::train::Backend;
 
-/// The experiments by name.
+/// The published experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Experiment {
     PhysicsPrior,
@@ -22,7 +22,7 @@ pub enum Experiment {
     RecedingHorizon,
 }
 
-/// A configuration with all that it names read.
+/// A configuration with everything it refers to read.
 pub struct Session {
     pub config: Config,
     pub(super) task: Task,
@@ -32,11 +32,11 @@ pub struct Session {
     first_seed: u64,
 }
 
-/// Who is told of every round, those found done included.
+/// Called after every round, including those that were carried out before.
 pub type Observer<'o> = &'o (dyn Fn(&Step<'_>) + Sync);
 
 impl Experiment {
-    /// The name that the command line takes.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::PhysicsPrior => physics_prior::NAME,
@@ -55,10 +55,10 @@ impl Experiment {
 }
 
 impl Session {
-    /// Read what `config` names. Its seeds are `first_seed` and those that follow.
+    /// Reads everything that `config` refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
-    /// Files that cannot be read or do not belong together.
+    /// Files that cannot be read or do not match.
     pub fn open(
         config: Config,
         library: &Library,
@@ -96,22 +96,22 @@ impl Session {
         })
     }
 
-    /// Trainings of all methods and seeds.
+    /// Number of trainings of all methods and seeds.
     pub fn rounds(&self) -> usize {
         let each = self.methods.iter().map(|method| method.config.rounds);
         self.seeds().len() * each.sum::<usize>()
     }
 
-    /// Trainings of one run of a method; 0 where it is unknown.
+    /// Number of trainings of one run of a method; 0 for an unknown method.
     pub fn rounds_of(&self, method: &str) -> usize {
         self.method(method).map_or(0, |known| known.config.rounds)
     }
 
-    /// Carry out an experiment in its folder, or what is left of it.
+    /// Carries out an experiment in its folder, or the rest of one that was interrupted.
     ///
     /// # Errors
-    /// A configuration that is not one of this experiment, a folder that holds another run, a run that diverges, or
-    /// files that cannot be read or written.
+    /// A configuration of another experiment, the folder of another run, a run that diverges, or files that cannot be read
+    /// or written.
     pub fn carry_out(
         &self,
         experiment: Experiment,
@@ -135,8 +135,8 @@ impl Session {
         Ok(results)
     }
 
-    /// One run of the loop in its folder, with the method of this name and the first seed; or what is left of it.
-    /// Returns where the checkpoint of the last model is.
+    /// Carries out one run of the loop, with the method of this name and the first seed, or the rest of one that was
+    /// interrupted. Returns the path of the last model's checkpoint.
     ///
     /// # Errors
     /// An unknown method, or as [`Session::carry_out`].
@@ -170,7 +170,7 @@ impl Session {
             .find(|method| method.config.name == name)
     }
 
-    /// Whether one of the methods has such a prior.
+    /// Whether a method has a prior of this kind.
     pub(super) fn has_prior(&self, is_such: impl Fn(&Prior) -> bool) -> bool {
         let mut methods = self.methods.iter();
         methods.any(|method| is_such(&method.learner.prior))
@@ -201,7 +201,7 @@ impl Session {
         })
     }
 
-    /// The return of every method against the real transitions that it has seen.
+    /// Evaluates the return of every method against the number of real transitions.
     fn learning_curves(
         &self,
         learnt: &[Vec<Learnt>],
@@ -229,7 +229,7 @@ impl Session {
         Ok(())
     }
 
-    /// Train every method with every seed: `[method][seed]`.
+    /// Trains every method with every seed: `[method][seed]`.
     fn learn(
         &self,
         folder: &RunFolder,
@@ -270,7 +270,7 @@ impl Session {
         })
     }
 
-    /// An episode with the model of each seed, counted from 0.
+    /// Evaluates a model for each seed; `predictor` is given the seed's position, from 0.
     pub(super) fn judge_all(
         &self,
         predictor: impl Fn(usize) -> Predictor + Sync,
@@ -310,7 +310,7 @@ impl Session {
         Ok(fixed)
     }
 
-    /// The plant's own equations, stepped as models are.
+    /// The plant's own equations, integrated as those of models are.
     fn perfect(&self) -> Predictor {
         Predictor::of_equations(self.plant.true_dynamics(), self.task.integrator)
     }
@@ -337,13 +337,13 @@ impl Session {
     }
 }
 
-/// An effect of a plant: name, joint counted from 1, values.
+/// An effect of a plant: name, joint (from 1), values.
 fn effect(effect: &FittedEffect) -> Value {
     let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
     json!([effect.effect.name, effect.joint + 1, values])
 }
 
-/// The equations of a system with their declared values.
+/// The equations of a system with the declared values.
 pub(super) fn equations(system: &System) -> crate::model::Dynamics {
     system.dynamics(&system.sign())
 }

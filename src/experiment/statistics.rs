@@ -1,6 +1,6 @@
 use rand::{Rng, RngExt};
 
-/// 95 %, by resampling the seeds (Efron 1979).
+/// A 95 % confidence interval, by bootstrap over the seeds (Efron 1979).
 pub type Interval = [f64; 2];
 
 const RESAMPLES: usize = 2000;
@@ -9,14 +9,14 @@ pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Of the sample; 0 of a single value.
+/// The sample's standard deviation; 0 for a single value.
 pub(crate) fn deviation(values: &[f64]) -> f64 {
     let middle = mean(values);
     let squares: f64 = values.iter().map(|value| (value - middle).powi(2)).sum();
     (squares / (values.len() - 1).max(1) as f64).sqrt()
 }
 
-/// The interval of what `statistic` makes of the seeds that it is given.
+/// The bootstrap interval of a statistic of the seeds, given by their positions.
 pub(super) fn bootstrap(
     seeds: usize,
     rng: &mut impl Rng,

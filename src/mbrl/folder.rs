@@ -40,7 +40,7 @@ impl Folder {
         &self.rounds
     }
 
-    /// Where the model after the last round is.
+    /// The checkpoint of the model after the last round.
     pub fn checkpoint(&self) -> PathBuf {
         self.checkpoint_after(self.rounds.len())
     }
@@ -49,7 +49,7 @@ impl Folder {
         self.folder.path().join(format!("checkpoint-{rounds:03}"))
     }
 
-    /// The run as it was left, or begun. `dynamics` is what its model file says.
+    /// The progress of the run so far; a run without rounds is started. `dynamics` are the equations of its model file.
     ///
     /// # Errors
     /// A damaged file, or a plant that diverges.

@@ -23,7 +23,7 @@ struct Setting {
     dynamics: Dynamics,
 }
 
-/// The pendulum with friction, noise and, as an effect with memory, a delay.
+/// The pendulum with friction, noise and a delay, which is an effect with memory.
 fn setting() -> Setting {
     let library = Library::built_in();
     let mut task = Task::read(Path::new("pendulum")).unwrap();
@@ -116,7 +116,7 @@ impl Setting {
 fn a_run_in_sessions_is_the_run_in_one() {
     let setting = setting();
     let (rounds, angles) = setting.in_sessions(&[5]);
-    // Session ends within an episode of three stretches and at its end.
+    // The run is interrupted within an episode of three stretches and at its end.
     assert_eq!(
         setting.in_sessions(&[1, 3, 5]),
         (rounds.clone(), angles.clone())
@@ -136,7 +136,7 @@ fn a_round_without_its_line_is_done_again_from_the_model_before_it() {
         setting.rounds(&mut progress, &mut folder, until);
         folder
     };
-    // As a kill between the third model and its line leaves it.
+    // The state after a kill between writing the third model and writing its line.
     let second = go_on(killed.path(), 2).checkpoint();
     let third = go_on(further.path(), 3).checkpoint();
     let left = killed.path().join(third.file_name().unwrap());
@@ -156,7 +156,7 @@ fn a_stretch_begins_where_the_last_one_ended() {
     let stretch = |k: usize| &angles[16 + 21 * k..][..21];
     assert_eq!(stretch(0)[20], stretch(1)[0]);
     assert_eq!(stretch(1)[20], stretch(2)[0]);
-    // Three stretches are an episode; the next one starts anew.
+    // An episode has three stretches; the next one has a new initial state.
     assert_ne!(stretch(2)[20], stretch(3)[0]);
     assert!((stretch(3)[0] - std::f64::consts::PI).abs() < 0.2);
 }

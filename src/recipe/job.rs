@@ -7,32 +7,32 @@ use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWe
 use crate::runs::{Identity, Purpose, RunFolder, stream};
 use crate::train::{Backend, Checkpoint, Origin, Training};
 
-/// A recipe with all that it names read and drawn: the start of a run, or of its continuation.
+/// A recipe with everything it refers to, read or sampled: ready to train or to resume.
 pub struct Job {
     pub recipe: Recipe,
     pub material: Material,
     /// The model before training.
     pub model: HybridModel,
-    /// For the checkpoints.
+    /// What the checkpoints record of the run.
     pub origin: Origin,
-    /// What the model file says, for the continuation.
+    /// The equations of the model file, for resuming.
     pub(super) dynamics: Dynamics,
 }
 
-/// A key of configurations.
+/// The configuration's key for the command line that repeats the run.
 const COMMAND_LINE: &str = "command_line";
 
-/// A model file, read, with its text.
+/// A model file: its system and its text.
 pub(super) struct Declared {
     pub system: System,
     pub text: String,
 }
 
 impl Job {
-    /// Train from scratch.
+    /// Prepares training from scratch.
     ///
     /// # Errors
-    /// A recipe, model, plant or log that cannot be read or that do not fit each other.
+    /// A recipe, model, plant or log that cannot be read, or that do not match.
     pub fn train(
         recipe: Recipe,
         library: &Library,
@@ -72,14 +72,14 @@ impl Job {
         })
     }
 
-    /// Record the command line that repeats this run.
+    /// Records the command line that repeats this run.
     #[must_use]
     pub fn begun_by(mut self, command_line: String) -> Self {
         self.origin.config[COMMAND_LINE] = command_line.into();
         self
     }
 
-    /// The training: new, or as the checkpoint in `folder` left it.
+    /// Starts the training, or resumes it from the checkpoint in `folder`.
     ///
     /// # Errors
     /// The folder holds something else, or the checkpoint of another run.
@@ -98,12 +98,12 @@ impl Job {
     }
 }
 
-/// What decides the numbers of a training, as its checkpoints record it.
+/// The identity of a training, from what its checkpoints record.
 fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
     let mut config = config.clone();
     let mut take = |key: &str| config.as_object_mut().and_then(|all| all.remove(key));
     let text = |value: Option<Value>| value.as_ref().and_then(Value::as_str).map(str::to_owned);
-    // How the command was spelled decides nothing.
+    // How the command was spelled does not matter.
     take(COMMAND_LINE);
     let (command, data) = (text(take("command")), text(take("data")));
     let inputs = [

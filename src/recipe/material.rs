@@ -13,19 +13,19 @@ use crate::train::{Segments, SegmentsError};
 /// The data of a recipe, ready for training.
 pub struct Material {
     pub training: Segments,
-    /// As many other segments of the plant, to judge by; none with logs.
+    /// The same number of other segments of the plant, for testing; none with logs.
     pub test: Option<Segments>,
-    /// Name and true value of the parameters of a simulated plant.
+    /// Names and true values of the parameters of a simulated plant.
     pub truth: Vec<(String, f64)>,
-    /// What a reader of the logs should know, one sentence each.
+    /// Remarks on the logs, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl Material {
-    /// Read or draw the data.
+    /// Reads the logs or samples the plant.
     ///
     /// # Errors
-    /// Unreadable logs, another number of joints, a plant that diverges, logs that are too short.
+    /// Unreadable logs, logs that are too short, another number of joints, or a plant that diverges.
     pub fn gather(
         recipe: &Recipe,
         system: &System,
@@ -50,7 +50,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
     let dynamics = equations(system);
     let values = dynamics.values();
     let modelled = |log: &Log| match recipe.kind {
-        // A network alone has no effects: it learns from what was commanded and shown.
+        // A network alone has no effects: it learns from the commanded torques and the sensor readings.
         Kind::DataDriven => log.clone(),
         Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, &values, log),
     };
@@ -58,7 +58,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
     for log in &logs {
         let before = training.len();
         for trajectory in trajectories(&modelled(log), thinning) {
-            // A gap may leave a piece that holds no segment; a log without any is refused below.
+            // A piece between gaps may be too short for a segment; a log without any segment is refused below.
             if trajectory.time.len() > logged.steps {
                 push(&mut training, &trajectory).map_err(in_file(&log.path))?;
             }

@@ -1,5 +1,5 @@
-//! Recipes: what to train on what data, in a text file; and the jobs that come of them, which can be
-//! interrupted and go on.
+//! Recipes: text files that say what to train on which data; and the jobs made from them, which can be interrupted and
+//! resumed.
 
 mod data;
 mod error;

@@ -3,25 +3,25 @@ use crate::model::MlpWeights;
 use crate::runs::{Purpose, stream};
 use crate::train::{Penalty, Start, Sweep};
 
-/// What one model of a sweep has of its own.
+/// What sets one model of a sweep apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Member {
-    /// Of its initial network and of the order of its minibatches.
+    /// Seed of its initial weights and of the order of its minibatches.
     pub seed: u64,
-    /// In place of the recipe's weight of the penalty.
+    /// Weight of the penalty; the recipe's own where there is none.
     pub alpha: Option<f64>,
 }
 
 impl Job {
-    /// A run of many models, all on the data of this job, in place of one. Each begins with the weights that a job of its
-    /// seed would draw.
+    /// Trains many models at once, all on the data of this job. Each starts from the weights that a job of its own seed
+    /// would draw.
     ///
     /// # Errors
-    /// A model without a network, in which nothing would differ; alphas where there is none; settings that are out of
-    /// range.
+    /// A model without a network, whose copies would all be equal; weights for a penalty that does not take them; settings
+    /// out of range.
     ///
     /// # Panics
-    /// When there are no members.
+    /// If `members` is empty.
     pub fn sweep(&self, members: &[Member]) -> Result<Sweep, RecipeError> {
         self.check(members)?;
         let made = self.model.frame().networks.last();

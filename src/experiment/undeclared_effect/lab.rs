@@ -9,7 +9,7 @@ use crate::plant::Plant;
 use crate::runs::RunFolder;
 use crate::train::Backend;
 
-/// All that an experiment takes, checked.
+/// An experiment with everything it refers to read and checked.
 pub struct Lab {
     pub experiment: Experiment,
     pub library: Library,
@@ -17,17 +17,17 @@ pub struct Lab {
     pub task: Task,
     /// One for each case.
     pub plants: Vec<Plant>,
-    /// Where hybrids are trained.
+    /// The backend that hybrids are trained on.
     pub backend: Backend,
-    /// Seeds follow each other from here.
+    /// The first of the consecutive seeds.
     pub first_seed: u64,
 }
 
 impl Lab {
-    /// Look for everything that the experiment names.
+    /// Reads everything that the experiment refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
-    /// What is missing, or does not belong to the declared system.
+    /// Files that are missing or not of the declared system.
     pub fn new(
         experiment: Experiment,
         library: Library,
@@ -69,7 +69,7 @@ impl Lab {
         })
     }
 
-    /// Carry out the trials that are not in the folder yet. `observer` is told of each that is done.
+    /// Carries out the trials that are not in the folder yet. `observer` is called after each trial.
     ///
     /// # Errors
     /// A trial that cannot be carried out, or a folder that cannot be written or holds another run.

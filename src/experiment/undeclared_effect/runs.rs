@@ -5,7 +5,7 @@ use super::{Lab, Trial};
 use crate::experiment::ExperimentError;
 use crate::runs::{Identity, RunFolder};
 
-/// A trial as it is kept in `runs/CASE-SEED.json`, with what decides it besides the experiment that the folder belongs to.
+/// The contents of `runs/CASE-SEED.json`: a trial and the case that it belongs to.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     run: Identity,
@@ -13,7 +13,7 @@ struct Kept {
 }
 
 impl Lab {
-    /// What all trials have in common. Cases and seeds may be added to an experiment that is under way.
+    /// The settings that all trials share. Cases and seeds are not among them, so that more can be added later.
     pub(super) fn identity(&self) -> Identity {
         let experiment = &self.experiment;
         self.identity_of(json!({
@@ -35,7 +35,7 @@ impl Lab {
         }
     }
 
-    /// The trial that `folder` keeps, or else a new one, which it then keeps.
+    /// The trial saved in `folder`; a new one is carried out and saved there.
     pub(super) fn trial_in(
         &self,
         folder: &RunFolder,
