@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use residyn::control::{Meter, Task};
-use residyn::export::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
+use residyn::formats::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
 use residyn::model::{Integrator, System};
 use serde_json::{Value, json};
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use rand::RngExt;
-use residyn::export::{Answers, Portable, Samples, find};
+use residyn::formats::{Answers, Portable, Samples, find};
 use residyn::lanes::Row;
 use residyn::model::{Commands, Integrator, Library, StepTorque, System};
 use serde_json::json;

@@ -3,7 +3,7 @@
 use std::io::{Cursor, Read};
 use std::process::Command;
 
-use residyn::export::{Format, Portable, find};
+use residyn::formats::{Format, Portable, find};
 use serde_json::{Value, json};
 use zip::ZipArchive;
 

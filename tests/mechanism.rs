@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rand::RngExt;
 use residyn::expr::SignForm;
-use residyn::mechanism::{Chain, model_text, read_mjcf, read_urdf};
+use residyn::formats::{read_mjcf, read_urdf};
+use residyn::model::chain::{Chain, model_text};
 use residyn::model::{Dynamics, FittedEffect, Library, System};
 use serde_json::json;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use rand_chacha::ChaCha8Rng;
-use residyn::export::Portable;
+use residyn::formats::Portable;
 use residyn::model::{
     Angles, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights,
     ResidualOn, System,

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use residyn::export::{Portable, find};
 use residyn::expr::SignForm;
-use residyn::mechanism::{model_text, read_mjcf, read_urdf};
+use residyn::formats::{Portable, find};
+use residyn::formats::{read_mjcf, read_urdf};
+use residyn::model::chain::model_text;
 use residyn::model::{Integrator, Library, System};
 use serde_json::json;
 

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
 use super::{Answer, Common};
-use crate::export::{Difference, File, Format, Portable, Unread, find};
+use crate::formats::{Difference, File, Format, Portable, Unread, find};
 use crate::model::{Integrator, Library};
 use crate::train::Manifest;
 

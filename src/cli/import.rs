@@ -5,7 +5,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
-use crate::export::Imported;
+use crate::formats::Imported;
 
 /// Make a checkpoint of a model that was exported as JSON and safetensors
 #[derive(Debug, Args)]

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs};
 use crate::control::Task;
-use crate::export::FORMATS;
+use crate::formats::FORMATS;
 use crate::model::{Effect, Library, System};
 use crate::plant::Plant;
 

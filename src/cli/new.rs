@@ -5,7 +5,8 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
-use crate::mechanism::{Chain, model_text, read_mjcf, read_urdf};
+use crate::formats::{read_mjcf, read_urdf};
+use crate::model::chain::{Chain, model_text};
 use crate::model::{Library, System};
 use crate::report::write_whole;
 
