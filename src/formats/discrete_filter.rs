@@ -1,45 +1,46 @@
+//! Delay and lag of an actuator, discretised exactly for commands that are held over equal steps.
+
 use serde::{Serialize, Serializer};
 
+use super::ExportModel;
 use crate::model::CommandFilter;
 
-use super::Portable;
-
-/// What the filters of one joint make of torques that are held over equal steps. They are linear: everything is a sum
-/// of what the lag has come to and of two of the torques commanded so far.
+/// The delay and lag of one joint for steps of fixed length. Both are linear, so the torque that acts is a linear
+/// combination of the lagged torque and of two earlier commands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HeldFilter {
+pub(super) struct DiscreteFilter {
     /// Counted from 0.
     pub joint: usize,
-    /// How many earlier torques matter; the last of them is the one that acts first.
+    /// How many earlier commands matter; the oldest of them acts first.
     pub past: usize,
-    /// Where in `[torque of this step, earlier ones, the newest first]` the torques stand that act when the step begins
-    /// and that then take their place.
+    /// Positions, in `[command of this step, earlier ones, newest first]`, of the command that acts when the step begins
+    /// and of the one that replaces it.
     pub places: [usize; 2],
-    /// Whether the joint's lag is part of the memory.
+    /// Whether the lagged torque is part of the memory.
     pub lags: bool,
-    /// The mean torque over each equal part of a step.
-    pub mean: Vec<Sum>,
-    /// What the lag has come to at the end of the step.
-    pub end: Sum,
+    /// The mean torque over each substep, in N m (or N).
+    pub mean: Vec<Combination>,
+    /// The lagged torque at the end of the step, in N m (or N).
+    pub end: Combination,
 }
 
-/// Factors of a sum.
+/// Coefficients of a linear combination of torques. Saved as a list, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sum {
-    /// Of the lag at the start of the step.
+pub(super) struct Combination {
+    /// Of the lagged torque at the start of the step.
     pub lagged: f64,
-    /// Of the torque that acts, by the delay, when the step begins.
+    /// Of the command that acts, after the delay, when the step begins.
     pub first: f64,
-    /// Of the torque that takes its place within the step.
+    /// Of the command that replaces it within the step.
     pub then: f64,
 }
 
-/// Below this share of a step the rest of a delay is the rounding of a quotient.
-const LEAST_REST: f64 = 1e-9;
+/// A remainder of the delay below this share of a step is rounding.
+const ROUNDING: f64 = 1e-9;
 
-impl HeldFilter {
-    /// The filters of a model, one for each joint that has any.
-    pub fn all(model: &Portable) -> Vec<Self> {
+impl DiscreteFilter {
+    /// The filters of a model, one for each joint that has a delay or a lag.
+    pub fn all(model: &ExportModel) -> Vec<Self> {
         let of_joint = |joint: usize| {
             let delay = model.filter(joint, CommandFilter::Delay);
             let lag = model.filter(joint, CommandFilter::Lag);
@@ -51,42 +52,25 @@ impl HeldFilter {
         (0..model.joints()).filter_map(of_joint).collect()
     }
 
-    fn new(joint: usize, delay: f64, lag: Option<f64>, step_s: f64, parts: usize) -> Self {
-        let (whole, rest) = split(delay / step_s);
+    /// `delay`, `lag` and `step_s` in s.
+    fn new(joint: usize, delay: f64, lag: Option<f64>, step_s: f64, substeps: usize) -> Self {
+        let (whole, rest) = whole_and_rest(delay / step_s);
         let change = rest * step_s;
-        // What the lag has come to, as the step goes on.
-        let mut now = Sum {
-            lagged: 1.0,
-            ..Sum::default()
-        };
-        let mut mean = Vec::with_capacity(parts);
-        for part in 0..parts {
-            let ends = [part, part + 1].map(|k| step_s * k as f64 / parts as f64);
-            let middle = change.clamp(ends[0], ends[1]);
-            let mut sum = Sum::default();
+        let mut lagged = Combination::LAGGED;
+        let mut mean = Vec::with_capacity(substeps);
+        for substep in 0..substeps {
+            let [start, end] = [substep, substep + 1].map(|k| step_s * k as f64 / substeps as f64);
+            let middle = change.clamp(start, end);
+            let mut average = Combination::default();
             for (from, to, command) in [
-                (
-                    ends[0],
-                    middle,
-                    Sum {
-                        first: 1.0,
-                        ..Sum::default()
-                    },
-                ),
-                (
-                    middle,
-                    ends[1],
-                    Sum {
-                        then: 1.0,
-                        ..Sum::default()
-                    },
-                ),
+                (start, middle, Combination::FIRST),
+                (middle, end, Combination::THEN),
             ] {
-                let (over, end) = now.held(command, lag.unwrap_or(0.0), to - from);
-                sum = sum.plus(over, (to - from) / (ends[1] - ends[0]));
-                now = end;
+                let (over, at_end) = lagged.after_lag(command, lag.unwrap_or(0.0), to - from);
+                average = average.plus(over, (to - from) / (end - start));
+                lagged = at_end;
             }
-            mean.push(sum);
+            mean.push(average);
         }
         let past = whole + usize::from(rest > 0.0);
         Self {
@@ -95,32 +79,44 @@ impl HeldFilter {
             places: [past, whole],
             lags: lag.is_some(),
             mean,
-            end: now,
+            end: lagged,
         }
     }
 
-    /// Numbers that the memory holds: earlier torques, the newest first, then the lag.
+    /// Size of the memory: earlier commands, newest first, then the lagged torque.
     pub fn memory(&self) -> usize {
         self.past + usize::from(self.lags)
     }
 }
 
-/// Whole steps, and the share of one that is left.
-fn split(steps: f64) -> (usize, f64) {
-    let whole = (steps + LEAST_REST).floor();
+/// Whole steps, and the remaining share of one.
+fn whole_and_rest(steps: f64) -> (usize, f64) {
+    let whole = (steps + ROUNDING).floor();
     let rest = (steps - whole).max(0.0);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a delay is not negative
     let whole = whole as usize;
-    (whole, if rest < LEAST_REST { 0.0 } else { rest })
+    (whole, if rest < ROUNDING { 0.0 } else { rest })
 }
 
-impl Serialize for Sum {
+impl Serialize for Combination {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         [self.lagged, self.first, self.then].serialize(serializer)
     }
 }
 
-impl Sum {
+impl Combination {
+    const LAGGED: Self = Self::new(1.0, 0.0, 0.0);
+    const FIRST: Self = Self::new(0.0, 1.0, 0.0);
+    const THEN: Self = Self::new(0.0, 0.0, 1.0);
+
+    const fn new(lagged: f64, first: f64, then: f64) -> Self {
+        Self {
+            lagged,
+            first,
+            then,
+        }
+    }
+
     fn plus(self, other: Self, factor: f64) -> Self {
         Self {
             lagged: self.lagged + factor * other.lagged,
@@ -129,8 +125,8 @@ impl Sum {
         }
     }
 
-    /// Mean and end of T dx/dt + x = `command` over `length`, from x = self.
-    fn held(self, command: Self, lag: f64, length: f64) -> (Self, Self) {
+    /// Mean and end value of x in `lag` dx/dt + x = `command` over `length` (both in s), from x = self.
+    fn after_lag(self, command: Self, lag: f64, length: f64) -> (Self, Self) {
         if lag <= 0.0 || length <= 0.0 {
             let end = if length > 0.0 { command } else { self };
             return (command, end);
@@ -145,28 +141,28 @@ impl Sum {
 
 #[cfg(test)]
 mod tests {
-    use super::HeldFilter;
+    use super::DiscreteFilter;
 
     #[test]
-    fn a_delay_of_whole_steps_is_an_earlier_torque() {
+    fn a_delay_of_whole_steps_is_an_earlier_command() {
         for (delay, past) in [(0.0, 0), (0.04, 2), (0.06, 3)] {
-            let filter = HeldFilter::new(0, delay, None, 0.02, 2);
+            let filter = DiscreteFilter::new(0, delay, None, 0.02, 2);
             assert_eq!((filter.past, filter.places), (past, [past, past]));
             assert!(filter.mean.iter().all(|sum| (sum.then - 1.0).abs() < 1e-12));
         }
     }
 
     #[test]
-    fn a_torque_takes_its_place_within_the_step() {
-        let filter = HeldFilter::new(0, 0.025, None, 0.02, 1);
+    fn a_command_replaces_another_within_the_step() {
+        let filter = DiscreteFilter::new(0, 0.025, None, 0.02, 1);
         assert_eq!((filter.past, filter.places), (2, [2, 1]));
         let mean = filter.mean[0];
         assert!((mean.first - 0.25).abs() < 1e-12 && (mean.then - 0.75).abs() < 1e-12);
     }
 
     #[test]
-    fn factors_of_a_constant_torque_come_to_one() {
-        let filter = HeldFilter::new(0, 0.03, Some(0.05), 0.02, 3);
+    fn coefficients_of_a_constant_command_sum_to_one() {
+        let filter = DiscreteFilter::new(0, 0.03, Some(0.05), 0.02, 3);
         for sum in filter.mean.iter().chain([&filter.end]) {
             assert!(
                 (sum.lagged + sum.first + sum.then - 1.0).abs() < 1e-12,

@@ -1,38 +1,40 @@
+//! A model as the formats read it.
+
 use rand::Rng;
 use serde::Serialize;
 use serde_json::json;
 
-use super::verify::Prediction;
-use super::{Answers, Samples};
+use super::verify::{Predictions, ReferenceModel, Samples, draw};
+use crate::expr::Op;
 use crate::model::{
     CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
-    nothing_but, with_residual,
+    nothing_but,
 };
 
-/// A model as every format reads it: the equations with their values, the networks whose outputs are added to their
-/// derivative, and how both become steps.
+/// A model as every format reads it: equations with their values, the networks whose outputs are added to their
+/// derivative, and the step.
 #[derive(Debug, Clone)]
-pub struct Portable {
+pub struct ExportModel {
     /// What the model file says.
     pub system: System,
-    /// What stands around the networks, its parameters at the values to export.
+    /// The equations without the networks, parameters at the values to export.
     pub equations: Dynamics,
-    /// The network that stands in place of equations, where one does.
+    /// The network that replaces the equations, if any.
     pub prior: Option<MlpWeights>,
-    /// The network for what the equations or the prior lack.
+    /// The network for what equations or prior lack, if any.
     pub residual: Option<MlpWeights>,
-    /// What the equations carry of the library of effects.
-    pub effects: Vec<CarriedEffect>,
+    /// The effects in the equations.
+    pub effects: Vec<ExportedEffect>,
     pub integrator: Integrator,
     /// How long a torque is held, in s.
     pub step_s: f64,
-    /// The configuration and the seed that the model came of.
+    /// Configuration and seed of the run that made the model.
     pub origin: serde_json::Value,
 }
 
-/// An effect that a model carries, in the names of the model's parameters.
+/// An effect of an exported model, its formula in the model's parameter names.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CarriedEffect {
+pub struct ExportedEffect {
     pub name: String,
     /// Counted from 1.
     pub joint: usize,
@@ -40,9 +42,9 @@ pub struct CarriedEffect {
     pub parameters: Vec<String>,
 }
 
-impl Portable {
-    /// The model of `system` with these numbers: values for all parameters of the equations with their effects, or a
-    /// network in their place; and a residual.
+impl ExportModel {
+    /// The model of `system` with these numbers: values of all parameters, those of effects included, or a network in
+    /// place of the equations; and a residual. `step_s` in s.
     pub fn new(
         system: &System,
         numbers: ModelWeights,
@@ -62,7 +64,7 @@ impl Portable {
         keep_intervals(&mut equations);
         Self {
             system: system.clone(),
-            effects: carried(system, &equations),
+            effects: exported_effects(system, &equations),
             equations,
             prior,
             residual,
@@ -72,8 +74,8 @@ impl Portable {
         }
     }
 
-    /// The model that a file states, with its own values.
-    pub fn stated(
+    /// The model of a file, with the file's own values.
+    pub fn of_system(
         system: &System,
         integrator: Integrator,
         step_s: f64,
@@ -87,7 +89,7 @@ impl Portable {
         Self::new(system, numbers, integrator, step_s, origin)
     }
 
-    /// The equations without the file's effects, where no network takes their place.
+    /// The equations without effects.
     pub fn declared(&self) -> Dynamics {
         let declared = self.system.dynamics_with(&[], &self.system.sign());
         declared.with_values(self.equations.values())
@@ -103,20 +105,20 @@ impl Portable {
         self.equations.joints
     }
 
-    /// The networks in the order in which they are evaluated. Each gives n or `2n` outputs, added to the last of the
-    /// rates.
-    pub fn networks(&self) -> impl Iterator<Item = &MlpWeights> {
-        self.prefixed().map(|(_, network)| network)
+    /// The networks by name, in order of evaluation. Each has n or `2n` outputs, added to the last of the rates.
+    pub(super) fn networks(&self) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
+        let prior = self.prior.iter().map(|network| ("prior", network));
+        prior.chain(self.residual.iter().map(|network| ("residual", network)))
     }
 
-    /// The same, each with the prefix of its tensors' names.
+    /// The same with the prefix of their tensors' names.
     pub(super) fn prefixed(&self) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
         let prior = self.prior.iter().map(|network| ("prior.", network));
         prior.chain(self.residual.iter().map(|network| ("", network)))
     }
 
     /// Every learnable number.
-    pub fn weights(&self) -> ModelWeights {
+    pub(super) fn weights(&self) -> ModelWeights {
         ModelWeights {
             parameters: self.equations.values(),
             prior: self.prior.clone(),
@@ -124,8 +126,8 @@ impl Portable {
         }
     }
 
-    /// Unit of a joint's (counted from 0) position, and of its torque.
-    pub fn units(&self, joint: usize) -> [&'static str; 2] {
+    /// Units of position and torque of a joint (counted from 0).
+    pub(super) fn units(&self, joint: usize) -> [&'static str; 2] {
         if self.system.prismatic[joint] {
             ["m", "N"]
         } else {
@@ -133,19 +135,20 @@ impl Portable {
         }
     }
 
-    /// Whether the motion depends on time other than through the torque.
-    pub fn depends_on_time(&self) -> bool {
+    /// Whether the equations use the time.
+    pub(super) fn depends_on_time(&self) -> bool {
         let program = &self.equations.program;
-        let time = program.ops().iter().position(
-            |op| matches!(op, crate::expr::Op::Input(k) if *k as usize == 3 * self.joints()),
-        );
+        let time = program
+            .ops()
+            .iter()
+            .position(|op| matches!(op, Op::Input(k) if *k as usize == 3 * self.joints()));
         let mut operands = program.ops().iter().flat_map(|op| op.operands());
         operands.any(|node| Some(node.index()) == time)
     }
 
-    /// Meaning and interval of each parameter, as far as they are known, for a comment beside it.
+    /// Meaning and interval of each parameter, as far as known, for a comment.
     pub(super) fn parameter_notes(&self) -> Vec<String> {
-        let file: toml::Table = toml::from_str(&self.system.text).unwrap_or_default();
+        let file: toml::Table = toml::from_str(&self.system.text).expect("a model file is TOML");
         let about = |name: &str| {
             let about = file.get("parameters")?.get(name)?.get("about")?;
             about.as_str().map(str::to_owned)
@@ -153,7 +156,7 @@ impl Portable {
         let acts = |name: &str| {
             let mut effects = self.effects.iter();
             let effect = effects.find(|effect| effect.parameters.iter().any(|p| p == name))?;
-            let CarriedEffect {
+            let ExportedEffect {
                 name,
                 joint,
                 expression,
@@ -172,8 +175,8 @@ impl Portable {
         self.equations.parameters.iter().map(note).collect()
     }
 
-    /// What no format carries of sensors that show something else than the rig's own angle.
-    pub(super) fn sensor_limits(&self) -> Vec<String> {
+    /// What no format carries of sensors: readings that differ from the joint's own position.
+    pub(super) fn sensors_not_carried(&self) -> Vec<String> {
         let shown = self.equations.reading.as_ref().map(|_| {
             "what the sensors show: positions are the rig's own, before play shifts them".to_owned()
         });
@@ -185,31 +188,34 @@ impl Portable {
         shown.into_iter().chain(own).collect()
     }
 
-    /// The time constant of a filter on a joint (counted from 0) in s, where the model has such a filter.
-    pub fn filter(&self, joint: usize, kind: CommandFilter) -> Option<f64> {
+    /// The parameter that is the time constant (s) of a joint's delay or lag, if it has one. Joints are counted from 0.
+    pub(super) fn filter_parameter(&self, joint: usize, kind: CommandFilter) -> Option<&Parameter> {
         let mut filters = self.equations.filters.iter();
         let filter = filters.find(|filter| filter.joint == joint && filter.kind == kind)?;
-        Some(self.equations.parameters[filter.parameter].value)
+        Some(&self.equations.parameters[filter.parameter])
     }
 
-    /// The whole model as one program, and its steps.
+    /// Its value, in s.
+    pub(super) fn filter(&self, joint: usize, kind: CommandFilter) -> Option<f64> {
+        self.filter_parameter(joint, kind).map(|p| p.value)
+    }
+
+    /// The whole model as one program, and its step.
     ///
     /// # Errors
-    /// A network that is not one for the model's joints.
-    pub(super) fn prediction(&self) -> Result<Prediction, HybridError> {
-        let mut networks = self.networks();
-        let whole = networks.try_fold(self.equations.clone(), |dynamics, network| {
-            with_residual(&dynamics, network)
-        });
-        Ok(Prediction {
-            whole: whole?,
-            integrator: self.integrator,
-            step_s: self.step_s,
-        })
+    /// A network that does not fit the number of joints.
+    pub(super) fn reference(&self) -> Result<ReferenceModel, HybridError> {
+        let networks = self.networks().map(|(_, network)| network);
+        ReferenceModel::new(
+            self.equations.clone(),
+            networks,
+            self.integrator,
+            self.step_s,
+        )
     }
 
-    /// Which program wrote a file, and what the model came of: for the head of every file.
-    pub fn provenance(&self) -> serde_json::Value {
+    /// The program's version, and configuration and seed of the run: for the head of every file.
+    pub(super) fn provenance(&self) -> serde_json::Value {
         json!({
             "residyn": env!("CARGO_PKG_VERSION"),
             "system": self.name(),
@@ -219,28 +225,24 @@ impl Portable {
         })
     }
 
-    /// Points and a rollout at which readers of the model can be asked.
+    /// Sample points and a rollout for the comparison of clients.
     ///
     /// # Errors
-    /// A network that is not one for the model's joints.
+    /// A network that does not fit the number of joints.
     pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, HybridError> {
-        Ok(Samples::draw(
-            &self.prediction()?,
-            &self.system.prismatic,
-            rng,
-        ))
+        Ok(draw(&self.reference()?, &self.system.prismatic, rng))
     }
 
-    /// What the program itself predicts there, in f64.
+    /// The program's own predictions at samples, in f64.
     ///
     /// # Errors
-    /// A network that is not one for the model's joints.
-    pub fn answers(&self, samples: &Samples) -> Result<Answers, HybridError> {
-        Ok(self.prediction()?.answers(samples))
+    /// A network that does not fit the number of joints.
+    pub fn predict(&self, samples: &Samples) -> Result<Predictions, HybridError> {
+        Ok(self.reference()?.predict(samples))
     }
 }
 
-/// The file's intervals hold where the value is still within them.
+/// Keep the file's interval of a value only where the value lies within it.
 fn keep_intervals(equations: &mut Dynamics) {
     for parameter in &mut equations.parameters {
         let value = parameter.value;
@@ -249,8 +251,8 @@ fn keep_intervals(equations: &mut Dynamics) {
     }
 }
 
-/// The effects of a model file, unless a network takes the place of its equations.
-fn carried(system: &System, equations: &Dynamics) -> Vec<CarriedEffect> {
+/// The effects of a model file; none where a network replaces the equations.
+fn exported_effects(system: &System, equations: &Dynamics) -> Vec<ExportedEffect> {
     let mut first = system.parameters.len();
     if equations.parameters.len() < first {
         return Vec::new();
@@ -259,7 +261,7 @@ fn carried(system: &System, equations: &Dynamics) -> Vec<CarriedEffect> {
         let own = &equations.parameters[first..first + effect.values.len()];
         first += own.len();
         let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
-        CarriedEffect {
+        ExportedEffect {
             name: effect.effect.name.clone(),
             joint: effect.joint + 1,
             expression: effect.expression(&names),

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::{ExportError, File, Format, Portable, Reader};
+use super::verify::Client;
+use super::{ExportError, ExportModel, File, Format};
 use crate::expr::latex_name;
 use crate::model::{Angles, Entry, FittedEffect, Integrator, MlpWeights, Parameter, ResidualOn};
 use crate::report::digits;
@@ -11,19 +12,21 @@ use crate::report::digits;
 pub(super) const FORMAT: Format = Format {
     name: "latex",
     about: "the equations with their values and intervals, as a document",
-    limits,
+    extension: "tex",
+    not_carried,
     files,
-    reader: Reader::None("it is for people to read"),
+    client: Client::None("it is for people to read"),
     tolerance: 0.0,
+    robots: None,
 };
 
-fn limits(model: &Portable) -> Vec<String> {
+fn not_carried(model: &ExportModel) -> Vec<String> {
     let network = model.networks().next();
-    let weights = network.map(|_| "weights of networks: their form alone is described".to_owned());
+    let weights = network.map(|_| "weights of networks: only their form is described".to_owned());
     weights.into_iter().collect()
 }
 
-fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     Ok(vec![File {
         path: path.to_owned(),
         bytes: document(model).into_bytes(),
@@ -31,7 +34,7 @@ fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
     }])
 }
 
-fn document(model: &Portable) -> String {
+fn document(model: &ExportModel) -> String {
     let mut out = format!(
         "% {}\n\\documentclass{{article}}\n\\usepackage[T1]{{fontenc}}\n\\usepackage{{amsmath}}\n\\usepackage[margin=25mm]{{geometry}}\n\
          \\begin{{document}}\n\n\\section*{{{}}}\n\n",
@@ -44,16 +47,14 @@ fn document(model: &Portable) -> String {
     motion(&mut out, model);
     effects(&mut out, model);
     parameters(&mut out, &model.equations.parameters);
-    for (what, network) in [("prior", &model.prior), ("residual", &model.residual)] {
-        if let Some(network) = network {
-            out += &network_in_words(what, network);
-        }
+    for (name, network) in model.networks() {
+        out += &network_in_words(name, network);
     }
     out += &step(model);
     out + "\\end{document}\n"
 }
 
-/// Text of a file as text of a document.
+/// Text with the special characters of LaTeX escaped.
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars() {
@@ -68,7 +69,7 @@ fn escaped(text: &str) -> String {
     out
 }
 
-/// With a capital letter at its beginning.
+/// Escaped, with a capital letter at its beginning.
 fn sentence(text: &str) -> String {
     let text = escaped(text.trim_end_matches('.'));
     let mut letters = text.chars();
@@ -77,20 +78,21 @@ fn sentence(text: &str) -> String {
     })
 }
 
-fn motion(out: &mut String, model: &Portable) {
+fn motion(out: &mut String, model: &ExportModel) {
     if model.prior.is_some() {
-        *out += "The rates of the state are those of a network.\n\n";
+        *out += "The derivative of the state is that of a network.\n\n";
         return;
     }
     *out += "\\subsection*{Equations of motion}\n\n\\begin{align*}\n";
     *out += &model.system.latex().join(" \\\\\n");
     *out += "\n\\end{align*}\n\n";
     if !model.effects.is_empty() {
-        *out += "Here $\\tau$ is what the effects below make of the commanded torques.\n\n";
+        *out +=
+            "Here $\\tau$ is the torque that results from the command and the effects below.\n\n";
     }
 }
 
-fn effects(out: &mut String, model: &Portable) {
+fn effects(out: &mut String, model: &ExportModel) {
     if model.effects.is_empty() {
         return;
     }
@@ -145,7 +147,7 @@ fn parameters(out: &mut String, parameters: &[Parameter]) {
     *out += "\\end{tabular}\n\n";
 }
 
-/// Without zeros at the end, which would tell of digits that nobody found.
+/// Without trailing zeros, which would suggest digits that were not determined.
 fn plain(value: &str) -> String {
     if value.contains('.') {
         let value = value.trim_end_matches('0');
@@ -185,7 +187,7 @@ fn network_in_words(what: &str, network: &MlpWeights) -> String {
     };
     let on = match network.on {
         ResidualOn::Accelerations => "the accelerations",
-        ResidualOn::Derivative => "the rates of the whole state",
+        ResidualOn::Derivative => "the derivative of the whole state",
     };
     format!(
         "\\subsection*{{Network}}\n\nThe {what} is a network with ReLU between layers of {} neurons. Its inputs are \
@@ -194,7 +196,7 @@ fn network_in_words(what: &str, network: &MlpWeights) -> String {
     )
 }
 
-fn step(model: &Portable) -> String {
+fn step(model: &ExportModel) -> String {
     let integrator = match model.integrator {
         Integrator::SemiImplicitEuler => "one step of the semi-implicit Euler method".to_owned(),
         Integrator::Rk4 => "one step of the classical Runge--Kutta method".to_owned(),

@@ -1,5 +1,7 @@
-//! The model in other people's tools: one file a format, each of which reads a [`Portable`] and says before writing
-//! what it cannot carry; and what a reader of the written files predicts beside what the program itself does.
+//! Formats of other programs, one file or folder each. Models are written in all of them; robot descriptions are read as
+//! well. A written file is checked against the program's own predictions ([`Format::predict`]).
+//!
+//! A new format is a file with a [`Format`] and one line in [`FORMATS`]: commands, lists and tests read that table.
 
 mod c;
 mod discrete_filter;
@@ -15,15 +17,14 @@ mod robot;
 mod urdf;
 mod verify;
 
-pub use discrete_filter::{HeldFilter, Sum as HeldSum};
-pub use export_model::{CarriedEffect, Portable};
-pub use format::{ExportError, File, Format, Reader, Unread, find};
-pub use json::{Description, ImportError, Imported};
-pub use mjcf::read_mjcf;
-pub use urdf::read_urdf;
-pub use verify::{Answers, Difference, PythonClient, Samples};
+pub use export_model::{ExportModel, ExportedEffect};
+pub use format::{ExportError, File, Format, RobotReader};
+pub use json::{ImportError, Imported};
+pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples};
 
-/// Every format, by name.
+use crate::expr::suggestion;
+
+/// Every format.
 pub const FORMATS: &[&Format] = &[
     &c::FORMAT,
     &fmu::fmi3::FORMAT,
@@ -36,3 +37,20 @@ pub const FORMATS: &[&Format] = &[
     &json::SAFETENSORS,
     &urdf::FORMAT,
 ];
+
+/// The format of this name.
+///
+/// # Errors
+/// Unknown name, with the nearest known one.
+pub fn find(name: &str) -> Result<&'static Format, String> {
+    let known = || FORMATS.iter().map(|format| format.name);
+    let format = FORMATS.iter().find(|format| format.name == name);
+    format.copied().ok_or_else(|| {
+        let near = suggestion(name, known());
+        let all: Vec<&str> = known().collect();
+        format!(
+            "unknown format `{name}`{near}; there are {}",
+            all.join(", ")
+        )
+    })
+}

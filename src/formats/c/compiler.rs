@@ -1,6 +1,6 @@
 use std::process::Command;
 
-use crate::formats::Unread;
+use crate::formats::ClientError;
 
 /// The C compiler: `$CC`, which may bring arguments, else `cc`.
 pub(in crate::formats) fn compiler() -> Command {
@@ -15,16 +15,16 @@ pub(in crate::formats) fn compiler() -> Command {
 ///
 /// # Errors
 /// No compiler, or one that refuses; in its words.
-pub(in crate::formats) fn compile(mut command: Command) -> Result<(), Unread> {
+pub(in crate::formats) fn compile(mut command: Command) -> Result<(), ClientError> {
     let name = command.get_program().to_string_lossy().into_owned();
     let run = command.output().map_err(|error| {
-        Unread::NoReader(format!(
+        ClientError::Unavailable(format!(
             "{name} does not start ({error}); name a C compiler in CC"
         ))
     })?;
     match run.status.success() {
         true => Ok(()),
-        false => Err(Unread::Refused(format!(
+        false => Err(ClientError::Failed(format!(
             "{name}: {}",
             String::from_utf8_lossy(&run.stderr)
         ))),

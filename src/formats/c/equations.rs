@@ -2,10 +2,10 @@ use std::fmt::Write;
 
 use super::{Names, networks};
 use crate::expr::{Graph, Node, Program};
-use crate::formats::Portable;
+use crate::formats::ExportModel;
 
 /// The functions of the derivative and its Jacobian.
-pub(super) fn derivative(model: &Portable, names: &Names) -> String {
+pub(super) fn derivative(model: &ExportModel, names: &Names) -> String {
     let program = &model.equations.program;
     let rates: Vec<String> = (0..2 * model.joints())
         .map(|k| format!("rates[{k}]"))
@@ -21,7 +21,7 @@ pub(super) fn derivative(model: &Portable, names: &Names) -> String {
         )
 }
 
-fn jacobian(model: &Portable, names: &Names) -> String {
+fn jacobian(model: &ExportModel, names: &Names) -> String {
     let n = model.joints();
     let program = &model.equations.program;
     let mut graph = Graph::new();

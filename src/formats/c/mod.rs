@@ -1,22 +1,24 @@
 //! One C99 header: derivative, step and both Jacobians, without allocation, in double or float.
 
+mod client;
 mod compiler;
 mod equations;
 mod names;
 mod networks;
-mod reader;
 
 pub(super) use compiler::{compile, compiler};
 pub(super) use names::Names;
 
-use super::{ExportError, File, Format, Portable, Reader};
+use super::verify::Client;
+use super::{ExportError, ExportModel, File, Format};
 use crate::expr::Notation;
 use crate::model::{CommandFilter, Integrator};
 
 pub(super) const FORMAT: Format = Format {
     name: "c",
     about: "one C99 header with its Jacobians, in double or float, without allocation",
-    limits: Portable::sensor_limits,
+    extension: "h",
+    not_carried: ExportModel::sensors_not_carried,
     files: |model, path| {
         Ok(vec![File {
             path: path.to_owned(),
@@ -24,14 +26,15 @@ pub(super) const FORMAT: Format = Format {
             about: "derivative, step and Jacobians in C".into(),
         }])
     },
-    reader: Reader::Own(reader::answers),
+    client: Client::Own(client::predict),
     tolerance: 1e-9,
+    robots: None,
 };
 
 /// The text of the header.
-pub(super) fn header(model: &Portable) -> Result<String, ExportError> {
+pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
     // Networks that do not belong to the model are refused first.
-    model.prediction()?;
+    model.reference()?;
     let names = Names::new(model);
     let code = [
         include_str!("types.h").to_owned(),
@@ -56,8 +59,8 @@ pub(super) fn header(model: &Portable) -> Result<String, ExportError> {
     ))
 }
 
-/// What a reader of the file has to know.
-fn head(model: &Portable, names: &Names) -> String {
+/// The comment at the head of the file.
+fn head(model: &ExportModel, names: &Names) -> String {
     let mut lines = vec![
         format!("{}: {}", model.name(), model.system.about),
         format!(
@@ -68,7 +71,7 @@ fn head(model: &Portable, names: &Names) -> String {
         ),
     ];
     lines.extend(
-        (FORMAT.limits)(model)
+        (FORMAT.not_carried)(model)
             .iter()
             .map(|limit| format!("Not carried: {limit}.")),
     );
@@ -91,7 +94,7 @@ fn head(model: &Portable, names: &Names) -> String {
     format!("/*\n{lines} */\n")
 }
 
-/// Text that neither ends a comment nor begins one.
+/// Text that can stand in a comment.
 fn comment(text: &str) -> String {
     let text = text
         .replace("*/", "* /")
@@ -101,7 +104,7 @@ fn comment(text: &str) -> String {
     text.trim_end_matches('\\').to_owned()
 }
 
-fn sizes(model: &Portable) -> String {
+fn sizes(model: &ExportModel) -> String {
     let n = model.joints();
     let parts = model.integrator.parts();
     format!(
@@ -113,7 +116,7 @@ fn sizes(model: &Portable) -> String {
     )
 }
 
-fn parameters(model: &Portable, names: &Names) -> String {
+fn parameters(model: &ExportModel, names: &Names) -> String {
     let parameters = &model.equations.parameters;
     let notes = model.parameter_notes();
     let fields: String = (parameters.iter().zip(notes))
@@ -129,7 +132,7 @@ fn parameters(model: &Portable, names: &Names) -> String {
     let values: Vec<String> = parameters.iter().map(|p| names.number(p.value)).collect();
     let (fields, values) = match parameters.is_empty() {
         true => (
-            "    char nothing; /* all is in the network */\n".to_owned(),
+            "    char unused; /* the model is a network alone */\n".to_owned(),
             "0".to_owned(),
         ),
         false => (fields, values.join(", ")),
@@ -142,10 +145,11 @@ fn parameters(model: &Portable, names: &Names) -> String {
     )
 }
 
-/// Room beyond what delays span at the exported step: parameters may change, and steps be shorter.
+/// Capacity for past torques relative to what delays span at the exported step: parameters may change, and steps may be
+/// shorter.
 const HEADROOM: f64 = 2.0;
 
-fn memory(model: &Portable, names: &Names) -> String {
+fn memory(model: &ExportModel, names: &Names) -> String {
     if model.equations.filters.is_empty() {
         return include_str!("memoryless.h").to_owned();
     }

@@ -1,20 +1,20 @@
 use std::collections::HashMap;
 
 use crate::expr::{Notation, Part};
-use crate::formats::Portable;
+use crate::formats::ExportModel;
 use crate::model::CommandFilter;
 
-/// How C names the parts of one model, and writes its formulas. In templates and in what is made from them all names
-/// begin with `model_` or `MODEL_`, until [`Names::fill`].
+/// Names of one model's parts in C, and the notation of its formulas. In templates and generated code all names begin with
+/// `model_` or `MODEL_` until [`Names::fill`] replaces these.
 pub(in crate::formats) struct Names {
-    /// What functions and types begin with, and macros.
+    /// Prefix of functions and types; in capitals that of macros.
     pub lower: String,
     pub upper: String,
-    /// What stands for the inputs of the equations.
+    /// C expressions for the inputs of the equations.
     inputs: HashMap<String, String>,
 }
 
-/// What no variable may be called: keywords of C and C++, names that the functions use, and macros.
+/// Reserved names: keywords of C and C++, names that the functions use, and macros.
 const TAKEN: &[&str] = &[
     "HUGE_VAL",
     "INFINITY",
@@ -131,7 +131,7 @@ const TAKEN: &[&str] = &[
 ];
 
 impl Names {
-    pub fn new(model: &Portable) -> Self {
+    pub fn new(model: &ExportModel) -> Self {
         let lower = prefix(model.name());
         let n = model.joints();
         let moving = (0..n)
@@ -161,14 +161,10 @@ impl Names {
         variable(parameter)
     }
 
-    /// The parameter of a joint's filter, or zero.
-    pub fn filter(&self, model: &Portable, joint: usize, kind: CommandFilter) -> String {
-        let mut filters = model.equations.filters.iter();
-        let filter = filters.find(|filter| filter.joint == joint && filter.kind == kind);
-        filter.map_or_else(
-            || "0".to_owned(),
-            |filter| self.name(&model.equations.parameters[filter.parameter].name),
-        )
+    /// The time constant of a joint's filter, or zero.
+    pub fn filter(&self, model: &ExportModel, joint: usize, kind: CommandFilter) -> String {
+        let parameter = model.filter_parameter(joint, kind);
+        parameter.map_or_else(|| "0".to_owned(), |p| self.name(&p.name))
     }
 }
 
@@ -217,7 +213,7 @@ impl Notation for Names {
     }
 }
 
-/// What everything of a system begins with.
+/// The prefix of a system's names.
 fn prefix(system: &str) -> String {
     let ascii = system
         .to_lowercase()
@@ -228,7 +224,8 @@ fn prefix(system: &str) -> String {
     }
 }
 
-/// Names of the model differ in C as well: a letter that C lacks becomes its number, and what is taken grows.
+/// A model's name in C. Distinct names stay distinct: a character that C lacks becomes its code point, and a reserved
+/// name gets an underscore.
 fn variable(name: &str) -> String {
     let letter = |c: char| match c {
         'a'..='z' | 'A'..='Z' | '0'..='9' | '_' => c.to_string(),

@@ -1,11 +1,12 @@
 use super::Names;
 use crate::expr::Notation;
-use crate::formats::Portable;
+use crate::formats::ExportModel;
 use crate::model::{Angles, MlpWeights};
 
 /// The networks as tables of numbers, with the functions that evaluate them.
-pub(super) fn tables(model: &Portable, names: &Names) -> String {
-    let networks: Vec<String> = named(model)
+pub(super) fn tables(model: &ExportModel, names: &Names) -> String {
+    let networks: Vec<String> = model
+        .networks()
         .map(|(name, network)| table(model.joints(), name, network, names))
         .collect();
     match networks.is_empty() {
@@ -14,30 +15,24 @@ pub(super) fn tables(model: &Portable, names: &Names) -> String {
     }
 }
 
-/// What adds their outputs to the rates.
-pub(super) fn added(model: &Portable) -> String {
+/// Code that adds their outputs to the rates.
+pub(super) fn added(model: &ExportModel) -> String {
     each(model, include_str!("network_added.h"))
 }
 
-/// What adds their derivatives to those of the rates.
-pub(super) fn jacobian_added(model: &Portable) -> String {
+/// Code that adds their derivatives to those of the rates.
+pub(super) fn jacobian_added(model: &ExportModel) -> String {
     each(model, include_str!("network_jacobian_added.h"))
 }
 
-fn named(model: &Portable) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
-    let both = [("prior", &model.prior), ("residual", &model.residual)];
-    both.into_iter()
-        .filter_map(|(name, network)| Some((name, network.as_ref()?)))
-}
-
-fn each(model: &Portable, template: &str) -> String {
+fn each(model: &ExportModel, template: &str) -> String {
     let filled = |(name, network): (&str, &MlpWeights)| {
         let outputs = network.on.outputs(model.joints());
         template
             .replace("NETWORK", name)
             .replace("OUTPUTS", &outputs.to_string())
     };
-    named(model).map(filled).collect()
+    model.networks().map(filled).collect()
 }
 
 fn table(joints: usize, name: &str, network: &MlpWeights, names: &Names) -> String {
@@ -57,7 +52,7 @@ fn table(joints: usize, name: &str, network: &MlpWeights, names: &Names) -> Stri
     numbers(name, network, names) + &code
 }
 
-/// What the positions become, and the derivatives of that.
+/// The features of the positions, and their derivatives.
 fn features_of(angles: Angles) -> [&'static str; 2] {
     match angles {
         Angles::Raw => ["x[i] = state[i];", "dx[i * MODEL_COLUMNS + i] = 1;"],
@@ -105,7 +100,7 @@ fn linear_layers(network: &MlpWeights) -> String {
     (0..=last).map(layer).collect()
 }
 
-/// Where a layer reads and writes: two places in turn.
+/// Where a layer reads and writes: two buffers in turn.
 fn buffers(name: &str, layer: usize) -> [String; 2] {
     [layer % 2, (layer + 1) % 2].map(|place| format!("{name}[{place}]"))
 }
@@ -116,7 +111,7 @@ fn weights(network: &MlpWeights, k: usize) -> String {
     format!("{outputs}, {inputs}, model_NETWORK_weight{k}, model_NETWORK_bias{k}")
 }
 
-/// Weights are whole floats in training; scaling is not.
+/// Weights are single precision in training; scaling is double.
 fn numbers(name: &str, network: &MlpWeights, names: &Names) -> String {
     let widths: Vec<String> = network.widths().iter().map(ToString::to_string).collect();
     let mut text = format!(

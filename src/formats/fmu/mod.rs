@@ -1,4 +1,4 @@
-//! FMI: the model with its C code as a unit of other simulators, for model exchange and for co-simulation.
+//! FMI: the model with its C code as a unit for other simulators, for model exchange and for co-simulation.
 
 pub(super) mod fmi2;
 pub(super) mod fmi3;
@@ -14,10 +14,11 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use self::variables::Variable;
 use super::c::{Names, compile, compiler, header};
-use super::{Answers, ExportError, File, Format, Portable, PythonClient, Reader, Samples, Unread};
+use super::verify::{Client, ClientError, Predictions, PythonClient, Samples};
+use super::{ExportError, ExportModel, File, Format};
 use crate::model::CommandFilter;
 
-/// What one standard has of its own.
+/// What is specific to one version of the standard.
 struct Standard {
     /// The name of its source file, and what that holds.
     source: (&'static str, &'static str),
@@ -27,24 +28,26 @@ struct Standard {
     descriptions: fn(&Fmu) -> Vec<(&'static str, String)>,
 }
 
-/// A model as every standard sees it.
+/// A model as all versions see it.
 struct Fmu<'m> {
-    model: &'m Portable,
+    model: &'m ExportModel,
     identifier: String,
     token: String,
     variables: Vec<Variable>,
 }
 
-type Files = fn(&Portable, &Path) -> Result<Vec<File>, ExportError>;
+type Files = fn(&ExportModel, &Path) -> Result<Vec<File>, ExportError>;
 
 const fn format(name: &'static str, about: &'static str, files: Files) -> Format {
     Format {
         name,
         about,
-        limits,
+        extension: "fmu",
+        not_carried,
         files,
-        reader: Reader::Own(ask),
+        client: Client::Own(predict),
         tolerance: 1e-9,
+        robots: None,
     }
 }
 
@@ -54,10 +57,10 @@ const CLIENT: PythonClient = PythonClient {
     packages: "fmpy",
 };
 
-/// What FMPy predicts, where the unit holds a library that can run.
-fn ask(path: &Path, samples: &Samples) -> Result<Answers, Unread> {
+/// What FMPy predicts, where the unit holds a library for this machine.
+fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let refused =
-        |error: &dyn std::error::Error| Unread::Refused(format!("{}: {error}", path.display()));
+        |error: &dyn std::error::Error| ClientError::Failed(format!("{}: {error}", path.display()));
     let file = std::fs::File::open(path).map_err(|error| refused(&error))?;
     let archive = ZipArchive::new(file).map_err(|error| refused(&error))?;
     let runs = archive
@@ -65,27 +68,27 @@ fn ask(path: &Path, samples: &Samples) -> Result<Answers, Unread> {
         .flatten()
         .any(|name| name.starts_with("binaries/"));
     match runs {
-        true => CLIENT.ask(path, samples),
-        false => Err(Unread::NoReader(
+        true => CLIENT.predict(path, samples),
+        false => Err(ClientError::Unavailable(
             "the unit holds no library; name a C compiler in CC".to_owned(),
         )),
     }
 }
 
-fn limits(model: &Portable) -> Vec<String> {
+fn not_carried(model: &ExportModel) -> Vec<String> {
     let delay = delays(model).then(|| {
         "the delay between steps of model exchange: there a delayed torque follows straight lines through the points \
-         that the importer accepted; co-simulation has it as it is"
+         that the importer accepted; co-simulation delays it exactly"
             .to_owned()
     });
     let binary = match compile(version()) {
         Ok(()) => None,
         Err(reason) => Some(format!(
-            "a binary, the FMU holds source code alone: {reason}"
+            "a binary: the FMU holds source code alone, since {reason}"
         )),
     };
     model
-        .sensor_limits()
+        .sensors_not_carried()
         .into_iter()
         .chain(delay)
         .chain(binary)
@@ -98,13 +101,13 @@ fn version() -> std::process::Command {
     command
 }
 
-/// Whether a torque of the past matters.
-fn delays(model: &Portable) -> bool {
+/// Whether past torques matter.
+fn delays(model: &ExportModel) -> bool {
     (0..model.joints()).any(|joint| model.filter(joint, CommandFilter::Delay).is_some())
 }
 
 impl Standard {
-    fn files(&self, model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+    fn files(&self, model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
         Ok(vec![File {
             path: path.to_owned(),
             bytes: self.archive(model)?,
@@ -112,7 +115,7 @@ impl Standard {
         }])
     }
 
-    fn archive(&self, model: &Portable) -> Result<Vec<u8>, ExportError> {
+    fn archive(&self, model: &ExportModel) -> Result<Vec<u8>, ExportError> {
         let names = Names::new(model);
         let header = header(model)?;
         let fmu = Fmu {
@@ -139,8 +142,8 @@ impl Standard {
     }
 }
 
-/// The model as a unit, before any standard.
-fn code(model: &Portable, names: &Names, token: &str) -> String {
+/// The code of the unit that all versions share.
+fn code(model: &ExportModel, names: &Names, token: &str) -> String {
     let (n, lags) = (model.joints(), variables::lags(model));
     let parameters = &model.equations.parameters;
     let addresses = parameters
@@ -172,13 +175,17 @@ fn code(model: &Portable, names: &Names, token: &str) -> String {
 }
 
 /// The shared library of sources, the first of which includes the others, where there is a compiler.
-fn library(model: &Portable, sources: &[(&str, String)]) -> Result<Option<Vec<u8>>, ExportError> {
+fn library(
+    model: &ExportModel,
+    sources: &[(&str, String)],
+) -> Result<Option<Vec<u8>>, ExportError> {
     let refused = |reason: String| ExportError::Model {
         format: "FMU",
         system: model.name().to_owned(),
         reason,
     };
-    let io = |error: std::io::Error| refused(format!("there is no place to compile it: {error}"));
+    let io =
+        |error: std::io::Error| refused(format!("no temporary folder to compile it in: {error}"));
     let folder = tempfile::tempdir().map_err(io)?;
     let at = |name: &str| folder.path().join(name);
     for (name, text) in sources {
@@ -196,12 +203,12 @@ fn library(model: &Portable, sources: &[(&str, String)]) -> Result<Option<Vec<u8
     command.args([&at("library"), &at(sources[0].0)]).arg("-lm");
     match compile(command) {
         Ok(()) => std::fs::read(at("library")).map(Some).map_err(io),
-        Err(Unread::NoReader(_)) => Ok(None),
-        Err(Unread::Refused(said)) => Err(refused(said)),
+        Err(ClientError::Unavailable(_)) => Ok(None),
+        Err(ClientError::Failed(said)) => Err(refused(said)),
     }
 }
 
-/// The same bytes for the same files: they carry no date.
+/// A ZIP archive without dates, so that the same files give the same bytes.
 fn zipped(files: impl Iterator<Item = (String, Vec<u8>)>) -> Vec<u8> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)

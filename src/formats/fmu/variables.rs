@@ -1,4 +1,4 @@
-use crate::formats::Portable;
+use crate::formats::ExportModel;
 use crate::formats::c::Names;
 use crate::model::CommandFilter;
 
@@ -29,7 +29,7 @@ pub(super) enum Role {
 }
 
 /// Joints (counted from 0) whose torque follows its command with a lag.
-pub(super) fn lags(model: &Portable) -> Vec<usize> {
+pub(super) fn lags(model: &ExportModel) -> Vec<usize> {
     let joints = 0..model.joints();
     joints
         .filter(|joint| model.filter(*joint, CommandFilter::Lag).is_some())
@@ -37,7 +37,7 @@ pub(super) fn lags(model: &Portable) -> Vec<usize> {
 }
 
 /// In the order of `unit.h`: time, torques, states, their rates, parameters.
-pub(super) fn variables(model: &Portable, names: &Names) -> Vec<Variable> {
+pub(super) fn variables(model: &ExportModel, names: &Names) -> Vec<Variable> {
     let time = Variable {
         name: "time".into(),
         about: "time".into(),
@@ -58,7 +58,7 @@ pub(super) fn variables(model: &Portable, names: &Names) -> Vec<Variable> {
     all
 }
 
-fn states(model: &Portable) -> Vec<Variable> {
+fn states(model: &ExportModel) -> Vec<Variable> {
     let of_joint = |joint: usize, what: &str, per: &str| Variable {
         name: format!("joint[{}].{what}", joint + 1),
         about: format!("{what} of joint {}", joint + 1),
@@ -74,7 +74,7 @@ fn states(model: &Portable) -> Vec<Variable> {
     positions.chain(velocities).chain(lagged).collect()
 }
 
-fn torque(model: &Portable, joint: usize, prefix: &str, about: &str, role: Role) -> Variable {
+fn torque(model: &ExportModel, joint: usize, prefix: &str, about: &str, role: Role) -> Variable {
     let what = if model.system.prismatic[joint] {
         "force"
     } else {
@@ -102,7 +102,7 @@ fn rate(state: &Variable, place: usize) -> Variable {
 }
 
 /// Those of an effect stand below their joint and its name.
-fn parameters(model: &Portable, names: &Names) -> impl Iterator<Item = Variable> {
+fn parameters(model: &ExportModel, names: &Names) -> impl Iterator<Item = Variable> {
     let place = |name: &str| {
         let mut effects = model.effects.iter();
         let effect = effects.find(|effect| effect.parameters.iter().any(|p| p == name));

@@ -7,5 +7,4 @@ mod orientation;
 mod read;
 mod write;
 
-pub use read::read_mjcf;
 pub(super) use write::{DRY_FRICTION, FORMAT, option};

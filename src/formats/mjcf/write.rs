@@ -3,54 +3,61 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use super::read::read_mjcf;
 use crate::formats::robot::mechanism::{
-    Drive, Link, Rig, escaped, file, friction_widths, head, numbers,
+    Drive, Link, Mechanism, escaped, file, friction_widths, head, numbers,
 };
-use crate::formats::{ExportError, File, Format, Portable, PythonClient, Reader};
+use crate::formats::verify::{Client, PythonClient};
+use crate::formats::{ExportError, ExportModel, File, Format, RobotReader};
 use crate::model::Integrator;
 use crate::model::chain::Joint;
 
 pub(in crate::formats) const FORMAT: Format = Format {
     name: "mjcf",
     about: "a mechanism of one or two joints with its friction, springs and drives, for MuJoCo",
-    limits,
+    extension: "xml",
+    not_carried,
     files,
-    reader: Reader::Python(PythonClient {
+    client: Client::Python(PythonClient {
         name: "mjcf.py",
         script: include_str!("../../../docs/clients/mjcf.py"),
         packages: "mujoco numpy",
     }),
     tolerance: 1e-9,
+    robots: Some(RobotReader {
+        about: "up to three hinge or slide joints, one carrying the next",
+        read: read_mjcf,
+    }),
 };
 
-fn limits(model: &Portable) -> Vec<String> {
-    let Ok(rig) = Rig::of(model) else {
+fn not_carried(model: &ExportModel) -> Vec<String> {
+    let Ok(mechanism) = Mechanism::of(model) else {
         return Vec::new();
     };
-    let mut limits = rig.limits;
-    if rig
+    let mut lost = mechanism.not_carried;
+    if mechanism
         .joints
         .iter()
         .any(|joint| joint.drivetrain.friction > 0.0)
     {
-        limits.push(DRY_FRICTION.into());
+        lost.push(DRY_FRICTION.into());
     }
-    if rig.drives.iter().any(|drive| drive.lag.is_some()) {
-        limits.push(
+    if mechanism.drives.iter().any(|drive| drive.lag.is_some()) {
+        lost.push(
             "the lag within a step: MuJoCo holds over each step what it has come to; only the derivative is compared"
                 .into(),
         );
     }
-    limits
+    lost
 }
 
 pub(in crate::formats) const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
 
-fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     file(model, path, "MJCF", text)
 }
 
-fn text(model: &Portable, rig: &Rig) -> String {
+fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     let mut text = head(model);
     let _ = write!(
         text,
@@ -58,32 +65,32 @@ fn text(model: &Portable, rig: &Rig) -> String {
          <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n    \
          <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
         escaped(model.name()),
-        option(model, rig),
+        option(model, mechanism),
         friction_widths(model)
     );
-    let links = rig.links();
-    for (k, (joint, link)) in rig.joints.iter().zip(&links).enumerate() {
+    let links = mechanism.links();
+    for (k, (joint, link)) in mechanism.joints.iter().zip(&links).enumerate() {
         text += &body(joint, link, links.get(k + 1), &"  ".repeat(k + 2));
     }
     for k in (0..links.len()).rev() {
         let _ = writeln!(text, "{}</body>", "  ".repeat(k + 2));
     }
     text += "  </worldbody>\n  <actuator>\n";
-    for (joint, drive) in rig.joints.iter().zip(&rig.drives) {
+    for (joint, drive) in mechanism.joints.iter().zip(&mechanism.drives) {
         text += &actuator(joint, drive);
     }
     text + "  </actuator>\n</mujoco>\n"
 }
 
 /// Gravity, and steps as the model makes them.
-pub(in crate::formats) fn option(model: &Portable, rig: &Rig) -> String {
+pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
     let integrator = match model.integrator {
         Integrator::SemiImplicitEuler => "Euler",
         Integrator::Rk4 | Integrator::Fine { .. } => "RK4",
     };
     format!(
         "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{integrator}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
-        numbers([0.0, 0.0, -rig.gravity]),
+        numbers([0.0, 0.0, -mechanism.gravity]),
         model.step_s / model.integrator.parts() as f64
     )
 }

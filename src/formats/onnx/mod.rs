@@ -2,7 +2,7 @@
 //! independent, everything is in single precision.
 
 mod builder;
-mod flow;
+mod derivative;
 mod proto;
 mod step;
 
@@ -11,41 +11,45 @@ use std::path::Path;
 use prost::Message;
 use serde_json::json;
 
-use super::{ExportError, File, Format, HeldFilter, Portable, PythonClient, Reader};
+use super::discrete_filter::DiscreteFilter;
+use super::verify::{Client, PythonClient};
+use super::{ExportError, ExportModel, File, Format};
 use builder::Builder;
-use flow::Flow;
+use derivative::Derivative;
 use proto::{Graph, Model, OperatorSet, Property};
 
 pub(super) const FORMAT: Format = Format {
     name: "onnx",
     about: "a step and, beside it, the derivative, as graphs of single precision with a free batch dimension",
-    limits,
+    extension: "onnx",
+    not_carried,
     files,
-    reader: Reader::Python(PythonClient {
+    client: Client::Python(PythonClient {
         name: "onnx.py",
         script: include_str!("../../../docs/clients/onnx.py"),
         packages: "numpy onnxruntime",
     }),
     tolerance: 1e-5,
+    robots: None,
 };
 
-/// Both are read by every runtime of the last years.
+/// Versions that every runtime of recent years reads.
 const IR_VERSION: i64 = 8;
 const OPERATOR_SET: i64 = 17;
 
-fn limits(model: &Portable) -> Vec<String> {
-    let mut limits = vec!["double precision: all numbers are single".to_owned()];
-    if !HeldFilter::all(model).is_empty() {
+fn not_carried(model: &ExportModel) -> Vec<String> {
+    let mut lost = vec!["double precision: all numbers are single".to_owned()];
+    if !DiscreteFilter::all(model).is_empty() {
         let step = model.step_s;
-        limits.push(format!(
+        lost.push(format!(
             "another step than {step} s: delay and lag are written for it; their memory is an input and an output"
         ));
     }
-    limits.extend(model.sensor_limits());
-    limits
+    lost.extend(model.sensors_not_carried());
+    lost
 }
 
-fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("-derivative.");
     name.push(path.extension().unwrap_or("onnx".as_ref()));
@@ -55,7 +59,7 @@ fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
         bytes: packed(model, graph),
         about: about.to_owned(),
     };
-    let with = match HeldFilter::all(model).is_empty() {
+    let with = match DiscreteFilter::all(model).is_empty() {
         true => "",
         false => ", memory",
     };
@@ -76,12 +80,12 @@ fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
     ])
 }
 
-fn derivative_graph(model: &Portable) -> Graph {
+fn derivative_graph(model: &ExportModel) -> Graph {
     let n = model.joints();
     let mut builder = Builder::default();
     let inputs = step::inputs(&mut builder, model, "torque that acts");
-    let flow = Flow::new(&mut builder, model);
-    let rates = flow.write(
+    let derivative = Derivative::new(&mut builder, model);
+    let rates = derivative.write(
         &mut builder,
         &inputs.state,
         &inputs.torque,
@@ -97,7 +101,7 @@ fn derivative_graph(model: &Portable) -> Graph {
     builder.finish("derivative")
 }
 
-fn packed(model: &Portable, graph: Graph) -> Vec<u8> {
+fn packed(model: &ExportModel, graph: Graph) -> Vec<u8> {
     let text = |key: &str, value: String| Property {
         key: key.to_owned(),
         value,
@@ -108,7 +112,7 @@ fn packed(model: &Portable, graph: Graph) -> Vec<u8> {
     let units: Vec<_> = (0..model.joints())
         .map(|joint| model.units(joint))
         .collect();
-    let memory: Vec<_> = (HeldFilter::all(model).iter())
+    let memory: Vec<_> = (DiscreteFilter::all(model).iter())
         .map(|f| json!({"joint": f.joint + 1, "past_torques": f.past, "lagged_torque": f.lags}))
         .collect();
     let json = |value: serde_json::Value| value.to_string();

@@ -1,9 +1,10 @@
 //! One step of the integrator, written out.
 
 use super::builder::{Builder, Value};
-use super::flow::Flow;
+use super::derivative::Derivative;
 use super::proto::Graph;
-use crate::formats::{HeldFilter, HeldSum, Portable};
+use crate::formats::ExportModel;
+use crate::formats::discrete_filter::{Combination, DiscreteFilter};
 use crate::model::Integrator;
 
 /// What a graph is given, as columns.
@@ -14,7 +15,7 @@ pub struct Inputs {
     pub time: Option<Value>,
 }
 
-pub fn inputs(builder: &mut Builder, model: &Portable, torque: &str) -> Inputs {
+pub fn inputs(builder: &mut Builder, model: &ExportModel, torque: &str) -> Inputs {
     let n = model.joints();
     let units: Vec<_> = (0..n).map(|joint| model.units(joint).join(", ")).collect();
     let about = format!("of joints in {}", units.join("; "));
@@ -33,15 +34,15 @@ pub fn inputs(builder: &mut Builder, model: &Portable, torque: &str) -> Inputs {
 }
 
 /// The graph of a whole step.
-pub fn graph(model: &Portable) -> Graph {
+pub fn graph(model: &ExportModel) -> Graph {
     let n = model.joints();
     let mut builder = Builder::default();
     let inputs = inputs(&mut builder, model, "torque commanded over the step");
     let acting = act(&mut builder, model, &inputs);
-    let flow = Flow::new(&mut builder, model);
+    let derivative = Derivative::new(&mut builder, model);
     let mut step = Step {
         builder: &mut builder,
-        flow,
+        derivative,
         h: model.step_s,
     };
     let next = match model.integrator {
@@ -62,10 +63,10 @@ pub fn graph(model: &Portable) -> Graph {
 
 /// The torque that acts over each part of the step. Where filters stand before it, their memory is one more input and
 /// output.
-fn act(builder: &mut Builder, model: &Portable, inputs: &Inputs) -> Vec<Vec<Value>> {
-    let filters = HeldFilter::all(model);
+fn act(builder: &mut Builder, model: &ExportModel, inputs: &Inputs) -> Vec<Vec<Value>> {
+    let filters = DiscreteFilter::all(model);
     let mut acting = vec![inputs.torque.clone(); model.integrator.parts()];
-    let width: usize = filters.iter().map(HeldFilter::memory).sum();
+    let width: usize = filters.iter().map(DiscreteFilter::memory).sum();
     if width == 0 {
         return acting;
     }
@@ -78,7 +79,7 @@ fn act(builder: &mut Builder, model: &Portable, inputs: &Inputs) -> Vec<Vec<Valu
         torques.extend(memory.by_ref().take(filter.past));
         let lagged = filter.lags.then(|| memory.next()).flatten();
         let [first, then] = filter.places.map(|k| torques[k].clone());
-        let mut sum = |sum: &HeldSum| {
+        let mut sum = |sum: &Combination| {
             let lag = lagged.as_ref().map(|lagged| (sum.lagged, lagged));
             let terms = [(sum.first, &first), (sum.then, &then)];
             weighted(builder, lag.into_iter().chain(terms))
@@ -110,7 +111,7 @@ fn weighted<'v>(builder: &mut Builder, terms: impl Iterator<Item = (f64, &'v Val
 
 struct Step<'b, 'm> {
     builder: &'b mut Builder,
-    flow: Flow<'m>,
+    derivative: Derivative<'m>,
     /// In s.
     h: f64,
 }
@@ -119,7 +120,9 @@ impl Step<'_, '_> {
     /// v' = v + h f_v, q' = q + h (f_q + h f_v)
     fn semi_implicit(&mut self, inputs: &Inputs, torque: &[Value]) -> Vec<Value> {
         let time = inputs.time.as_ref();
-        let rates = self.flow.write(self.builder, &inputs.state, torque, time);
+        let rates = self
+            .derivative
+            .write(self.builder, &inputs.state, torque, time);
         let n = torque.len();
         let gains: Vec<Value> = rates[n..].iter().map(|f| self.times(self.h, f)).collect();
         let (q, v) = inputs.state.split_at(n);
@@ -172,7 +175,8 @@ impl Step<'_, '_> {
             let after = self.builder.constant(after);
             self.builder.apply("Add", &[time, &after])
         });
-        self.flow.write(self.builder, state, torque, time.as_ref())
+        self.derivative
+            .write(self.builder, state, torque, time.as_ref())
     }
 
     fn all_along(&mut self, state: &[Value], h: f64, slopes: &[Value]) -> Vec<Value> {

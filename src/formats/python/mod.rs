@@ -9,7 +9,9 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::{ExportError, File, Format, HeldFilter, Portable, PythonClient, Reader};
+use super::discrete_filter::{Combination, DiscreteFilter};
+use super::verify::{Client, PythonClient};
+use super::{ExportError, ExportModel, File, Format};
 use crate::control::Task;
 use crate::expr::Program;
 use crate::model::{Angles, Integrator, MlpWeights, ResidualOn};
@@ -18,14 +20,16 @@ use notation::{Python, literal};
 pub(super) const FORMAT: Format = Format {
     name: "python",
     about: "a module for numpy with the step, the derivative and the reward; an environment where gymnasium is installed",
-    limits,
+    extension: "py",
+    not_carried,
     files,
-    reader: Reader::Python(PythonClient {
+    client: Client::Python(PythonClient {
         name: "module.py",
         script: include_str!("../../../docs/clients/module.py"),
         packages: "numpy",
     }),
     tolerance: 1e-9,
+    robots: None,
 };
 
 const STEP: &str = include_str!("step.py");
@@ -33,25 +37,25 @@ const SEMI_IMPLICIT_EULER: &str = include_str!("semi_implicit_euler.py");
 const RK4: &str = include_str!("rk4.py");
 const ENVIRONMENT: &str = include_str!("environment.py");
 
-fn limits(model: &Portable) -> Vec<String> {
-    let mut limits = Vec::new();
+fn not_carried(model: &ExportModel) -> Vec<String> {
+    let mut lost = Vec::new();
     if Task::of_system(model.name()).is_none() {
-        limits.push(format!(
+        lost.push(format!(
             "a reward and an environment: no built-in task is one of `{}`",
             model.name()
         ));
     }
-    if !HeldFilter::all(model).is_empty() {
-        limits.push(format!(
+    if !DiscreteFilter::all(model).is_empty() {
+        lost.push(format!(
             "other values of delays and lags, and another step than {} s: they are written for these",
             model.step_s
         ));
     }
-    limits.extend(model.sensor_limits());
-    limits
+    lost.extend(model.sensors_not_carried());
+    lost
 }
 
-fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     let task = Task::of_system(model.name());
     let about = match &task {
         Some(task) => format!(
@@ -67,7 +71,7 @@ fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
     }])
 }
 
-fn module(model: &Portable, task: Option<&Task>) -> String {
+fn module(model: &ExportModel, task: Option<&Task>) -> String {
     let mut out = head(model);
     constants(&mut out, model);
     derivative(&mut out, model);
@@ -83,7 +87,7 @@ fn module(model: &Portable, task: Option<&Task>) -> String {
     out
 }
 
-fn head(model: &Portable) -> String {
+fn head(model: &ExportModel) -> String {
     let n = model.joints();
     let units: Vec<String> = (0..n)
         .map(|joint| {
@@ -103,7 +107,7 @@ fn head(model: &Portable) -> String {
          import json\n\n\
          import numpy as np\n\n\
          ABOUT = {about}\n\
-         # The program that wrote this module, and the configuration that the model came of.\n\
+         # The program that wrote this module, and the configuration of the run that made the model.\n\
          PROVENANCE = json.loads({provenance})\n",
         plain(model.name()),
         units.join(", "),
@@ -111,7 +115,7 @@ fn head(model: &Portable) -> String {
     )
 }
 
-fn constants(out: &mut String, model: &Portable) {
+fn constants(out: &mut String, model: &ExportModel) {
     let substeps = model.integrator.parts();
     let _ = write!(
         out,
@@ -129,7 +133,7 @@ fn constants(out: &mut String, model: &Portable) {
     }
     *out += "}\n";
     if !model.effects.is_empty() {
-        *out += "\n# Effects that the equations carry.\nEFFECTS = [\n";
+        *out += "\n# Effects in the equations.\nEFFECTS = [\n";
         for effect in &model.effects {
             let _ = writeln!(out, "    {},", json!(effect));
         }
@@ -137,7 +141,7 @@ fn constants(out: &mut String, model: &Portable) {
     }
     filters(out, model);
     for (name, network) in networks(model) {
-        layers(out, name, network);
+        layers(out, &name, network);
     }
 }
 
@@ -148,27 +152,28 @@ fn unit(unit: &str) -> String {
     plain(unit)
 }
 
-/// Text of a file as part of a comment or of a docstring.
+/// Text that can stand in a comment or docstring.
 fn plain(text: &str) -> String {
     text.replace(['"', '\\'], "'")
         .replace(char::is_control, " ")
 }
 
-fn networks(model: &Portable) -> impl Iterator<Item = (&'static str, &MlpWeights)> {
-    let prior = model.prior.iter().map(|network| ("PRIOR", network));
-    prior.chain(model.residual.iter().map(|network| ("RESIDUAL", network)))
+/// The networks, each with the name of its constant.
+fn networks(model: &ExportModel) -> impl Iterator<Item = (String, &MlpWeights)> {
+    let networks = model.networks();
+    networks.map(|(name, network)| (name.to_uppercase(), network))
 }
 
-fn filters(out: &mut String, model: &Portable) {
-    let filters = HeldFilter::all(model);
+fn filters(out: &mut String, model: &ExportModel) {
+    let filters = DiscreteFilter::all(model);
     if filters.is_empty() {
-        *out += "\n# Nothing stands between commanded torques and those that act.\nFILTERS = []\n";
+        *out += "\n# Commanded torques act as they are: no delay, no lag.\nFILTERS = []\n";
         return;
     }
-    *out += "\n# What stands between commanded torques and those that act. Factors are of the lagged torque, of the\n\
-             # torque that acts when a step begins, and of the one that takes its place.\nFILTERS = [\n";
+    *out += "\n# Delay and lag between commanded torques and those that act. Coefficients are of the lagged torque, of\n\
+             # the torque that acts when a step begins, and of the one that replaces it.\nFILTERS = [\n";
     for filter in filters {
-        let row = |sum: &super::HeldSum| {
+        let row = |sum: &Combination| {
             let factors = [sum.lagged, sum.first, sum.then].map(literal);
             format!("[{}]", factors.join(", "))
         };
@@ -211,8 +216,8 @@ fn layers(out: &mut String, name: &str, network: &MlpWeights) {
     *out += "    ],\n}\n";
 }
 
-/// The right-hand side, its networks included.
-fn derivative(out: &mut String, model: &Portable) {
+/// The right-hand side, networks included.
+fn derivative(out: &mut String, model: &ExportModel) {
     let n = model.joints();
     if networks(model).next().is_some() {
         *out += "\n\ndef _network(network, features):\n    \

@@ -7,17 +7,17 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::expr::SignForm;
-use crate::formats::{CarriedEffect, ExportError, File, Portable};
+use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
 use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
 
 /// A mechanism with its drives.
-pub(in crate::formats) struct Rig {
+pub(in crate::formats) struct Mechanism {
     pub joints: Vec<Joint>,
     pub drives: Vec<Drive>,
     /// m/s^2, against z
     pub gravity: f64,
     /// What is not carried.
-    pub limits: Vec<String>,
+    pub not_carried: Vec<String>,
 }
 
 /// What a drive makes of its command: `gear * clamp(gain * command + constant)`.
@@ -43,12 +43,12 @@ pub(in crate::formats) struct Link {
     pub tensor: Matrix3<f64>,
 }
 
-impl Rig {
+impl Mechanism {
     /// The mechanism of a model.
     ///
     /// # Errors
     /// Equations of none that is known, or a network in their place.
-    pub fn of(model: &Portable) -> Result<Self, String> {
+    pub fn of(model: &ExportModel) -> Result<Self, String> {
         if model.prior.is_some() {
             return Err("a network stands in place of its equations".into());
         }
@@ -63,25 +63,26 @@ impl Rig {
             limit: None,
             lag: None,
         };
-        let mut rig = Self {
+        let mut mechanism = Self {
             drives: vec![still; found.joints.len()],
             joints: found.joints,
             gravity: found.gravity,
-            limits: Vec::new(),
+            not_carried: Vec::new(),
         };
         for effect in &model.effects {
-            rig.carry(effect, model);
+            mechanism.carry(effect, model);
         }
-        rig.note_conflicts();
+        mechanism.note_conflicts();
         if model.residual.is_some() {
-            rig.limits
+            mechanism
+                .not_carried
                 .push("the network for what the equations lack".into());
         }
-        rig.limits.extend(model.sensor_limits());
-        Ok(rig)
+        mechanism.not_carried.extend(model.sensors_not_carried());
+        Ok(mechanism)
     }
 
-    fn carry(&mut self, effect: &CarriedEffect, model: &Portable) {
+    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
         let parameters = &model.equations.parameters;
         let value = |name: &String| {
             parameters
@@ -109,7 +110,7 @@ impl Rig {
             ("actuator_saturation", [limit]) => drive.limit = Some(*limit),
             ("actuator_lag", [time]) => drive.lag = Some(*time),
             ("constant_torque", [torque]) => drive.constant = *torque,
-            _ => self.limits.push(format!(
+            _ => self.not_carried.push(format!(
                 "{} on joint {}: {}",
                 effect.name, effect.joint, effect.expression
             )),
@@ -120,7 +121,7 @@ impl Rig {
     fn note_conflicts(&mut self) {
         for (k, drive) in self.drives.iter_mut().enumerate() {
             if drive.limit.is_some() && drive.constant != 0.0 {
-                self.limits.push(format!(
+                self.not_carried.push(format!(
                     "constant_torque on joint {}, beside the limit of its drive",
                     k + 1
                 ));
@@ -191,7 +192,7 @@ fn at_zero(joint: &Joint) -> Pose {
 }
 
 /// For each joint the speed over which dry friction reverses; 0 where it does so at once.
-pub(in crate::formats) fn friction_widths(model: &Portable) -> String {
+pub(in crate::formats) fn friction_widths(model: &ExportModel) -> String {
     let widths = model.system.sign().into_iter().map(|sign| match sign {
         SignForm::Exact => 0.0,
         SignForm::Smooth { width } => width,
@@ -227,7 +228,7 @@ pub(in crate::formats) fn escaped(text: &str) -> String {
 }
 
 /// Where the file is from, as a comment.
-pub(in crate::formats) fn head(model: &Portable) -> String {
+pub(in crate::formats) fn head(model: &ExportModel) -> String {
     // Two hyphens end a comment.
     let origin = model.provenance().to_string().replace("--", "- -");
     format!("<?xml version=\"1.0\"?>\n<!-- {origin} -->\n")
@@ -235,20 +236,20 @@ pub(in crate::formats) fn head(model: &Portable) -> String {
 
 /// The one file of a format, from what it writes of the mechanism.
 pub(in crate::formats) fn file(
-    model: &Portable,
+    model: &ExportModel,
     path: &Path,
     format: &'static str,
-    text: fn(&Portable, &Rig) -> String,
+    text: fn(&ExportModel, &Mechanism) -> String,
 ) -> Result<Vec<File>, ExportError> {
     let refused = |reason| ExportError::Model {
         format,
         system: model.name().to_owned(),
         reason,
     };
-    let rig = Rig::of(model).map_err(refused)?;
+    let mechanism = Mechanism::of(model).map_err(refused)?;
     Ok(vec![File {
         path: path.to_owned(),
-        bytes: text(model, &rig).into_bytes(),
+        bytes: text(model, &mechanism).into_bytes(),
         about: "a mechanism with the same equations".to_owned(),
     }])
 }

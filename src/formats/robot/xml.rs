@@ -66,12 +66,12 @@ impl<'x> Source<'x> {
             return Ok(root);
         }
         let found = root.tag_name().name();
-        let remedy = match found {
-            "robot" => "; this is URDF, read it with --from-urdf",
-            "mujoco" => "; this is MJCF, read it with --from-mjcf",
+        let format = match found {
+            "robot" => "; this is URDF, read it as urdf",
+            "mujoco" => "; this is MJCF, read it as mjcf",
             _ => "",
         };
-        let message = format!("the file begins with <{found}>, expected <{name}>{remedy}");
+        let message = format!("the root element is <{found}>, expected <{name}>{format}");
         Err(self.error(root, message))
     }
 

@@ -3,5 +3,4 @@
 mod read;
 mod write;
 
-pub use read::read_urdf;
 pub(super) use write::FORMAT;

@@ -5,22 +5,31 @@ use std::path::Path;
 
 use nalgebra::{Rotation3, Vector3};
 
+use super::read::read_urdf;
 use crate::formats::mjcf::{DRY_FRICTION, option};
-use crate::formats::robot::mechanism::{Link, Rig, escaped, file, friction_widths, head, numbers};
-use crate::formats::{ExportError, File, Format, Portable, PythonClient, Reader};
+use crate::formats::robot::mechanism::{
+    Link, Mechanism, escaped, file, friction_widths, head, numbers,
+};
+use crate::formats::verify::{Client, PythonClient};
+use crate::formats::{ExportError, ExportModel, File, Format, RobotReader};
 use crate::model::chain::Joint;
 
 pub(in crate::formats) const FORMAT: Format = Format {
     name: "urdf",
     about: "a mechanism of one or two joints with damping, dry friction and limits of the drives",
-    limits,
+    extension: "urdf",
+    not_carried,
     files,
-    reader: Reader::Python(PythonClient {
+    client: Client::Python(PythonClient {
         name: "urdf.py",
         script: include_str!("../../../docs/clients/urdf.py"),
         packages: "mujoco numpy",
     }),
     tolerance: 1e-9,
+    robots: Some(RobotReader {
+        about: "up to three revolute, continuous or prismatic joints, one carrying the next",
+        read: read_urdf,
+    }),
 };
 
 /// What readers take for gravity, m/s^2.
@@ -28,23 +37,23 @@ const GRAVITY: f64 = 9.81;
 /// For sliding joints, whose limits the format demands: m, m/s and N.
 const NO_LIMIT: f64 = 1e6;
 
-fn limits(model: &Portable) -> Vec<String> {
-    let Ok(rig) = Rig::of(model) else {
+fn not_carried(model: &ExportModel) -> Vec<String> {
+    let Ok(mechanism) = Mechanism::of(model) else {
         return Vec::new();
     };
-    let mut limits = rig.limits;
+    let mut lost = mechanism.not_carried;
     #[allow(clippy::float_cmp)] // as written
-    if rig.gravity != GRAVITY {
-        limits.push(format!(
+    if mechanism.gravity != GRAVITY {
+        lost.push(format!(
             "gravity of {} m/s^2: only MuJoCo is told",
-            rig.gravity
+            mechanism.gravity
         ));
     }
-    for (k, (joint, drive)) in rig.joints.iter().zip(&rig.drives).enumerate() {
+    for (k, (joint, drive)) in mechanism.joints.iter().zip(&mechanism.drives).enumerate() {
         let number = k + 1;
         let mut lost = |is_there: bool, what: &str| {
             if is_there {
-                limits.push(format!("{what} of joint {number}"));
+                lost.push(format!("{what} of joint {number}"));
             }
         };
         lost(joint.drivetrain.armature > 0.0, "the rotor's inertia");
@@ -54,21 +63,21 @@ fn limits(model: &Portable) -> Vec<String> {
         #[allow(clippy::float_cmp)] // as set
         lost(drive.gain != 1.0 || drive.gear != 1.0, "the drive's gain");
     }
-    if rig
+    if mechanism
         .joints
         .iter()
         .any(|joint| joint.drivetrain.friction > 0.0)
     {
-        limits.push(DRY_FRICTION.into());
+        lost.push(DRY_FRICTION.into());
     }
-    limits
+    lost
 }
 
-fn files(model: &Portable, path: &Path) -> Result<Vec<File>, ExportError> {
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     file(model, path, "URDF", text)
 }
 
-fn text(model: &Portable, rig: &Rig) -> String {
+fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     let mut text = head(model);
     let _ = write!(
         text,
@@ -76,11 +85,16 @@ fn text(model: &Portable, rig: &Rig) -> String {
          <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n  \
          <residyn dry_friction_width=\"{}\"/>\n  <link name=\"base\"/>\n",
         escaped(model.name()),
-        option(model, rig),
+        option(model, mechanism),
         friction_widths(model)
     );
     let mut parent = "base";
-    for ((joint, link), drive) in rig.joints.iter().zip(rig.links()).zip(&rig.drives) {
+    for ((joint, link), drive) in mechanism
+        .joints
+        .iter()
+        .zip(mechanism.links())
+        .zip(&mechanism.drives)
+    {
         text += &of_link(&joint.body, &link);
         text += &of_joint(joint, &link, parent, drive.limit);
         parent = &joint.body;

@@ -1,11 +1,14 @@
-//! What a reader of the written files predicts beside what the program itself does.
+//! Checks a written file: a client predicts from it at sample points, and the difference to the program's own
+//! predictions is measured.
 
 mod client;
-mod inputs;
+mod draw;
 mod predictions;
 mod reference;
+mod samples;
 
-pub use client::PythonClient;
-pub use inputs::Samples;
-pub use predictions::{Answers, Difference};
-pub(super) use reference::Prediction;
+pub use client::{Client, ClientError, PythonClient};
+pub(super) use draw::draw;
+pub use predictions::{Difference, Predictions};
+pub(super) use reference::ReferenceModel;
+pub use samples::Samples;

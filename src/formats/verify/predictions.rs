@@ -1,18 +1,17 @@
 use serde::{Deserialize, Serialize};
 
-/// What a reader of the model predicts at [`Samples`](super::Samples): rows of positions, then velocities. What a format
-/// does not answer is left out.
+/// What a client predicts at [`Samples`](super::Samples). What a format does not offer is left out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Answers {
-    /// The state after one step from each point.
+pub struct Predictions {
+    /// `[point][2n]`: the state after one step from each point.
     pub next: Option<Vec<Vec<f64>>>,
-    /// ds/dt at each point, its torque acting.
+    /// `[point][2n]`: ds/dt at each point while its torque acts.
     pub derivative: Option<Vec<Vec<f64>>>,
-    /// The state after each step of the rollout.
+    /// `[step][2n]`: the state after each step of the rollout.
     pub rollout: Option<Vec<Vec<f64>>>,
 }
 
-/// The largest difference between two readers, for each state relative to the largest magnitude that it has.
+/// The largest differences between two clients, for each state relative to its largest magnitude.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Difference {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -23,8 +22,8 @@ pub struct Difference {
     pub rollout: Option<f64>,
 }
 
-impl Answers {
-    /// How far `other` is from these; infinite where it has another number of rows, or what is no number.
+impl Predictions {
+    /// How far `other` is from these; infinite where it has another number of rows, or a NaN.
     pub fn difference(&self, other: &Self) -> Difference {
         let between = |mine: &Option<Vec<Vec<f64>>>, theirs: &Option<Vec<Vec<f64>>>| {
             Some(difference(mine.as_ref()?, theirs.as_ref()?))
@@ -38,14 +37,14 @@ impl Answers {
 }
 
 impl Difference {
-    /// The larger of a step and of the derivative: what no rollout has amplified.
+    /// The larger of the differences of steps and derivatives, which no rollout has amplified.
     pub fn pointwise(&self) -> f64 {
         let both = [self.next, self.derivative].into_iter().flatten();
         both.fold(0.0, f64::max)
     }
 }
 
-/// The largest difference between rows, for each column relative to its largest magnitude in the first.
+/// The largest difference between rows, for each column relative to its largest magnitude in `mine`.
 pub(super) fn difference(mine: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
     let same_shape =
         mine.len() == theirs.len() && mine.iter().zip(theirs).all(|(a, b)| a.len() == b.len());
@@ -57,13 +56,13 @@ pub(super) fn difference(mine: &[Vec<f64>], theirs: &[Vec<f64>]) -> f64 {
         let scale = mine.iter().map(|row| row[k].abs()).fold(0.0, f64::max);
         let rows = mine.iter().zip(theirs);
         let gap = rows.map(|(a, b)| gap(a[k], b[k])).fold(0.0, f64::max);
-        // A state that never leaves zero is compared as it is.
+        // A state that is always zero is compared in its own unit.
         gap / if scale > 0.0 { scale } else { 1.0 }
     };
     (0..columns).map(of_column).fold(0.0, f64::max)
 }
 
-/// Infinite where one of them is no number, which a maximum would pass over.
+/// Infinite for NaN, which a maximum would skip.
 fn gap(a: f64, b: f64) -> f64 {
     let gap = (a - b).abs();
     if gap.is_nan() { f64::INFINITY } else { gap }
@@ -71,30 +70,30 @@ fn gap(a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::Answers;
+    use super::Predictions;
 
-    fn answers(rows: &[[f64; 2]]) -> Answers {
-        Answers {
+    fn predictions(rows: &[[f64; 2]]) -> Predictions {
+        Predictions {
             next: Some(rows.iter().map(|row| row.to_vec()).collect()),
-            ..Answers::default()
+            ..Predictions::default()
         }
     }
 
     #[test]
     fn differences_are_relative_to_each_states_own_magnitude() {
-        let mine = answers(&[[100.0, 0.1], [-50.0, 0.2]]);
-        let theirs = answers(&[[100.0, 0.1], [-49.0, 0.19]]);
+        let mine = predictions(&[[100.0, 0.1], [-50.0, 0.2]]);
+        let theirs = predictions(&[[100.0, 0.1], [-49.0, 0.19]]);
         let difference = mine.difference(&theirs);
         assert!((difference.pointwise() - 0.05).abs() < 1e-12);
         assert_eq!((difference.derivative, difference.rollout), (None, None));
     }
 
     #[test]
-    fn what_is_no_number_or_missing_is_infinitely_far() {
-        let mine = answers(&[[1.0, 1.0], [2.0, 2.0]]);
+    fn nan_and_missing_rows_are_infinitely_far() {
+        let mine = predictions(&[[1.0, 1.0], [2.0, 2.0]]);
         for theirs in [
-            answers(&[[1.0, f64::NAN], [2.0, 2.0]]),
-            answers(&[[1.0, 1.0]]),
+            predictions(&[[1.0, f64::NAN], [2.0, 2.0]]),
+            predictions(&[[1.0, 1.0]]),
         ] {
             assert_eq!(mine.difference(&theirs).next, Some(f64::INFINITY));
         }

@@ -1,4 +1,4 @@
-//! A model rebuilt from a description and its weights alone, as a reader does who knows neither model files nor effects.
+//! Predicts from a description and its weights alone, as a client would that knows neither model files nor effects.
 
 use std::path::{Path, PathBuf};
 
@@ -6,16 +6,17 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
+use super::description::SavedFilter;
 use crate::expr::{Graph, Node, Program};
-use crate::formats::verify::Prediction;
-use crate::formats::{Answers, Samples, Unread};
-use crate::model::{CommandFilter, Dynamics, Filter, Integrator, ModelWeights, with_residual};
+use crate::formats::verify::ReferenceModel;
+use crate::formats::{ClientError, Predictions, Samples};
+use crate::model::{Dynamics, Filter, Integrator, ModelWeights};
 use crate::train::Shape;
 use crate::train::weights::from_bytes;
 
-/// What such a reader looks at.
+/// The part of a description that such a client reads.
 #[derive(Deserialize)]
-struct Rebuilt {
+struct SavedModel {
     #[serde(flatten)]
     shape: Shape,
     integrator: Integrator,
@@ -32,34 +33,24 @@ struct Equations {
     outputs: Vec<usize>,
 }
 
-#[derive(Deserialize)]
-struct SavedFilter {
-    /// Counted from 1.
-    joint: usize,
-    kind: CommandFilter,
-    parameter: String,
-}
-
 /// What the model in `path` predicts.
-pub(super) fn answers(path: &Path, samples: &Samples) -> Result<Answers, Unread> {
-    let refused =
-        |error: &dyn std::fmt::Display| Unread::Refused(format!("{}: {error}", path.display()));
-    let bytes = std::fs::read(path).map_err(|error| refused(&error))?;
-    let model: Rebuilt = serde_json::from_slice(&bytes).map_err(|error| refused(&error))?;
+pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
+    let failed =
+        |error: &dyn std::fmt::Display| ClientError::Failed(format!("{}: {error}", path.display()));
+    let bytes = std::fs::read(path).map_err(|error| failed(&error))?;
+    let model: SavedModel = serde_json::from_slice(&bytes).map_err(|error| failed(&error))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let weights = folder.join(&model.weights);
-    let bytes = std::fs::read(&weights).map_err(|error| refused(&error))?;
+    let bytes = std::fs::read(&weights).map_err(|error| failed(&error))?;
     let file = model.weights.to_string_lossy();
     let numbers =
-        from_bytes(&model.shape, &bytes, &file, folder).map_err(|error| refused(&error))?;
-    let prediction = model
-        .prediction(&numbers)
-        .map_err(|error| refused(&error))?;
-    Ok(prediction.answers(samples))
+        from_bytes(&model.shape, &bytes, &file, folder).map_err(|error| failed(&error))?;
+    let model = model.reference(&numbers).map_err(|error| failed(&error))?;
+    Ok(model.predict(samples))
 }
 
-impl Rebuilt {
-    fn prediction(self, numbers: &ModelWeights) -> Result<Prediction, String> {
+impl SavedModel {
+    fn reference(self, numbers: &ModelWeights) -> Result<ReferenceModel, String> {
         let Shape {
             system,
             joints,
@@ -76,15 +67,9 @@ impl Rebuilt {
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),
             reading: None,
         };
-        let mut networks = numbers.prior.iter().chain(&numbers.residual);
-        let whole = networks.try_fold(equations, |dynamics, network| {
-            with_residual(&dynamics, network)
-        });
-        Ok(Prediction {
-            whole: whole.map_err(|error| error.to_string())?,
-            integrator: self.integrator,
-            step_s: self.step_s,
-        })
+        let networks = numbers.prior.iter().chain(&numbers.residual);
+        ReferenceModel::new(equations, networks, self.integrator, self.step_s)
+            .map_err(|error| error.to_string())
     }
 }
 
@@ -108,11 +93,11 @@ impl Equations {
         let mut nodes = Vec::new();
         for operation in &self.operations {
             let node = write(&mut graph, &inputs, &nodes, operation);
-            nodes.push(node.ok_or_else(|| format!("{operation} is no operation"))?);
+            nodes.push(node.ok_or_else(|| format!("{operation} is not an operation"))?);
         }
         let outputs = self.outputs.iter().map(|k| nodes.get(*k).copied());
         let outputs: Option<Vec<Node>> = outputs.collect();
-        Ok(graph.finish(&outputs.ok_or("an output is no operation")?))
+        Ok(graph.finish(&outputs.ok_or("an output is not an operation")?))
     }
 }
 

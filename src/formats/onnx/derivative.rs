@@ -3,18 +3,18 @@
 use super::builder::{Builder, Value, whole};
 use super::proto::FLOAT;
 use crate::expr::{Binary, Op, Unary};
-use crate::formats::Portable;
+use crate::formats::ExportModel;
 use crate::model::{Angles, MlpWeights};
 
 /// The right-hand side, to be written as often as an integrator evaluates it.
-pub struct Flow<'m> {
-    model: &'m Portable,
+pub struct Derivative<'m> {
+    model: &'m ExportModel,
     parameters: Vec<Value>,
 }
 
-impl<'m> Flow<'m> {
+impl<'m> Derivative<'m> {
     /// Parameters become named numbers, once.
-    pub fn new(builder: &mut Builder, model: &'m Portable) -> Self {
+    pub fn new(builder: &mut Builder, model: &'m ExportModel) -> Self {
         let parameters = model.equations.parameters.iter();
         let parameters = parameters
             .map(|p| builder.parameter(&format!("parameters.{}", p.name), p.value, &p.unit))
