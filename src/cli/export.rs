@@ -45,14 +45,14 @@ const STEP_S: f64 = 0.01;
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let format = arguments.format;
     let model = portable(arguments)?;
-    let lost = (format.not_carried)(&model);
-    for what in &lost {
+    let not_carried = (format.not_carried)(&model);
+    for what in &not_carried {
         eprintln!("not carried: {what}");
     }
     let files = format.write(&model, &arguments.out)?;
     let measured = measure(format, &model, arguments);
     inputs::print(&match arguments.common.json {
-        true => format!("{:#}\n", printed(format, &files, &lost, &measured)),
+        true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
         false => text(format, &files, &measured),
     })?;
     if let Err(ClientError::Failed(said)) = &measured {
@@ -138,7 +138,7 @@ fn printed(
     json!({
         "format": format.name,
         "files": files.iter().map(file).collect::<Vec<_>>(),
-        "not_carried": lost,
+        "not_carried": not_carried,
         "difference": difference,
         "not_measured": measured.as_ref().err().map(ToString::to_string),
     })
