@@ -3,9 +3,7 @@ use std::io::ErrorKind;
 
 use crate::bench::GridError;
 use crate::experiment::ExperimentError;
-use crate::export::ImportError;
 use crate::files::OutputError;
-use crate::model::FileError;
 use crate::recipe::RecipeError;
 use crate::runs::RunFolderError;
 
@@ -16,8 +14,6 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().and_then(of_recipe))
         .or_else(|| error.downcast_ref().and_then(of_experiment))
         .or_else(|| error.downcast_ref().and_then(of_grid))
-        .or_else(|| error.downcast_ref().and_then(of_import))
-        .or_else(|| error.downcast_ref().and_then(of_file))
 }
 
 fn of_output(error: &OutputError) -> Option<&'static str> {
@@ -57,24 +53,4 @@ fn of_experiment(error: &ExperimentError) -> Option<&'static str> {
 
 fn of_grid(error: &GridError) -> Option<&'static str> {
     matches!(error, GridError::Open { .. }).then_some("give a grid with --grid")
-}
-
-fn of_import(error: &ImportError) -> Option<&'static str> {
-    let foreign = matches!(
-        error,
-        ImportError::Unreadable { .. } | ImportError::Json { .. }
-    );
-    foreign.then_some("give the JSON file that `residyn export --format json` wrote")
-}
-
-/// A robot description of the other format.
-fn of_file(error: &FileError) -> Option<&'static str> {
-    let ends = |end| error.message.ends_with(end);
-    if ends("this is URDF") {
-        Some("read it with --from-urdf")
-    } else if ends("this is MJCF") {
-        Some("read it with --from-mjcf")
-    } else {
-        None
-    }
 }
