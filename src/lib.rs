@@ -55,7 +55,6 @@ pub mod mbrl;
 pub mod model;
 pub mod plan;
 pub mod plant;
-pub mod recipe;
 pub mod report;
 pub mod rounds;
 pub mod runs;

@@ -9,7 +9,7 @@ use std::time::Duration;
 use residyn::data::{Columns, Log};
 use residyn::experiment::{Config, Session};
 use residyn::model::Library;
-use residyn::recipe::{Job, Recipe};
+use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
 

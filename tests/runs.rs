@@ -47,7 +47,7 @@ fn comes_again(arguments: &[&str], record: &str, command: fn(&Value) -> &Value, 
     let dir = dir.path();
     let read = || -> Value {
         let text = fs::read_to_string(dir.join(record)).unwrap();
-        let mut value = serde_json::from_str(&text).unwrap();
+        let mut value: Value = serde_json::from_str(&text).unwrap();
         for key in clock {
             assert_ne!(value[*key].take(), Value::Null, "{key}");
         }
@@ -130,4 +130,19 @@ fn a_log_is_written_through_a_link_and_never_onto_a_device() {
     }
     assert!(fs::symlink_metadata(&device).unwrap().is_symlink());
     assert_eq!(fs::read_dir(at("logs")).unwrap().count(), 1);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_checkpoint_is_written_through_a_link() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    std::os::unix::fs::symlink("real", dir.join("link")).unwrap();
+    let config = config("smoke/train-pendulum.toml");
+    for _ in 0..2 {
+        json(dir, &["train", "--config", &config, "--out", "link"]);
+        assert!(fs::symlink_metadata(dir.join("link")).unwrap().is_symlink());
+        assert!(dir.join("real/checkpoint.json").is_file());
+        assert_eq!(fs::read_dir(dir).unwrap().count(), 2);
+    }
 }

@@ -7,8 +7,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use residyn::model::Library;
-use residyn::recipe::{Job, Outcome, Recipe};
 use residyn::runs::RunFolder;
+use residyn::train::recipe::{Job, Outcome, Recipe};
 use residyn::train::{Backend, Penalty};
 use serde_json::Value;
 
@@ -64,7 +64,7 @@ fn recipe(name: &str) -> Recipe {
 
 /// How far the worst parameter is from the truth, as a share of it.
 fn worst(outcome: &Outcome) -> f64 {
-    let off = |p: &residyn::recipe::Learnt| {
+    let off = |p: &residyn::train::recipe::Learnt| {
         let truth = p.truth.unwrap();
         ((p.found - truth) / truth).abs()
     };

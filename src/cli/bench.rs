@@ -8,8 +8,9 @@ use clap::{Args, Subcommand};
 
 use super::{Answer, Common, inputs, progress, told};
 use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
-use crate::files::{content_id, write_whole};
+use crate::files::content_id;
 use crate::model::Library;
+use crate::runs::RunFolder;
 
 /// Measure the program itself on simulated rigs
 #[derive(Debug, Args)]
@@ -65,13 +66,14 @@ fn effects(arguments: &Effects) -> Result<Answer> {
             arguments.out.display()
         )
     })?;
+    let folder = RunFolder::open(&arguments.out)?;
     let store = Store::open(&arguments.out)?;
     let lines = store.run(&cells)?;
     let summary = summarise(&lines);
     let text = markdown(&summary);
     let json = serde_json::to_string_pretty(&summary)? + "\n";
-    write_whole(&arguments.out.join("summary.json"), json.as_bytes())?;
-    write_whole(&arguments.out.join("table.md"), text.as_bytes())?;
+    folder.write_text("summary.json", &json)?;
+    folder.write_text("table.md", &text)?;
     inputs::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }

@@ -9,8 +9,8 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use super::{Answer, Common, inputs, progress};
-use crate::recipe::Job;
 use crate::runs::RunFolder;
+use crate::train::recipe::Job;
 use crate::train::{Progress, Training, save};
 
 /// Where and how often to save.

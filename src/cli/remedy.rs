@@ -4,8 +4,8 @@ use std::io::ErrorKind;
 use crate::bench::GridError;
 use crate::experiment::ExperimentError;
 use crate::files::OutputError;
-use crate::recipe::RecipeError;
 use crate::runs::RunFolderError;
+use crate::train::recipe::RecipeError;
 
 /// What to do about an error, in terms of the command line, of which the library knows nothing.
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {

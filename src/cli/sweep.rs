@@ -7,8 +7,8 @@ use anyhow::{Result, bail};
 use clap::Args;
 
 use super::{Answer, Common, command_line, inputs, progress};
-use crate::recipe::{Job, Member, Recipe, Swept};
 use crate::runs::RunFolder;
+use crate::train::recipe::{Job, Member, Recipe, Swept};
 use crate::train::{SweepProgress, Trained};
 
 /// Train many models by one recipe at once, with different initial weights or different weights of the penalty

@@ -88,7 +88,7 @@ impl Config {
             let sound = |c: char| c.is_ascii_alphanumeric() || c == '_';
             if name.is_empty() || !name.chars().all(sound) {
                 return Err(format!(
-                    "the method {name:?} names a folder; write it in letters, digits and _"
+                    "the name {name:?} of a method becomes the name of a folder; use letters, digits and _"
                 ));
             }
             if [super::PRIOR, super::PERFECT].contains(&name.as_str())

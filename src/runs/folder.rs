@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::Identity;
 use super::lock::Lock;
-use crate::files::{OutputError, folder_of, write_whole};
+use crate::files::{OutputError, end_of_links, folder_of, write_whole};
 
 /// What a folder belongs to: the identity of its run and the version that began it.
 const RECORD: &str = "run.json";
@@ -173,9 +173,10 @@ impl RunFolder {
 
 /// The file that locks a folder: the same for every name that leads to the folder.
 fn lock_of(path: &Path) -> io::Result<PathBuf> {
-    let real = match fs::canonicalize(path) {
+    let path = end_of_links(path);
+    let real = match fs::canonicalize(&path) {
         Ok(real) => real,
-        Err(_) => fs::canonicalize(folder_of(path))?.join(path.file_name().unwrap_or_default()),
+        Err(_) => fs::canonicalize(folder_of(&path))?.join(path.file_name().unwrap_or_default()),
     };
     let mut name = std::ffi::OsString::from(".");
     name.push(real.file_name().unwrap_or_default());

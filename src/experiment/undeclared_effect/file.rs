@@ -78,7 +78,7 @@ impl Experiment {
             let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
             if name.is_empty() || !name.chars().all(plain) {
                 return Err(format!(
-                    "the case `{name}` names files; use letters, digits, - and _"
+                    "the name `{name}` of a case becomes part of file names; use letters, digits, - and _"
                 ));
             }
             if self.cases[..k].iter().any(|other| other.name == *name) {

@@ -150,7 +150,7 @@ impl OutcomeOfCase {
         let lost = if self.is_lost {
             ""
         } else {
-            ", which is none: nothing to win back"
+            ", which is not significant: nothing to win back"
         };
         let _ = writeln!(
             out,

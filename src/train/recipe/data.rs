@@ -98,7 +98,7 @@ impl Keys {
         ];
         if let Some((name, _)) = foreign.iter().find(|(_, given)| *given) {
             return Err(format!(
-                "`{name}` is of a simulated plant, but [data] has `logs`; remove it"
+                "`{name}` belongs to a simulated plant, but [data] has `logs`; remove it"
             ));
         }
         let logs = self.logs.unwrap_or_default();

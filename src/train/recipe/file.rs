@@ -131,7 +131,7 @@ impl Recipe {
         let given = !self.start.is_empty() || !self.hold.is_empty();
         if self.kind == Kind::DataDriven && given {
             return Err(
-                "[start] and `hold` speak of physical parameters, but kind = \"data_driven\" has none; \
+                "[start] and `hold` are about physical parameters, but kind = \"data_driven\" has none; \
                  remove them, or take kind = \"hybrid\""
                     .into(),
             );

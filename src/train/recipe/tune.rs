@@ -25,8 +25,8 @@ impl Job {
     ) -> Result<Self, RecipeError> {
         if !recipe.start.is_empty() || !recipe.hold.is_empty() {
             return Err(recipe.wrong(
-                "[start] and `hold` are for training from scratch; when tuning, the checkpoint says \
-                 them, so remove them"
+                "[start] and `hold` are for training from scratch; when tuning, the checkpoint \
+                 determines them; remove them"
                     .into(),
             ));
         }

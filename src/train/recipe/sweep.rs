@@ -75,8 +75,8 @@ mod tests {
 
     use super::Member;
     use crate::model::Library;
-    use crate::recipe::{Job, Recipe};
     use crate::train::Backend;
+    use crate::train::recipe::{Job, Recipe};
 
     #[test]
     fn a_member_begins_with_the_weights_of_its_own_job() {
