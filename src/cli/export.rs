@@ -162,13 +162,13 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, ClientErr
                 .collect();
             let _ = writeln!(
                 out,
-                "largest difference to the prediction here, as a share of each state's largest value: {}",
+                "largest difference from the program's own prediction, relative to each state's largest value: {}",
                 parts.join(", ")
             );
             if difference.pointwise() > format.tolerance {
                 let _ = writeln!(
                     out,
-                    "this is more than the {:.0e} it should be",
+                    "this exceeds the tolerance of {:.0e}",
                     format.tolerance
                 );
             }
@@ -176,7 +176,7 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, ClientErr
         Err(reason) => {
             let _ = writeln!(
                 out,
-                "difference to the prediction here not measured: {reason}"
+                "difference from the program's own prediction not measured: {reason}"
             );
         }
     }
