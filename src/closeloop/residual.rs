@@ -1,6 +1,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::study::{Fitted, Study};
+use crate::data::statistics::upper_median;
 use crate::identify::{Shooting, cut, fit};
 
 /// What the model lacks over one short stretch of a log: the constant generalised force that, added to
@@ -86,15 +87,14 @@ pub fn within_turn(samples: &mut [ForceSample], prismatic: &[bool]) {
 /// Root mean square of the residual force over stretches and joints, outliers weighing no more than three
 /// times the median: in N m (or N).
 pub fn norm(samples: &[ForceSample]) -> f64 {
-    let mut squares: Vec<f64> = samples
+    let squares: Vec<f64> = samples
         .iter()
         .flat_map(|s| s.force.iter().map(|f| f * f))
         .collect();
     if squares.is_empty() {
         return 0.0;
     }
-    squares.sort_by(f64::total_cmp);
-    let limit = 9.0 * squares[squares.len() / 2];
+    let limit = 9.0 * upper_median(&squares);
     #[allow(clippy::cast_precision_loss)] // few stretches
     let count = squares.len() as f64;
     (squares.iter().map(|s| s.min(limit)).sum::<f64>() / count).sqrt()
