@@ -43,7 +43,7 @@ pub struct Outcome {
     pub identifiability: Identifiability,
     pub before: Fitted,
     pub after: Fitted,
-    /// Values in the model file that the fit of `before` contradicts.
+    /// Values in the model file that the fit of `after` contradicts.
     pub contradicted: Vec<Contradicted>,
     /// All parameters of `after`, with their intervals.
     pub parameters: Vec<Parameter>,

@@ -159,10 +159,7 @@ pub fn close_loop(
         alternatives,
         taken_back,
         confirmed_on,
-        contradicted: contradicted(
-            &system.dynamics(&system.sign()).values(),
-            &with_intervals(&study, &before, &before.fit.values),
-        ),
+        contradicted: contradicted(&system.dynamics(&system.sign()).parameters, &parameters),
         before,
         after,
         parameters,
