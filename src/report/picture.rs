@@ -5,9 +5,10 @@ use super::plot::{
     ShapeSample, Track,
 };
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
-use crate::closeloop::{Curve, ForceSample, Outcome};
+use crate::closeloop::{ForceSample, Outcome, ResidualForce};
 use crate::data::Log;
 use crate::evaluate::{Assessment, Trace, summarise, traces};
+use crate::identify::FitError;
 use crate::model::Dynamics;
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
@@ -15,7 +16,7 @@ const SHOWN_S: f64 = 8.0;
 
 /// Measured motion and open-loop predictions on the beginning of the first test log.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
-    let Some(log) = outcome.test.first() else {
+    let Some(log) = outcome.given.test.first() else {
         return Err(PlotError::Empty {
             title: "predictions".into(),
         });
@@ -27,14 +28,14 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
         (
             Role::Before,
             FITTED,
-            &outcome.before.dynamics,
-            outcome.before.values_in(log),
+            &outcome.models.before.dynamics,
+            outcome.models.before.values_in(log),
         ),
         (
             Role::After,
             WITH_EFFECTS,
-            &outcome.after.dynamics,
-            outcome.after.values_in(log),
+            &outcome.models.after.dynamics,
+            outcome.models.after.values_in(log),
         ),
     ];
     if let Some(learned) = &outcome.learned {
@@ -56,7 +57,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    let panels: Vec<Panel> = (0..outcome.models.after.dynamics.joints)
+        .map(panel)
+        .collect();
     let title = format!(
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
@@ -65,7 +68,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
 }
 
 fn kind(outcome: &Outcome, joint: usize) -> JointKind {
-    if outcome.prismatic[joint] {
+    if outcome.given.prismatic[joint] {
         JointKind::Prismatic
     } else {
         JointKind::Revolute
@@ -104,8 +107,7 @@ fn predicted(
 
 /// The residual generalised force over angle, speed, torque and time, without and with the effects.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    let fitted = (&outcome.residual_before, &outcome.curves_before);
-    let with_effects = (&outcome.residual_after, &outcome.curves_after);
+    let (fitted, with_effects) = (&outcome.remainder.before, &outcome.remainder.after);
     let panel = |joint: usize| ShapePanel {
         joint: joint + 1,
         kind: kind(outcome, joint),
@@ -114,7 +116,9 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
             shape(Role::After, WITH_EFFECTS, joint, with_effects),
         ],
     };
-    let panels: Vec<ShapePanel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    let panels: Vec<ShapePanel> = (0..outcome.models.after.dynamics.joints)
+        .map(panel)
+        .collect();
     super::plot::residual_shape(
         &panels,
         "Residual force: what each model leaves unexplained",
@@ -125,14 +129,15 @@ fn shape(
     role: Role,
     label: &str,
     joint: usize,
-    (samples, curves): (&Vec<ForceSample>, &Vec<Curve>),
+    force: &Result<ResidualForce, FitError>,
 ) -> ShapeModel {
     let sample = |s: &ForceSample| ShapeSample {
         values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
         residual: s.force[joint],
     };
     let curve = |name: String| {
-        let mut of_joint = curves.iter().filter(|c| c.joint == joint + 1);
+        let curves = force.iter().flat_map(|force| &force.curves);
+        let mut of_joint = curves.filter(|c| c.joint == joint + 1);
         of_joint.find(|c| c.variable == name).map(|c| ShapeCurve {
             x: c.x.clone(),
             force: c.force.clone(),
@@ -140,13 +145,14 @@ fn shape(
             high: c.high.clone(),
         })
     };
+    let samples = force.iter().flat_map(|force| &force.samples);
     let number = joint + 1;
     let names = ["q", "qd", "tau"].map(|stem| format!("{stem}{number}"));
     let [q, qd, tau] = names.map(curve);
     ShapeModel {
         role,
         label: label.to_owned(),
-        samples: samples.iter().map(sample).collect(),
+        samples: samples.map(sample).collect(),
         curves: [q, qd, tau, curve("t".to_owned())],
     }
 }
@@ -154,7 +160,7 @@ fn shape(
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
 /// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let errors = &outcome.errors;
     let named = |role: Role, label: &str, model: &Assessment| {
         let rmse = summarise(&model.horizons, joints).position_rmse;

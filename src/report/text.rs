@@ -6,16 +6,18 @@ use super::wording::{
     reduction, small, value, values,
 };
 use crate::closeloop::{
-    Finding, How, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, SIGNIFICANT, UNKNOWN, Verdict, norm,
+    Finding, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, ResidualForce, SIGNIFICANT, SplitMethod,
+    UNKNOWN, Verdict,
 };
 use crate::data::Severity;
 use crate::evaluate::{Summary, summarise};
+use crate::identify::FitError;
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
     let sections = [
         answer(outcome),
-        effects(&outcome.findings),
+        effects(&outcome.effects.findings),
         confirmed(outcome),
         errors(outcome),
         parameters(outcome),
@@ -36,7 +38,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 fn answer(outcome: &Outcome) -> String {
     format!(
         "# {}: {}\n\n{}.\n\n",
-        outcome.after.dynamics.name,
+        outcome.models.after.dynamics.name,
         headline(outcome),
         capitalised(&outcome.reason)
     )
@@ -44,6 +46,7 @@ fn answer(outcome: &Outcome) -> String {
 
 pub(super) fn headline(outcome: &Outcome) -> String {
     let found: Vec<String> = outcome
+        .effects
         .findings
         .iter()
         .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint + 1))
@@ -83,10 +86,10 @@ fn effects(findings: &[Finding]) -> String {
 
 /// The unit of positions: that of all joints, or both.
 fn position_unit(outcome: &Outcome) -> &'static str {
-    let sliding = outcome.prismatic.iter().filter(|slides| **slides).count();
+    let sliding = outcome.given.prismatic.iter().filter(|slides| **slides).count();
     match sliding {
         0 => "rad",
-        all if all == outcome.prismatic.len() => "m",
+        all if all == outcome.given.prismatic.len() => "m",
         _ => "rad or m",
     }
 }
@@ -102,7 +105,7 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
     let hybrid = errors.hybrid.iter();
     models.extend(hybrid.map(|m| (WITH_NETWORK, m)));
     models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     models
         .into_iter()
         .map(|(name, model)| (name, summarise(&model.horizons, joints)))
@@ -128,7 +131,7 @@ fn errors(outcome: &Outcome) -> String {
     );
     let (before, after) = (&models[1].1, &models[2].1);
     for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for j in 0..outcome.after.dynamics.joints {
+        for j in 0..outcome.models.after.dynamics.joints {
             let rmse = |s: &Summary| s.position_rmse[h][j];
             let cell = |(_, s): &(&str, Summary)| {
                 format!("{} ({})", small(rmse(s)), small(s.position_median[h][j]))
@@ -166,11 +169,11 @@ fn errors(outcome: &Outcome) -> String {
 }
 
 fn parameters(outcome: &Outcome) -> String {
-    let declared = outcome.before.declared.len();
+    let declared = outcome.models.before.declared.len();
     let mut out = String::from("## Parameters of the declared equations\n\n");
-    for (parameter, before) in outcome.parameters[..declared]
+    for (parameter, before) in outcome.models.parameters[..declared]
         .iter()
-        .zip(&outcome.before.declared)
+        .zip(&outcome.models.before.declared)
     {
         let _ = writeln!(
             out,
@@ -178,14 +181,14 @@ fn parameters(outcome: &Outcome) -> String {
             value(parameter)
         );
     }
-    let verdict = &outcome.identifiability;
+    let verdict = &outcome.models.identifiability;
     let _ = writeln!(
         out,
         "\nThe logs determine {} of {} free parameters.",
         verdict.determined, verdict.free
     );
     for &k in &verdict.hold {
-        let name = &outcome.before.dynamics.parameters[k].name;
+        let name = &outcome.models.before.dynamics.parameters[k].name;
         let _ = writeln!(
             out,
             "- `{name}` is held: the logs determine it only in combination with others. \
@@ -197,7 +200,7 @@ fn parameters(outcome: &Outcome) -> String {
 
 /// Which numbers of the model file do not hold for these logs.
 fn contradicted(outcome: &Outcome) -> String {
-    if outcome.contradicted.is_empty() {
+    if outcome.models.contradicted.is_empty() {
         return String::new();
     }
     let errors = &outcome.errors;
@@ -211,7 +214,7 @@ fn contradicted(outcome: &Outcome) -> String {
         small(fitted),
         unit = position_unit(outcome),
     );
-    for one in &outcome.contradicted {
+    for one in &outcome.models.contradicted {
         let _ = writeln!(
             out,
             "- {}: declared {}, fitted {}: {}",
@@ -226,11 +229,11 @@ fn contradicted(outcome: &Outcome) -> String {
 }
 
 fn alternatives(outcome: &Outcome) -> String {
-    if outcome.alternatives.is_empty() {
+    if outcome.effects.alternatives.is_empty() {
         return String::new();
     }
     let mut out = String::from("## Other explanations that these logs do not rule out\n\n");
-    for alternative in &outcome.alternatives {
+    for alternative in &outcome.effects.alternatives {
         let _ = writeln!(
             out,
             "- **{}** on joint {}: {}. To tell them apart: {}.",
@@ -244,7 +247,10 @@ fn alternatives(outcome: &Outcome) -> String {
 }
 
 fn confirmed(outcome: &Outcome) -> String {
-    let mut out = match (outcome.findings.is_empty(), outcome.confirmed_on) {
+    let mut out = match (
+        outcome.effects.findings.is_empty(),
+        outcome.effects.confirmed_on,
+    ) {
         (true, _) => String::new(),
         (false, 0) => {
             "The logs are too short to confirm the effects on data that did not select them.\n"
@@ -254,7 +260,7 @@ fn confirmed(outcome: &Outcome) -> String {
             "Each effect also lowers the loss on {stretches} stretches of training data that did not select it.\n"
         ),
     };
-    for taken_back in &outcome.taken_back {
+    for taken_back in &outcome.effects.taken_back {
         let (label, reason) = (taken_back.effect.label(), &taken_back.reason);
         let _ = writeln!(
             out,
@@ -265,7 +271,7 @@ fn confirmed(outcome: &Outcome) -> String {
 }
 
 fn left(outcome: &Outcome) -> String {
-    let left = &outcome.unexplained;
+    let left = &outcome.remainder.unexplained;
     let p = probability(left.p_value);
     let share = 100.0 * left.omnibus.most().1;
     let structure = match left.place.as_str() {
@@ -290,14 +296,26 @@ fn left(outcome: &Outcome) -> String {
     };
     format!(
         "## What is left\n\nOf the residual variance above the sensor noise, {:.1} % is left. {structure}\n{network}\
-         Residual generalised force: {:.4} for the {FITTED}, {:.4} {WITH_EFFECTS} (root mean square over stretches of 0.15 s, \
+         Residual generalised force: {} for the {FITTED}, {} {WITH_EFFECTS} (root mean square over stretches of 0.15 s, \
          in N m or N).\n\n\
          ![residual](residual.svg)\n\n{}",
         100.0 * left.fraction,
-        norm(&outcome.residual_before),
-        norm(&outcome.residual_after),
-        outcome.proposal.as_ref().map(proposed).unwrap_or_default()
+        force(&outcome.remainder.before),
+        force(&outcome.remainder.after),
+        outcome
+            .remainder
+            .proposal
+            .as_ref()
+            .map(proposed)
+            .unwrap_or_default()
     )
+}
+
+fn force(force: &Result<ResidualForce, FitError>) -> String {
+    match force {
+        Ok(force) => format!("{:.4}", force.norm()),
+        Err(error) => format!("not computed ({error})"),
+    }
 }
 
 fn proposed(proposal: &Proposal) -> String {
@@ -323,7 +341,7 @@ fn tried(outcome: &Outcome) -> String {
     let mut out = String::from(
         "## What was tried\n\nGain: relative fall of the loss on stretches held out of the fit.\n\n",
     );
-    for (number, round) in outcome.rounds.iter().enumerate() {
+    for (number, round) in outcome.effects.rounds.iter().enumerate() {
         let _ = writeln!(
             out,
             "Round {} ({} candidates; the most promising were fitted):\n\n| effect | joint | gain | p | |\n|---|---|---|---|---|",
@@ -343,8 +361,12 @@ fn tried(outcome: &Outcome) -> String {
         }
         out.push('\n');
     }
-    if outcome.rounds.len() == MOST_EFFECTS
-        && outcome.rounds.last().is_some_and(|r| r.chosen.is_some())
+    if outcome.effects.rounds.len() == MOST_EFFECTS
+        && outcome
+            .effects
+            .rounds
+            .last()
+            .is_some_and(|r| r.chosen.is_some())
     {
         let _ = writeln!(
             out,
@@ -355,10 +377,12 @@ fn tried(outcome: &Outcome) -> String {
 }
 
 fn logs(outcome: &Outcome) -> String {
-    let how = match &outcome.how_split {
-        How::Given => "as given".to_owned(),
-        How::LastLogs { count } => format!("the last {count} logs were kept for the test"),
-        How::EndOfEachLog { share, gap_s } => {
+    let how = match &outcome.given.split {
+        SplitMethod::Given => "as given".to_owned(),
+        SplitMethod::LastLogs { count } => {
+            format!("the last {count} logs were kept for the test")
+        }
+        SplitMethod::EndOfEachLog { share, gap_s } => {
             format!(
                 "the last {:.0} % of each log, after a gap of {gap_s} s, were kept for the test",
                 100.0 * share
@@ -367,12 +391,13 @@ fn logs(outcome: &Outcome) -> String {
     };
     let mut out = format!("## Logs\n\nSplit: {how}.\n\n");
     let roles = outcome
+        .given
         .train
         .iter()
         .map(|_| "fitted")
-        .chain(outcome.test.iter().map(|_| "test"));
-    let all = outcome.train.iter().chain(&outcome.test);
-    for ((log, audit), role) in all.zip(&outcome.audits).zip(roles) {
+        .chain(outcome.given.test.iter().map(|_| "test"));
+    let all = outcome.given.train.iter().chain(&outcome.given.test);
+    for ((log, audit), role) in all.zip(&outcome.given.audits).zip(roles) {
         let _ = writeln!(
             out,
             "- **{}** ({role}): {} rows, {:.2} s",
@@ -396,6 +421,7 @@ fn logs(outcome: &Outcome) -> String {
 
 fn footer(outcome: &Outcome, seed: u64) -> String {
     let widths: Vec<String> = outcome
+        .models
         .sign_widths
         .iter()
         .map(|w| format!("{w:.3}"))

@@ -13,7 +13,10 @@ pub struct Contradicted {
 /// The declared values that lie outside of the intervals of the fitted ones. Both are in the same order, and further
 /// fitted ones may follow. A parameter without an interval was not fitted and contradicts nothing; one that is declared
 /// fixed has another value only as a finding, `parameter_shift`.
-pub(super) fn contradicted(declared: &[Parameter], fitted: &[Parameter]) -> Vec<Contradicted> {
+pub(in crate::closeloop) fn contradicted(
+    declared: &[Parameter],
+    fitted: &[Parameter],
+) -> Vec<Contradicted> {
     let outside = |(declared, fitted): (&Parameter, &Parameter)| {
         let [low, high] = fitted.ci95.filter(|_| !declared.fixed)?;
         (!(low..=high).contains(&declared.value)).then(|| Contradicted {
