@@ -55,7 +55,7 @@ pub struct Models {
     pub sign_widths: Vec<f64>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
-    /// Values in the model file that the fit of `before` contradicts.
+    /// Values in the model file that the fit of `after` contradicts.
     pub contradicted: Vec<Contradicted>,
 }
 

@@ -6,7 +6,7 @@ use super::find::{Found, find};
 use super::fitted::Fitted;
 use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
-use super::refine::{Refined, refine, with_intervals};
+use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
@@ -94,12 +94,9 @@ fn remainder(study: &Study<'_>, found: &Found, refined: &Refined<'_>) -> Remaind
 }
 
 fn models_of(study: &Study<'_>, before: Fitted, refined: Refined<'_>) -> Models {
-    let declared = study.system.dynamics(&study.system.sign()).values();
+    let declared = study.system.dynamics(&study.system.sign()).parameters;
     Models {
-        contradicted: contradicted(
-            &declared,
-            &with_intervals(study, &before, &before.fit.values),
-        ),
+        contradicted: contradicted(&declared, &refined.parameters),
         before,
         after: refined.model,
         parameters: refined.parameters,

@@ -1,7 +1,8 @@
 use std::fmt::Write;
 
 use super::calibration::line;
-use super::text::{headline, proposal_line, small, values};
+use super::text::{headline, proposal_line};
+use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
 use crate::evaluate::{Assessment, Summary, summarise};
 
@@ -28,7 +29,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         let name = &outcome.models.before.dynamics.parameters[k].name;
         let _ = writeln!(
             out,
-            "  {name} is held, the logs do not determine it: the other values are relative to it"
+            "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
     let joints = outcome.models.after.dynamics.joints;
@@ -37,6 +38,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         numbers(&outcome.errors.before),
         numbers(&outcome.errors.after),
     );
+    out += "  open-loop position error on the test logs, root mean square:\n";
     for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
         for j in 0..joints {
             let unit = if outcome.given.prismatic[j] {
@@ -48,12 +50,12 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after",
+                "  joint {}, {seconds} s ahead: {before} {unit} {FITTED}; {after} {unit} {WITH_EFFECTS}",
                 j + 1
             );
         }
     }
-    let declared = ("declared model as written", &outcome.errors.declared);
+    let declared = (AS_WRITTEN, &outcome.errors.declared);
     let against = outcome.errors.against.iter();
     let as_they_are = std::iter::once(declared).chain(against.map(|(name, m)| (name.as_str(), m)));
     for (name, model) in as_they_are {
