@@ -12,7 +12,7 @@ use super::{Answer, Common, progress};
 use crate::control::{
     Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
 };
-use crate::experiment::statistics::{deviation, mean};
+use crate::data::statistics::{mean, sample_deviation};
 use crate::model::Library;
 use crate::plan::Method;
 use crate::plant::{Noise, Plant};
@@ -284,7 +284,7 @@ impl Printed {
             task_name: task.name(),
             task,
             return_mean: mean(&returns),
-            return_std: deviation(&returns),
+            return_std: sample_deviation(&returns),
             successes: episodes.iter().filter(|e| e.success).count(),
             episodes,
         }
