@@ -5,7 +5,8 @@ use std::path::Path;
 
 use residyn::control::{Meter, Task};
 use residyn::export::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
-use residyn::model::{Integrator, System};
+use residyn::model::System;
+use residyn::sim::Integrator;
 use serde_json::{Value, json};
 
 use crate::clients::client;
@@ -313,7 +314,7 @@ delta = 0.005
 driven = 1
 "#;
     let system = models::system("pendulum", effects);
-    let model = Portable::stated(&system, Integrator::Rk4, 0.01, Value::Null);
+    let model = Portable::stated(&system, Integrator::RK4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
         let limits = (find(name).unwrap().limits)(&model);
         for piece in [
@@ -332,7 +333,7 @@ fn names_and_units_of_files_do_not_break_a_module() {
                 lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
                 [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
     let system = System::from_text(Path::new("odd.toml"), text, &[]).unwrap();
-    let model = Portable::stated(&system, Integrator::Rk4, 0.01, json!("\"\"\"\n\\"));
+    let model = Portable::stated(&system, Integrator::RK4, 0.01, json!("\"\"\"\n\\"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.module");
     let format = find("python").unwrap();

@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::export::{Difference, File, Format, Portable, Unread, find};
-use crate::model::{Integrator, Library};
+use crate::model::Library;
+use crate::sim::Integrator;
 use crate::train::Manifest;
 
 /// Write a model for other programs, and measure how far what they predict is from here
@@ -113,7 +114,7 @@ fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Port
     let system = library.system(file)?;
     Ok(Portable::stated(
         &system,
-        arguments.integrator.unwrap_or(Integrator::Rk4),
+        arguments.integrator.unwrap_or(Integrator::RK4),
         arguments.step.unwrap_or(STEP_S),
         json!({"config": {"model": file}, "seed": arguments.common.seed}),
     ))

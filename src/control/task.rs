@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Meter;
-use crate::model::{Dynamics, Integrator};
+use crate::model::Dynamics;
 use crate::plan::{Objective, Settings};
 use crate::plant::{Noise, Plant, Rig};
+use crate::sim::Integrator;
 
 /// What a plant is to do, and how is planned for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -164,20 +165,14 @@ impl Task {
             .collect()
     }
 
-    /// `plant` at a true start, moving and measured as the task says; `dynamics` and `values` are its own.
+    /// `plant` at a true start, moving and measured as the task says; `dynamics` are its true ones.
     ///
     /// # Panics
     /// When one of them is of another system.
-    pub fn rig<'d>(
-        &self,
-        plant: &Plant,
-        dynamics: &'d Dynamics,
-        values: &[f64],
-        start: &[f64],
-    ) -> Rig<'d> {
+    pub fn rig<'d>(&self, plant: &Plant, dynamics: &'d Dynamics, start: &[f64]) -> Rig<'d> {
         let PlantSettings { integrator, noise } = self.plant;
         let start = plant.as_read(start);
-        Rig::new(dynamics, values, &start, integrator, self.step_s, noise)
+        Rig::new(dynamics, &start, integrator, self.step_s, noise)
     }
 
     /// Whether it makes sense, for a plant of `joints` joints.

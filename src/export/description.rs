@@ -11,7 +11,8 @@ use thiserror::Error;
 
 use super::{CarriedEffect, ExportError, File, Format, HeldFilter, Portable, Reader, rebuilt};
 use crate::expr::{Op, Program};
-use crate::model::{Effect, HybridError, Integrator, ModelWeights, System};
+use crate::model::{Effect, HybridError, ModelWeights, System};
+use crate::sim::Integrator;
 use crate::train::weights::{from_bytes, to_bytes};
 use crate::train::{
     Backend, CheckpointError, FitSettings, Origin, Shape, TrainError, Training, save,
@@ -78,6 +79,12 @@ struct Equations {
     /// The same for the step of the file: `mean` torques over each substep and what the lag has come to at the `end`, as
     /// sums of factors times the lagged torque and the torques at two `places`.
     held: Vec<HeldFilter>,
+    /// How a held step is integrated: in so many equal substeps, each through these stages.
+    substeps: usize,
+    /// `[time, reach, weight]`: when a stage is, how far the next lies along its slope, and the slope's weight.
+    stages: Vec<[f64; 3]>,
+    /// Whether positions move with the velocities that a substep leads to.
+    semi_implicit: bool,
     /// The rates around the networks, as formulas.
     formulas: String,
     /// Names of the inputs of the operations.
@@ -189,6 +196,7 @@ impl Equations {
             .flat_map(|stem| (1..=model.joints()).map(move |j| format!("d({stem}{j})/dt")))
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let scheme = model.integrator.scheme();
         Self {
             parameters: equations.parameters.iter().map(parameter).collect(),
             effects: model.effects.clone(),
@@ -199,6 +207,11 @@ impl Equations {
                 })
                 .collect(),
             held: HeldFilter::all(model),
+            substeps: model.integrator.substeps(),
+            stages: (scheme.stages.iter())
+                .map(|stage| [stage.time, stage.reach, stage.weight])
+                .collect(),
+            semi_implicit: scheme.semi_implicit,
             formulas: program.text(&names),
             inputs: program.inputs().to_vec(),
             operations: operations(program),

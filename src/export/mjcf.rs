@@ -6,7 +6,7 @@ use std::path::Path;
 use super::mechanism::{Drive, Link, Rig, escaped, file, friction_widths, head, numbers};
 use super::{ExportError, File, Format, Portable, PythonClient, Reader};
 use crate::mechanism::Joint;
-use crate::model::Integrator;
+use crate::sim::RK4;
 
 pub(super) const FORMAT: Format = Format {
     name: "mjcf",
@@ -38,6 +38,13 @@ fn limits(model: &Portable) -> Vec<String> {
             "the lag within a step: MuJoCo holds over each step what it has come to; only the derivative is compared"
                 .into(),
         );
+    }
+    let scheme = model.integrator.scheme();
+    if !scheme.semi_implicit && scheme != RK4 {
+        limits.push(format!(
+            "the {}: MuJoCo integrates by the {} in its place",
+            scheme.title, RK4.title
+        ));
     }
     limits
 }
@@ -75,14 +82,15 @@ fn text(model: &Portable, rig: &Rig) -> String {
 
 /// Gravity, and steps as the model makes them.
 pub(super) fn option(model: &Portable, rig: &Rig) -> String {
-    let integrator = match model.integrator {
-        Integrator::SemiImplicitEuler => "Euler",
-        Integrator::Rk4 | Integrator::Fine { .. } => "RK4",
+    // MuJoCo's own Runge-Kutta method is the classical one.
+    let integrator = match model.integrator.scheme().semi_implicit {
+        true => "Euler",
+        false => "RK4",
     };
     format!(
         "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{integrator}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
         numbers([0.0, 0.0, -rig.gravity]),
-        model.step_s / model.integrator.parts() as f64
+        model.step_s / model.integrator.substeps() as f64
     )
 }
 

@@ -5,9 +5,10 @@ use serde_json::json;
 use super::prediction::Prediction;
 use super::{Answers, Samples};
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
-    nothing_but, with_residual,
+    CommandFilter, Dynamics, HybridError, MlpWeights, ModelWeights, Parameter, System, nothing_but,
+    with_residual,
 };
+use crate::sim::Integrator;
 
 /// A model as every format reads it: the equations with their values, the networks whose outputs are added to their
 /// derivative, and how both become steps.

@@ -1,6 +1,6 @@
 use super::{Answers, Samples};
-use crate::model::{Dynamics, Integrator};
-use crate::plant::Environment;
+use crate::model::Dynamics;
+use crate::sim::{Environment, Integrator};
 
 /// A whole model, networks included, and how it is stepped: what this program itself predicts, in f64.
 #[derive(Debug, Clone)]
@@ -43,7 +43,6 @@ impl Prediction {
 
     /// After no torque.
     fn environment(&self) -> Environment<'_> {
-        let values = self.whole.values();
-        Environment::new(&self.whole, &values, self.integrator, self.step_s)
+        Environment::new(&self.whole, self.integrator, self.step_s)
     }
 }

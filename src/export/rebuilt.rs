@@ -9,7 +9,8 @@ use serde_json::Value;
 use super::prediction::Prediction;
 use super::{Answers, Samples, Unread};
 use crate::expr::{Graph, Node, Program};
-use crate::model::{CommandFilter, Dynamics, Filter, Integrator, ModelWeights, with_residual};
+use crate::model::{CommandFilter, Dynamics, Filter, ModelWeights, with_residual};
+use crate::sim::Integrator;
 use crate::train::Shape;
 use crate::train::weights::from_bytes;
 
