@@ -2,6 +2,7 @@
 //! integrators that run it.
 
 mod assemble;
+pub mod chain;
 mod dynamics;
 mod effect;
 mod effects_in_file;
