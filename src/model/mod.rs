@@ -7,6 +7,7 @@ mod dynamics;
 mod effect;
 mod effects_in_file;
 mod equations;
+mod file;
 mod filter;
 mod frame;
 mod hybrid;

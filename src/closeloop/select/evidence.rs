@@ -1,7 +1,9 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::folds::left_out_losses;
-use super::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
+use crate::data::statistics::{mean, standard_error};
 use crate::identify::uncertainty;
 use crate::model::FittedEffect;
 
@@ -22,10 +24,10 @@ pub struct Evidence {
 
 /// An effect must lower the loss on left-out stretches by this share, the error itself thus by a twentieth: less
 /// is of no use to anyone, and on real rigs it is what a wrong effect saves by standing in for others.
-pub(super) const WORTHWHILE: f64 = 0.1;
+pub const WORTHWHILE: f64 = 0.1;
 /// An effect plainly helps that takes away half of the loss on stretches that it was not fitted to: chance does
 /// not do that.
-pub(super) const PLAIN: f64 = 0.5;
+pub const PLAIN: f64 = 0.5;
 /// Candidates within this many standard errors of the best explain the logs as well as it does.
 const AS_GOOD: f64 = 2.0;
 /// And they save this share of what it saves,
@@ -72,15 +74,15 @@ impl Evidence {
 
     /// Whether the losses on left-out stretches do not tell this candidate from a better one.
     pub fn is_as_good_as(&self, best: &Self) -> bool {
-        let (mean, error) = mean_and_error(&differences(&self.losses, &best.losses));
-        mean <= AS_GOOD * error
+        let differences = differences(&self.losses, &best.losses);
+        mean(&differences) <= AS_GOOD * standard_error(&differences)
             && self.gain > AS_MUCH * best.gain
             && 1.0 - self.gain <= AS_LITTLE * (1.0 - best.gain)
     }
 }
 
 /// Fall of the loss as a share of what it was.
-pub(super) fn gain(before: &[f64], after: &[f64]) -> f64 {
+pub fn gain(before: &[f64], after: &[f64]) -> f64 {
     1.0 - after.iter().sum::<f64>() / before.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
@@ -145,12 +147,4 @@ pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
 
 fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-#[allow(clippy::cast_precision_loss)] // few stretches
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    (mean, (variance / count).sqrt())
 }

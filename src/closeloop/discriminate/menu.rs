@@ -1,5 +1,6 @@
 use super::motion::Motion;
-use crate::closeloop::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
 
 /// What drives the rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +30,7 @@ enum Start {
 
 /// One experiment that the rig of the logs might do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Entry {
+struct MenuItem {
     /// What to do; `{joint}`, `{torque}` (N m or N) and `{speed}` (rad/s or m/s) stand for what the logs say.
     text: &'static str,
     drive: Drive,
@@ -40,7 +41,7 @@ struct Entry {
     turns: bool,
 }
 
-const AS_LOGGED: Entry = Entry {
+const AS_LOGGED: MenuItem = MenuItem {
     text: "longer logs of the same motion",
     drive: Drive::Logged {
         factor: 1.0,
@@ -51,8 +52,8 @@ const AS_LOGGED: Entry = Entry {
     turns: false,
 };
 
-const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> Entry {
-    Entry {
+const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> MenuItem {
+    MenuItem {
         text,
         drive: Drive::Logged { factor, pace },
         start: Start::Logged(speed),
@@ -60,8 +61,8 @@ const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> Entry
     }
 }
 
-const fn coasting(text: &'static str, speed: f64) -> Entry {
-    Entry {
+const fn coasting(text: &'static str, speed: f64) -> MenuItem {
+    MenuItem {
         text,
         drive: Drive::Nothing,
         start: Start::TopSpeed(speed),
@@ -69,8 +70,8 @@ const fn coasting(text: &'static str, speed: f64) -> Entry {
     }
 }
 
-const fn turning(text: &'static str, torque: f64) -> Entry {
-    Entry {
+const fn turning(text: &'static str, torque: f64) -> MenuItem {
+    MenuItem {
         text,
         drive: Drive::Added(torque),
         turns: true,
@@ -79,9 +80,9 @@ const fn turning(text: &'static str, torque: f64) -> Entry {
 }
 
 /// Smallest changes of what the user does already first.
-const MENU: [Entry; 12] = [
+const MENU: [MenuItem; 12] = [
     AS_LOGGED,
-    Entry {
+    MenuItem {
         text: "the same motion sampled four times as often",
         finer: 4,
         ..AS_LOGGED
@@ -96,7 +97,7 @@ const MENU: [Entry; 12] = [
     ),
     logged("the same torque run twice as fast", 1.0, 2.0, 1.0),
     logged("the torque's sign reversed", -1.0, 1.0, -1.0),
-    Entry {
+    MenuItem {
         text: "slow torque ramps on joint {joint} from standstill to {torque}, up and down",
         drive: Drive::Ramps(0.5),
         start: Start::Rest,
@@ -130,7 +131,7 @@ const RAMPS_S: f64 = 8.0;
 const MOTIONS: usize = 10;
 
 /// An experiment ready to be simulated.
-pub(super) struct Proposal {
+pub(super) struct Experiment {
     pub text: String,
     pub motions: Vec<Motion>,
     /// A joint that must go round.
@@ -139,18 +140,18 @@ pub(super) struct Proposal {
 
 /// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
 /// states are where motions begin.
-pub(super) fn proposals(study: &Study<'_>, model: &Fitted, joints: &[usize]) -> Vec<Proposal> {
-    let of_one_joint = |entry: &Entry| entry.text.contains("{joint}");
+pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[usize]) -> Vec<Experiment> {
+    let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
     let mut all = Vec::new();
-    for entry in &MENU {
-        let joints = if of_one_joint(entry) { joints } else { &[0] };
+    for item in &MENU {
+        let joints = if of_one_joint(item) { joints } else { &[0] };
         let able = joints
             .iter()
-            .filter(|joint| entry.is_possible(study, **joint));
-        all.extend(able.map(|&joint| Proposal {
-            text: entry.words(study, joint),
-            motions: entry.motions(study, model, joint),
-            turns: entry.turns.then_some(joint),
+            .filter(|joint| item.is_possible(study, **joint));
+        all.extend(able.map(|&joint| Experiment {
+            text: item.words(study, joint),
+            motions: item.motions(study, model, joint),
+            turns: item.turns.then_some(joint),
         }));
     }
     all
@@ -161,7 +162,7 @@ pub(super) fn as_logged(study: &Study<'_>, model: &Fitted) -> Vec<Motion> {
     AS_LOGGED.motions(study, model, 0)
 }
 
-impl Entry {
+impl MenuItem {
     fn is_possible(&self, study: &Study<'_>, joint: usize) -> bool {
         let undriven = [AS_LOGGED.drive, Drive::Nothing].contains(&self.drive);
         let driven = match self.drive {
