@@ -15,9 +15,7 @@ use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
     Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
-    as_modelled,
 };
-use crate::sim::Integrator;
 use crate::sim::{Integrator, Point, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
