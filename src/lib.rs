@@ -58,4 +58,5 @@ pub mod plant;
 pub mod report;
 pub mod rounds;
 pub mod runs;
+pub mod sim;
 pub mod train;

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::Columns;
 use super::error::{CellFault, LogError};
-use super::signal::{differences, median};
+use super::signal::differences;
+use super::statistics::median;
 use crate::files::write_with;
 
 /// A span of a log's own time, both ends included.

@@ -7,8 +7,9 @@ use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::files::{beside, beside_or_named, content_id};
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
-use crate::model::{Dynamics, HybridModel, Integrator, Library, System};
+use crate::model::{Dynamics, HybridModel, Library, System};
 use crate::runs::RunFolder;
+use crate::sim::Integrator;
 use crate::train::{Backend, Checkpoint, Origin};
 
 /// A method with everything it refers to read.

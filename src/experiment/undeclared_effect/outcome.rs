@@ -3,7 +3,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
-use crate::experiment::statistics::{Interval, bootstrap, deviation, mean};
+use crate::data::statistics::{bootstrap, mean, sample_deviation};
 use crate::runs::{Purpose, stream};
 
 /// The share of the lost return that is to be recovered after the first number of episodes.
@@ -28,7 +28,7 @@ pub struct OutcomeOfCase {
     pub case: Case,
     /// Return with the true model minus return with the declared one, mean over the seeds.
     pub loss: f64,
-    pub loss_ci95: Interval,
+    pub loss_ci95: [f64; 2],
     /// Whether the loss is significant. If it is not, there is nothing to win back.
     pub is_lost: bool,
     pub models: Vec<Compared>,
@@ -58,7 +58,7 @@ pub struct Compared {
 pub struct WonBack {
     /// Ratio of means over the seeds; 1 if the whole loss is won back.
     pub share: f64,
-    pub ci95: Interval,
+    pub ci95: [f64; 2],
 }
 
 impl Outcome {
@@ -179,7 +179,7 @@ impl Compared {
             model: first.model,
             episodes: first.episodes,
             mean: mean(&returns),
-            deviation: deviation(&returns),
+            deviation: sample_deviation(&returns),
             successes: scores().filter(|score| score.judged.success).count(),
             won_back: None,
             returns,

@@ -1,4 +1,4 @@
-//! MJCF, for MuJoCo.
+//! Writes the mechanism of a model.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -9,8 +9,8 @@ use crate::formats::robot::mechanism::{
 };
 use crate::formats::verify::{Client, PythonClient};
 use crate::formats::{ExportError, ExportModel, File, Format, RobotReader};
-use crate::model::Integrator;
 use crate::model::chain::Joint;
+use crate::sim::RK4;
 
 pub(in crate::formats) const FORMAT: Format = Format {
     name: "mjcf",
@@ -44,9 +44,16 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     }
     if mechanism.drives.iter().any(|drive| drive.lag.is_some()) {
         lost.push(
-            "the lag within a step: MuJoCo holds over each step what it has come to; only the derivative is compared"
+            "the lag within a step: MuJoCo holds the lagged torque over each step; only the derivative is compared"
                 .into(),
         );
+    }
+    let scheme = model.integrator.scheme();
+    if !scheme.semi_implicit && scheme != RK4 {
+        lost.push(format!(
+            "the {}: MuJoCo integrates by the {} in its place",
+            scheme.title, RK4.title
+        ));
     }
     lost
 }
@@ -62,7 +69,7 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     let _ = write!(
         text,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n  <custom>\n    \
-         <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n    \
+         <!-- Velocities over which dry friction reverses in the exported model. -->\n    \
          <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
         escaped(model.name()),
         option(model, mechanism),
@@ -82,20 +89,21 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     text + "  </actuator>\n</mujoco>\n"
 }
 
-/// Gravity, and steps as the model makes them.
+/// Gravity, step and integrator of the model.
 pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
-    let integrator = match model.integrator {
-        Integrator::SemiImplicitEuler => "Euler",
-        Integrator::Rk4 | Integrator::Fine { .. } => "RK4",
+    // MuJoCo's own Runge-Kutta method is the classical one.
+    let integrator = match model.integrator.scheme().semi_implicit {
+        true => "Euler",
+        false => "RK4",
     };
     format!(
         "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{integrator}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
         numbers([0.0, 0.0, -mechanism.gravity]),
-        model.step_s / model.integrator.parts() as f64
+        model.step_s / model.integrator.substeps() as f64
     )
 }
 
-/// A body, left open for the next.
+/// A body, its element left open for the next.
 fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String {
     let rotation = link.pose.rotation;
     let axes = rotation
@@ -142,7 +150,7 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
     )
 }
 
-/// What the joint has beside its axis.
+/// Attributes of the joint's drivetrain.
 fn of_joint(joint: &Joint) -> String {
     let spring = joint
         .drivetrain
@@ -157,7 +165,7 @@ fn of_joint(joint: &Joint) -> String {
     ])
 }
 
-/// Attributes whose values are not the format's own.
+/// Attributes whose values differ from the format's defaults.
 fn attributes(values: &[(&str, f64, f64)]) -> String {
     #[allow(clippy::float_cmp)] // as set
     let given = values.iter().filter(|(_, value, default)| value != default);

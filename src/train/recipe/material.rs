@@ -5,9 +5,10 @@ use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::files::{beside, beside_or_named};
-use crate::model::{Library, System, as_modelled};
+use crate::model::{Library, System};
 use crate::plant::Plant;
 use crate::runs::{Purpose, stream};
+use crate::sim::as_modelled;
 use crate::train::{Segments, SegmentsError};
 
 /// The data of a recipe, ready for training.
@@ -48,11 +49,10 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
         length_s: f64::INFINITY,
     };
     let dynamics = equations(system);
-    let values = dynamics.values();
     let modelled = |log: &Log| match recipe.kind {
         // A network alone has no effects: it learns from the commanded torques and the sensor readings.
         Kind::DataDriven => log.clone(),
-        Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, &values, log),
+        Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, log),
     };
     let mut training = Segments::new(system.joints, logged.steps);
     for log in &logs {
