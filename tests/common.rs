@@ -10,9 +10,8 @@ use rand_distr::{Distribution, Normal};
 use residyn::data::Log;
 use residyn::expr::{Graph, Program, SignForm};
 use residyn::lanes::Row;
-use residyn::model::{
-    Commands, Dynamics, Effect, Entry, FittedEffect, Library, Rollout, Sensors, StepTorque, System,
-};
+use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, System};
+use residyn::sim::{Commands, Hold, RK4, Simulator};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
@@ -212,21 +211,18 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
         *tau = log.time.iter().map(|t| 0.25 * torque * wave(*t)).collect();
     }
     let (time, tau) = (log.time.clone(), log.tau.clone());
-    let commands = Commands::new(model, &model.values(), &time, &tau);
-    let mut rollout = Rollout::<f64, 1>::new(model, &model.values());
-    let mut sensors = Sensors::<1>::new(model, &model.values());
-    let mut state: Vec<Row<f64, 1>> = start.iter().map(|x| Row([*x])).collect();
+    let commands = [&Commands::new(model, &time, &tau)];
+    let mut simulator = Simulator::new(model, RK4);
+    simulator.put(start);
     for row in 0..=rows {
         let time = log.time[row];
-        let before = || Commands::just_before([&commands], [row]);
-        let shown = sensors.show(&state, before, Row([time]));
+        let [angles, velocities] = simulator.shown(commands, [row]);
         for j in 0..n {
-            log.q[j].push(shown[j][0]);
-            log.qd[j].push(state[n + j][0]);
+            log.q[j].push(angles[j][0]);
+            log.qd[j].push(velocities[j][0]);
         }
         let held: Vec<Row<f64, 1>> = log.tau.iter().map(|tau| Row([tau[row]])).collect();
-        let torque = StepTorque::new([&commands], &held, Row([time]), Row([time + 0.01]), 20);
-        rollout.advance(&mut state, &torque.mean, Row([time]), Row([0.01]), 20);
+        simulator.advance(&Hold::lasting(commands, &held, Row([time]), 0.01, 20));
     }
     log
 }

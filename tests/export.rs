@@ -7,7 +7,8 @@ use residyn::control::{Meter, Task};
 use residyn::formats::{
     Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
 };
-use residyn::model::{Integrator, System};
+use residyn::model::System;
+use residyn::sim::Integrator;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -337,7 +338,7 @@ delta = 0.005
 driven = 1
 "#;
     let system = models::system("pendulum", effects);
-    let model = ExportModel::of_system(&system, Integrator::Rk4, 0.01, Value::Null);
+    let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
         let limits = (find(name).unwrap().not_carried)(&model);
         for piece in [
@@ -356,7 +357,7 @@ fn names_and_units_of_files_do_not_break_a_module() {
                 lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
                 [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
     let system = System::from_text(Path::new("odd.toml"), text, &[]).unwrap();
-    let model = ExportModel::of_system(&system, Integrator::Rk4, 0.01, json!("\"\"\"\n\\"));
+    let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("\"\"\"\n\\"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.module");
     let format = find("python").unwrap();

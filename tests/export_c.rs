@@ -8,7 +8,8 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use residyn::formats::{ExportModel, Predictions, Samples, find};
 use residyn::lanes::Row;
-use residyn::model::{Commands, Integrator, Library, StepTorque, System};
+use residyn::model::{Library, System};
+use residyn::sim::{Commands, Hold, Integrator, StepTorque};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -38,7 +39,7 @@ qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 
 fn odd() -> ExportModel {
     let library = Library::built_in();
     let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
-    ExportModel::of_system(&system, Integrator::Rk4, 0.01, json!("*/ \\"))
+    ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("*/ \\"))
 }
 
 /// A model's header in a folder of its own.
@@ -329,16 +330,13 @@ fn torques_act_as_the_filters_say_whatever_the_steps() {
         }
         time.push(now);
         let equations = &header.model.equations;
-        let commands = Commands::new(equations, &equations.values(), &time[..=steps], &tau);
-        let parts = match header.model.integrator {
-            Integrator::Fine { steps } => steps.get() as usize,
-            _ => 1,
-        };
+        let commands = Commands::new(equations, &time[..=steps], &tau);
+        let parts = header.model.integrator.substeps();
         let rows = header.ask("tests/clients/acting.c", &[], &question);
         for (k, row) in rows.iter().enumerate() {
             let held: Vec<_> = tau.iter().map(|tau| Row([tau[k + 1]])).collect();
             let ends = [time[k + 1], time[k + 2]].map(|time| Row([time]));
-            let acting = StepTorque::new([&commands], &held, ends[0], ends[1], parts).mean;
+            let acting = StepTorque::new(&Hold::between([&commands], &held, ends, parts)).mean;
             for (a, Row([b])) in row.iter().zip(acting) {
                 assert!((a - b).abs() < 1e-9, "{} step {k}: {a} {b}", header.name);
             }

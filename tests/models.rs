@@ -5,9 +5,10 @@ use std::path::Path;
 use rand_chacha::ChaCha8Rng;
 use residyn::formats::ExportModel;
 use residyn::model::{
-    Angles, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights,
-    ResidualOn, System,
+    Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights, ResidualOn,
+    System,
 };
+use residyn::sim::Integrator;
 use serde_json::json;
 
 use crate::common::rng;
@@ -57,10 +58,8 @@ m = 4.0
 
 /// All of them, by name.
 pub fn all() -> Vec<(&'static str, ExportModel)> {
-    let fine = Integrator::Fine {
-        steps: 4.try_into().unwrap(),
-    };
-    let (euler, rk4) = (Integrator::SemiImplicitEuler, Integrator::Rk4);
+    let fine = Integrator::fine(4.try_into().unwrap());
+    let (euler, rk4) = (Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4);
     let pendulum = || system("pendulum", "");
     let friction = || system("pendulum", PENDULUM_EFFECTS);
     let acrobot = || system("acrobot", "");
