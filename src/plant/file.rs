@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::Excitation;
 use crate::expr::suggestion;
+use crate::files::{beside_or_named, text_or_embedded};
 use crate::model::{FileError, FittedEffect, Library, System};
 
 /// Why a plant cannot be simulated.
@@ -101,17 +102,11 @@ impl Plant {
     /// # Errors
     /// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
     pub fn read(path: &Path, library: &Library) -> Result<Self, PlantError> {
-        match std::fs::read_to_string(path) {
-            Ok(text) if is_plant(&text) => return Self::from_text(path, &text, library),
-            Ok(_) => return Ok(Self::of_system(library.system(path)?)),
-            Err(_) => {}
-        }
-        let embedded = path
-            .to_str()
-            .and_then(|name| BUILT_IN.get_file(format!("{name}.toml")));
-        match embedded.and_then(|file| file.contents_utf8()) {
-            Some(text) => Self::from_text(path, text, library),
-            None => Ok(Self::of_system(library.system(path)?)),
+        let embedded = |name: &str| BUILT_IN.get_file(format!("{name}.toml"))?.contents_utf8();
+        match text_or_embedded(path, embedded) {
+            Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
+            // A model, or nothing that can be read: the library knows what to say of it.
+            _ => Ok(Self::of_system(library.system(path)?)),
         }
     }
 
@@ -141,13 +136,8 @@ impl Plant {
             message,
         };
         let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
-        let beside = path.parent().unwrap_or(Path::new("")).join(&file.model);
-        let model = if beside.is_file() {
-            &beside
-        } else {
-            &file.model
-        };
-        let mut plant = Self::of_system(library.system(model)?);
+        let model = beside_or_named(path, &file.model);
+        let mut plant = Self::of_system(library.system(&model)?);
         plant.set_parameters(&file.parameters).map_err(wrong)?;
         plant.hide(library, &file.effect)?;
         plant.sensor = file.sensor;
