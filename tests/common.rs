@@ -1,4 +1,4 @@
-//! What several tests share: the catalog of systems and effects, random points, comparisons.
+//! Shared by several tests: the catalog of systems and effects, random points, comparisons.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -42,7 +42,7 @@ pub fn dynamics(system: &System, effects: &[FittedEffect], sign: SignForm) -> Dy
     system.dynamics_with(effects, &vec![sign; system.joints])
 }
 
-/// Whether the effect has anything to act on there.
+/// Whether the effect can act on that joint.
 pub fn can_act(system: &System, effect: &Effect, joint: usize) -> bool {
     let inertia = matches!(effect.entry, Entry::Inertia(_));
     !(inertia && !system.has_mass_matrix() || effect.first_joint_only && joint > 0)
@@ -102,10 +102,10 @@ pub fn catalog(sign: SignForm) -> Vec<Case> {
     cases
 }
 
-/// Inputs of a program of motion: states, torques, time, parameters, all exact in f32.
+/// Inputs of a program of dynamics: states, torques, time, parameters, all exact in f32.
 ///
-/// Parameters vary by a quarter about their declared or typical values, so that masses stay masses and
-/// a whole number of cogs does not (the formula takes any number).
+/// Parameters vary by a quarter about their declared or typical values: masses stay positive, and the number of cogs
+/// need not be whole.
 pub fn point(dynamics: &Dynamics, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let n = dynamics.joints;
     let bounds = [vec![3.0; n], vec![4.0; n], vec![2.0; n]].concat();
@@ -151,12 +151,9 @@ pub fn in_f32(program: &Program, points: &[Vec<f64>]) -> Vec<Vec<f64>> {
     found
 }
 
-/// Both backends that every build has, gradients switched on.
+/// The devices that every build has, with gradients.
 pub fn devices() -> Vec<Device> {
-    use residyn::train::Backend;
-    [Backend::NdArray, Backend::NdArray]
-        .map(Backend::device)
-        .to_vec()
+    vec![residyn::train::Backend::NdArray.device()]
 }
 
 pub fn tensor(values: &[f64], device: &Device) -> Tensor<1> {
@@ -184,7 +181,7 @@ pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
     );
 }
 
-/// A log of these rows, to be filled.
+/// A log without rows.
 pub fn empty_log(name: &str, joints: usize) -> Log {
     Log {
         path: name.into(),

@@ -1,4 +1,4 @@
-//! The C header, compiled: what it predicts, its Jacobians, and that no compiler has anything to say about it.
+//! The compiled C header: its predictions, its Jacobians, and no warnings of any compiler.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -16,7 +16,7 @@ use tempfile::TempDir;
 use crate::common::rng;
 use crate::models;
 
-/// Every function of formulas, names that C has taken, and text that would end a comment.
+/// Every function of formulas, reserved names of C, and text that would end a comment.
 const ODD: &str = r#"
 [system]
 name = "Rig"
@@ -54,7 +54,7 @@ impl Header {
         self.folder.path().join("model.h")
     }
 
-    /// Arguments that every client is compiled with.
+    /// Arguments for the compilation of every client.
     fn arguments(&self) -> Vec<String> {
         let lower = self.model.name().to_lowercase();
         let upper = lower.to_uppercase();
@@ -67,7 +67,7 @@ impl Header {
         ]
     }
 
-    /// A client as a program, compiled with these flags.
+    /// A client compiled with these flags.
     fn program(&self, client: &str, flags: &[&str]) -> PathBuf {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let program = self.folder.path().join("client");
@@ -85,7 +85,7 @@ impl Header {
         program
     }
 
-    /// The rows of numbers that a client prints which is compiled with these flags.
+    /// The rows of numbers that a client prints, compiled with these flags.
     fn ask(&self, client: &str, flags: &[&str], question: &str) -> Vec<Vec<f64>> {
         rows(
             Command::new(self.program(client, flags)),
@@ -124,7 +124,7 @@ pub fn succeeds(command: &mut Command, what: &str) {
     assert!(run.status.success(), "{what}: {command:?}\n{said}");
 }
 
-/// Whether these tools start; where one does not, say so where nobody misses it.
+/// Whether these tools start; if one does not, print a prominent note.
 pub fn there_are(tools: &[&str]) -> bool {
     let starts = |tool: &&str| Command::new(tool).arg("--version").output().is_ok();
     let missing: Vec<&str> = tools.iter().copied().filter(|tool| !starts(tool)).collect();
@@ -173,7 +173,7 @@ fn question(samples: &Samples) -> String {
 
 const CLIENT: &str = "docs/clients/c.c";
 
-/// What the client answers under these flags.
+/// The predictions of the client under these flags.
 fn predictions(header: &Header, flags: &[&str], samples: &Samples) -> Predictions {
     let rows = header.ask(CLIENT, flags, &question(samples));
     let (points, rollout) = rows.split_at(samples.states.len());
@@ -310,7 +310,7 @@ fn jacobians_are_the_slopes() {
     }
 }
 
-/// Steps of any length, so that a delay spans now few of them and now many.
+/// Steps of varying length, so that a delay spans few or many of them.
 #[test]
 fn torques_act_as_the_filters_say_whatever_the_steps() {
     let filtered = |header: &Header| !header.model.equations.filters.is_empty();

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use crate::common::rng;
 
-/// Friction, and a command that is delayed by no whole number of steps and then smoothed.
+/// Friction, and a command that is delayed by a fraction of a step and then lagged.
 const PENDULUM_EFFECTS: &str = r#"
 [[effect]]
 name = "coulomb_friction"
@@ -153,7 +153,7 @@ fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {
     }
 }
 
-/// A random network whose features are scaled and whose outputs are small beside the motion's own.
+/// A random network with scaled features and outputs that are small relative to the derivative.
 fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> MlpWeights {
     let features = settings.angles.features(joints);
     let scaling = InputScaling {

@@ -1,4 +1,4 @@
-//! Mechanisms exported for simulators of rigid bodies, as MuJoCo moves them and as they are read back here.
+//! Mechanisms exported for simulators of rigid bodies: simulated by MuJoCo, and read back.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::mechanism::{fixture, read};
 use crate::models;
 use crate::support::{refuses, residyn, text};
 
-/// An effect as a model file has it.
+/// An effect as in a model file.
 fn effect(name: &str, joint: usize, values: &str) -> String {
     format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
 }
@@ -31,7 +31,7 @@ fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     ExportModel::of_system(&system, integrator, 0.01, json!({}))
 }
 
-/// What both formats carry.
+/// Models that both formats carry.
 fn plain() -> Vec<(&'static str, ExportModel)> {
     let fine = Integrator::fine(4.try_into().unwrap());
     let friction = |joint| {
@@ -75,7 +75,7 @@ fn plain() -> Vec<(&'static str, ExportModel)> {
     ]
 }
 
-/// Equations alone: what they are those of has to be found.
+/// Equations alone, whose mechanism has to be recovered.
 fn stated() -> Vec<(&'static str, ExportModel)> {
     let stated = |slides: &str, mass: &[&[&str]], bias: &[&str]| {
         let text = format!(
@@ -112,7 +112,7 @@ fn stated() -> Vec<(&'static str, ExportModel)> {
     ]
 }
 
-/// What MJCF carries beside that, by steps.
+/// Models that MJCF alone carries, compared step by step.
 fn driven() -> Vec<(&'static str, ExportModel)> {
     let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
     let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");

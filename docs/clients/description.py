@@ -68,7 +68,7 @@ def advance(state, torque, time, h):
 
 
 def rest(rows):
-    """No torque so far: for each filtered joint earlier torques, the newest first, and the lagged one."""
+    """At rest: for each filtered joint earlier torques, newest first, and the lagged torque."""
     return [[np.zeros((f["past"], rows)), np.zeros(rows)] for f in equations["held"]]
 
 
