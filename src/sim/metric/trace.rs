@@ -1,7 +1,8 @@
 use crate::data::{Log, half_width_s};
-use crate::identify::{Window, initial_state};
 use crate::model::Dynamics;
-use crate::sim::{Commands, PREDICTION_S, Point, RK4, Simulator, with_own_angles};
+use crate::sim::{
+    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
+};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]

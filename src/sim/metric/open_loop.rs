@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use super::assessment::{Assessment, OpenLoop, WindowError};
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
-use crate::identify::{Window, initial_state};
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{Commands, PREDICTION_S, Point, RK4, Simulator, with_own_angles};
+use crate::sim::{
+    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
+};
 
 /// Windows side by side in one rollout.
 const LANES: usize = 8;

@@ -1,9 +1,10 @@
 use thiserror::Error;
 
+use super::{FitError, Shooting, fit};
 use crate::data::{Interval, Log};
 use crate::expr::Graph;
-use crate::identify::{FitError, Shooting, cut, fit};
 use crate::model::{Dynamics, Parameter};
+use crate::sim::cut;
 
 /// A model whose angles are read through sensors with a zero of their own in each log.
 #[derive(Debug, Clone)]
