@@ -1,5 +1,5 @@
-//! Open-loop prediction error: how far a model runs from a log that it only sees the start and the
-//! torque of.
+//! Open-loop prediction error: how far a model that is given only the start state and the torques of a log departs from
+//! it.
 
 mod assessment;
 mod open_loop;
