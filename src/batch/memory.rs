@@ -111,13 +111,11 @@ impl WithSimd for Act<'_> {
             let weights = &self.weights[k % n];
             for part in 0..Rows::parts::<S>() {
                 let commands = self.commanded[..=k].iter().rev().step_by(n);
-                let sum = commands.zip(weights).fold(
-                    Vector::splat(simd, carried),
-                    |sum, (command, weight)| {
-                        let weight = Vector::splat(simd, *weight);
-                        command.get(simd, part).mul_add(weight, sum)
-                    },
-                );
+                let mut sum = Vector::splat(simd, carried);
+                for (command, weight) in commands.zip(weights) {
+                    let weight = Vector::splat(simd, *weight);
+                    sum = command.get(simd, part).mul_add(weight, sum);
+                }
                 acting.set(part, sum);
             }
         }

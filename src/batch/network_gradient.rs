@@ -175,11 +175,11 @@ impl Layer {
             let slopes = slopes.registers::<S, O>(block, output);
             let inputs = inputs.registers::<S, I>(block, input);
             for k in 0..W / f32::lanes::<S>() {
-                let inputs = inputs.map(|input| Vector::new(simd, input[k]));
                 for o in 0..O {
                     let slope = Vector::new(simd, slopes[o][k]);
                     for i in 0..I {
-                        sums[o][i] = slope.mul_add(inputs[i], sums[o][i]);
+                        let input = Vector::new(simd, inputs[i][k]);
+                        sums[o][i] = slope.mul_add(input, sums[o][i]);
                     }
                 }
             }

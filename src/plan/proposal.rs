@@ -159,8 +159,9 @@ impl WithSimd for Place<'_> {
             .zip(self.deviation)
             .zip(self.bounds.iter().cycle());
         for (row, ((mean, deviation), bounds)) in self.inputs.iter_mut().zip(spread) {
-            let [mean, deviation, low, high] =
-                [*mean, *deviation, bounds[0], bounds[1]].map(|x| Vector::splat(simd, x));
+            let (mean, deviation) = (Vector::splat(simd, *mean), Vector::splat(simd, *deviation));
+            let [low, high] = *bounds;
+            let (low, high) = (Vector::splat(simd, low), Vector::splat(simd, high));
             for number in f32::registers_mut::<S>(&mut **row) {
                 let placed = Vector::new(simd, *number).mul_add(deviation, mean);
                 *number = placed.max(low).min(high).register;
