@@ -57,5 +57,4 @@ pub mod plan;
 pub mod plant;
 pub mod recipe;
 pub mod report;
-pub mod rounds;
 pub mod train;

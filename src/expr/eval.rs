@@ -6,15 +6,6 @@ use super::places::Places;
 use super::steps::{Kind, Step};
 use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
 
-/// The number types that programs run on: f64 to fit, f32 to train and plan.
-pub trait Real:
-    num_traits::Float + num_traits::FromPrimitive + Default + Send + Sync + 'static
-{
-}
-
-impl Real for f32 {}
-impl Real for f64 {}
-
 /// The working memory of one program, `W` independent evaluations side by side, in whole registers of the
 /// processor at hand where `W` is a multiple of theirs and one after the other elsewhere.
 #[derive(Debug, Clone)]

@@ -2,9 +2,11 @@
 //! chosen when the program runs. What is written once here, for f32 and f64, serves every engine.
 
 mod math;
+mod pool;
 mod row;
 mod vector;
 
+pub use pool::WorkerPool;
 pub use row::Row;
 pub use vector::{Element, Vector};
 

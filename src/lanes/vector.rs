@@ -3,10 +3,11 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use pulp::Simd;
 
 use super::math::Constants;
-use crate::expr::Real;
 
-/// A number type of which a processor holds several in one register.
-pub trait Element: Real + Constants {
+/// A number type of which a processor holds several in one register: f64 to fit, f32 to train and plan.
+pub trait Element:
+    num_traits::Float + num_traits::FromPrimitive + Default + Send + Sync + Constants
+{
     /// One register.
     type Register<S: Simd>: Copy;
     /// Which lanes a comparison holds in.

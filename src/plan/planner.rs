@@ -7,8 +7,7 @@ use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
 use crate::batch::{Rows, W};
-use crate::lanes::Arch;
-use crate::rounds::Rounds;
+use crate::lanes::{Arch, WorkerPool};
 
 /// Who knows what sequences of inputs bring. One of them serves one block of candidates.
 pub trait Evaluate: Send {
@@ -38,7 +37,7 @@ pub struct Planner<E: Evaluate> {
     start: RwLock<Option<E::Prepared>>,
     proposal: RwLock<Proposal>,
     blocks: Vec<Mutex<Candidates<E>>>,
-    rounds: Rounds,
+    pool: WorkerPool,
 }
 
 /// One block of candidates.
@@ -106,14 +105,14 @@ impl<E: Evaluate> Planner<E> {
             blocks: (0..population.div_ceil(W))
                 .map(|index| Mutex::new(block(index)))
                 .collect(),
-            rounds: Rounds::new(),
+            pool: WorkerPool::new(),
         }
     }
 
     /// Call `lead`, while all cores stay ready for the searches in it. Outside of it a search runs on one core.
-    pub fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
-        self.rounds
-            .helped(&|index| self.draw_and_evaluate(index), lead)
+    pub fn with_workers<R>(&self, body: impl FnOnce() -> R) -> R {
+        self.pool
+            .with_workers(&|index| self.draw_and_evaluate(index), body)
     }
 
     /// Begin again in the middle of the bounds.
@@ -141,8 +140,7 @@ impl<E: Evaluate> Planner<E> {
         let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);
         for _ in 0..iterations {
             let tasks = self.blocks.len();
-            self.rounds
-                .run(tasks, &|index| self.draw_and_evaluate(index));
+            self.pool.run(tasks, &|index| self.draw_and_evaluate(index));
             let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
             let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
             let population = Population::new(evaluated, population);
