@@ -14,10 +14,11 @@ use residyn::closeloop::{Request, Split, close_loop};
 use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn::model::{
-    Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+    Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
 };
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
+use residyn::sim::Integrator;
 use residyn::train::{Backend, FitSettings, Segments, Training};
 
 const STEP_S: f64 = 0.02;
@@ -242,14 +243,7 @@ fn identify(c: &mut Criterion) {
     let mut group = c.benchmark_group("identify");
     group.sample_size(10).bench_function("demo", |b| {
         b.iter(|| {
-            let request = Request {
-                system: &system,
-                library: &library,
-                split: split.clone(),
-                against: Vec::new(),
-                horizons_s: [0.1, 0.5, 1.0],
-                backend: None,
-            };
+            let request = Request::new(&system, &library, split.clone());
             black_box(close_loop(request, &mut rng.clone(), &mut |_| {}).expect("a model"));
         });
     });

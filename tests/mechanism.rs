@@ -1,11 +1,12 @@
-//! Model files made of robot descriptions.
+//! Model files derived from robot descriptions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use rand::RngExt;
 use residyn::expr::SignForm;
-use residyn::mechanism::{Chain, model_text, read_mjcf, read_urdf};
+use residyn::formats::{FORMATS, Format};
+use residyn::model::chain::{Chain, model_text};
 use residyn::model::{Dynamics, FittedEffect, Library, System};
 use serde_json::json;
 
@@ -27,13 +28,19 @@ pub fn fixture(name: &str) -> PathBuf {
     root.join("tests/fixtures/mechanisms").join(name)
 }
 
+/// The format of a robot description, by the file's extension.
+fn format(file: &Path) -> &'static Format {
+    let extension = file.extension().unwrap();
+    let mut formats = FORMATS.iter().filter(|format| format.robots.is_some());
+    formats.find(|f| extension == f.extension).unwrap()
+}
+
+pub fn read(file: &Path) -> Chain {
+    (format(file).robots.as_ref().unwrap().read)(file).unwrap()
+}
+
 fn chain(name: &str) -> Chain {
-    let file = fixture(name);
-    if name.ends_with("urdf") {
-        read_urdf(&file).unwrap()
-    } else {
-        read_mjcf(&file).unwrap()
-    }
+    read(&fixture(name))
 }
 
 fn system(chain: &Chain) -> System {
@@ -46,7 +53,7 @@ fn system(chain: &Chain) -> System {
     .unwrap()
 }
 
-/// The model with the effects that are forces of a state: MuJoCo's dry friction and limits are constraints.
+/// The model with effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
 fn comparable(system: &System) -> Dynamics {
     let others = ["coulomb_friction", "actuator_saturation"];
     let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
@@ -77,7 +84,7 @@ fn mujoco_finds_the_same_torques() {
     }
 }
 
-/// Coordinates, speeds, torques, time, and the parameters as they are.
+/// Positions, velocities, torques, time, and the parameters at their values.
 fn states(model: &Dynamics, count: usize) -> Vec<Vec<f64>> {
     let moving = 3 * model.joints + 1;
     let with_values = |point: Vec<f64>| [&point[..moving], &model.values()].concat();
@@ -104,7 +111,7 @@ fn energy_changes_by_the_power() {
     }
 }
 
-/// The mass matrix at a point: its inverse by what single torques change.
+/// The mass matrix at a point, the inverse of the accelerations by unit torques.
 fn inverse_mass(model: &Dynamics, point: &[f64]) -> nalgebra::DMatrix<f64> {
     let n = model.joints;
     let accelerations = |torque: Option<usize>| {
@@ -134,7 +141,7 @@ fn the_mass_matrix_is_symmetric_and_positive() {
     }
 }
 
-/// A change of one parameter cannot be undone by the others: the torques' derivatives by them are independent.
+/// No change of one parameter can be compensated by the others: the derivatives of the torques are independent.
 #[test]
 fn all_parameters_can_be_told_apart() {
     for name in FILES {
@@ -240,20 +247,16 @@ fn the_command_writes_what_other_commands_take() {
     succeeds(&["evaluate", "--model", text(&out), "--test", text(&log)]);
 }
 
-/// What the command says of a fixture in which one place is changed.
+/// The message of the command for a fixture with one change.
 fn message(name: &str, from: &str, to: &str) -> String {
     let contents = fs::read_to_string(fixture(name)).unwrap();
     assert!(contents.contains(from), "{name} has no {from}");
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join(name);
     fs::write(&file, contents.replacen(from, to, 1)).unwrap();
-    let source = if name.ends_with("urdf") {
-        "--from-urdf"
-    } else {
-        "--from-mjcf"
-    };
+    let source = format!("--from-{}", format(&file).name);
     let out = folder.path().join("model.toml");
-    let message = refuses(&["new", source, text(&file), "--out", text(&out)]);
+    let message = refuses(&["new", &source, text(&file), "--out", text(&out)]);
     assert!(!out.exists(), "a file was left behind");
     message
 }
@@ -336,9 +339,9 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
             "planar_2r.urdf",
             "damping=\"0.02\"",
             "damping=\"-1\"",
-            &["line 25, column 24", "from zero on"],
+            &["line 25, column 24", "give zero or a positive number"],
         ),
-        ("planar_2r.urdf", "</robot>", "", &["no XML"]),
+        ("planar_2r.urdf", "</robot>", "", &["not valid XML"]),
         (
             "spatial_3r.urdf",
             "type=\"fixed\"",
@@ -419,10 +422,10 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
 }
 
 #[test]
-fn the_other_format_is_met_with_its_option() {
+fn the_other_format_is_named() {
     let file = fixture("rp.xml");
     let said = refuses(&["new", "--from-urdf", text(&file)]);
-    assert!(said.contains("read it with --from-mjcf"), "{said}");
+    assert!(said.contains("this is MJCF, read it as mjcf"), "{said}");
     let said = refuses(&["new", "--from-urdf", "nowhere.urdf"]);
     assert!(said.contains("nowhere.urdf: cannot be read"), "{said}");
     let said = refuses(&["new"]);
@@ -441,7 +444,7 @@ fn angles_that_were_rounded_are_taken_as_written_and_noted() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("exact.urdf");
     fs::write(&file, contents.replacen("1.5708", "1.5707963268", 1)).unwrap();
-    let text = model_text(&read_urdf(&file).unwrap());
+    let text = model_text(&read(&file));
     let short = "M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\"";
     assert!(text.contains(short), "{text}");
 }

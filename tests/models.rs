@@ -3,16 +3,17 @@
 use std::path::Path;
 
 use rand_chacha::ChaCha8Rng;
-use residyn::export::Portable;
+use residyn::formats::ExportModel;
 use residyn::model::{
-    Angles, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights,
-    ResidualOn, System,
+    Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights, ResidualOn,
+    System,
 };
+use residyn::sim::Integrator;
 use serde_json::json;
 
 use crate::common::rng;
 
-/// Friction, and a command that is delayed by no whole number of steps and then smoothed.
+/// Friction, and a command that is delayed by a fraction of a step and then lagged.
 const PENDULUM_EFFECTS: &str = r#"
 [[effect]]
 name = "coulomb_friction"
@@ -56,11 +57,9 @@ m = 4.0
 "#;
 
 /// All of them, by name.
-pub fn all() -> Vec<(&'static str, Portable)> {
-    let fine = Integrator::Fine {
-        steps: 4.try_into().unwrap(),
-    };
-    let (euler, rk4) = (Integrator::SemiImplicitEuler, Integrator::Rk4);
+pub fn all() -> Vec<(&'static str, ExportModel)> {
+    let fine = Integrator::fine(4.try_into().unwrap());
+    let (euler, rk4) = (Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4);
     let pendulum = || system("pendulum", "");
     let friction = || system("pendulum", PENDULUM_EFFECTS);
     let acrobot = || system("acrobot", "");
@@ -113,11 +112,16 @@ pub fn system(name: &str, effects: &str) -> System {
     .unwrap()
 }
 
-fn physics(system: &System, integrator: Integrator, step_s: f64) -> Portable {
-    Portable::stated(system, integrator, step_s, origin(system))
+fn physics(system: &System, integrator: Integrator, step_s: f64) -> ExportModel {
+    ExportModel::of_system(system, integrator, step_s, origin(system))
 }
 
-fn hybrid(system: &System, residual: &MlpWeights, integrator: Integrator, step_s: f64) -> Portable {
+fn hybrid(
+    system: &System,
+    residual: &MlpWeights,
+    integrator: Integrator,
+    step_s: f64,
+) -> ExportModel {
     let mut model = physics(system, integrator, step_s);
     model.residual = Some(residual.clone());
     model
@@ -128,13 +132,13 @@ fn data_driven(
     prior: &MlpWeights,
     integrator: Integrator,
     step_s: f64,
-) -> Portable {
+) -> ExportModel {
     let numbers = ModelWeights {
         parameters: Vec::new(),
         prior: Some(prior.clone()),
         residual: None,
     };
-    Portable::new(system, numbers, integrator, step_s, origin(system))
+    ExportModel::new(system, numbers, integrator, step_s, origin(system))
 }
 
 fn origin(system: &System) -> serde_json::Value {
@@ -149,7 +153,7 @@ fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {
     }
 }
 
-/// A random network whose features are scaled and whose outputs are small beside the motion's own.
+/// A random network with scaled features and outputs that are small relative to the derivative.
 fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> MlpWeights {
     let features = settings.angles.features(joints);
     let scaling = InputScaling {
@@ -167,17 +171,17 @@ fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> Ml
 #[test]
 fn the_models_are_of_every_kind() {
     let models = all();
-    let some = |kind: fn(&Portable) -> bool| models.iter().any(|(_, model)| kind(model));
-    assert!(some(
-        |m| m.networks().next().is_none() && m.effects.is_empty()
-    ));
+    let some = |kind: fn(&ExportModel) -> bool| models.iter().any(|(_, model)| kind(model));
+    assert!(some(|m| m.prior.is_none()
+        && m.residual.is_none()
+        && m.effects.is_empty()));
     assert!(some(
         |m| !m.equations.filters.is_empty() && m.residual.is_some()
     ));
     assert!(some(|m| m.prior.is_some()));
     for (name, model) in &models {
         let samples = model.samples(&mut rng(1)).unwrap();
-        let answers = model.answers(&samples).unwrap();
+        let answers = model.predict(&samples).unwrap();
         let numbers = answers.rollout.unwrap().concat();
         assert!(numbers.iter().all(|x| x.abs() < 100.0), "{name} runs away");
     }

@@ -9,11 +9,12 @@ use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
 use super::{Answer, Common};
-use crate::export::{Difference, File, Format, Portable, Unread, find};
-use crate::model::{Integrator, Library};
+use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
+use crate::model::Library;
+use crate::sim::Integrator;
 use crate::train::Manifest;
 
-/// Write a model for other programs, and measure how far what they predict is from here
+/// Write a model for other programs, and compare their predictions with its own
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     residyn export --checkpoint closeloop-report/checkpoint --format onnx --out pendulum.onnx\n  \
@@ -21,16 +22,16 @@ use crate::train::Manifest;
 pub(super) struct Arguments {
     #[command(flatten)]
     model: inputs::Model,
-    /// What to write; `residyn list formats` shows all
+    /// Format; `residyn list formats` shows all
     #[arg(long, value_parser = find)]
     format: &'static Format,
-    /// Where to write it
+    /// Output path
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
-    /// How long a torque is held, in s; a checkpoint's own without it, else 0.01
+    /// How long a torque is held, in s; by default the checkpoint's own, else 0.01
     #[arg(long, value_name = "S")]
     step: Option<f64>,
-    /// How a step is integrated: semi_implicit_euler, rk4 or fine:N; a checkpoint's own without it, else rk4
+    /// Integrator: semi_implicit_euler, rk4 or fine:N; by default the checkpoint's own, else rk4
     #[arg(long)]
     integrator: Option<Integrator>,
     #[command(flatten)]
@@ -39,23 +40,23 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-/// The step where neither the user nor a recipe says one, in s.
+/// The default step, in s.
 const STEP_S: f64 = 0.01;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let format = arguments.format;
     let model = portable(arguments)?;
-    let limits = (format.limits)(&model);
-    for limit in &limits {
-        eprintln!("not carried: {limit}");
+    let not_carried = (format.not_carried)(&model);
+    for what in &not_carried {
+        eprintln!("not carried: {what}");
     }
     let files = format.write(&model, &arguments.out)?;
     let measured = measure(format, &model, arguments);
     inputs::print(&match arguments.common.json {
-        true => format!("{:#}\n", printed(format, &files, &limits, &measured)),
+        true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
         false => text(format, &files, &measured),
     })?;
-    if let Err(Unread::Refused(said)) = &measured {
+    if let Err(ClientError::Failed(said)) = &measured {
         bail!("what was written cannot be read: {said}");
     }
     let same = |d: &Difference| d.pointwise() <= format.tolerance;
@@ -65,15 +66,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     })
 }
 
-fn measure(format: &Format, model: &Portable, arguments: &Arguments) -> Result<Difference, Unread> {
+fn measure(
+    format: &Format,
+    model: &ExportModel,
+    arguments: &Arguments,
+) -> Result<Difference, ClientError> {
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let refused = |error: crate::model::HybridError| Unread::Refused(error.to_string());
+    let refused = |error: crate::model::HybridError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
-    let own = model.answers(&samples).map_err(refused)?;
-    Ok(own.difference(&format.ask(&arguments.out, &samples)?))
+    let own = model.predict(&samples).map_err(refused)?;
+    Ok(own.difference(&format.predict(&arguments.out, &samples)?))
 }
 
-fn portable(arguments: &Arguments) -> Result<Portable> {
+fn portable(arguments: &Arguments) -> Result<ExportModel> {
     if let Some(step) = arguments.step.filter(|s| !(*s > 0.0 && s.is_finite())) {
         bail!("--step {step}: a step is a number of seconds above zero");
     }
@@ -84,7 +89,7 @@ fn portable(arguments: &Arguments) -> Result<Portable> {
     }
 }
 
-fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<Portable> {
+fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<ExportModel> {
     let device = arguments.common.device;
     let (checkpoint, system, _) = inputs::checkpoint(dir, library, device)?;
     let Manifest {
@@ -93,7 +98,7 @@ fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result
         settings,
         ..
     } = &checkpoint.manifest;
-    Ok(Portable::new(
+    Ok(ExportModel::new(
         &system,
         checkpoint.weights.clone(),
         arguments.integrator.unwrap_or(settings.integrator),
@@ -102,18 +107,18 @@ fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result
     ))
 }
 
-/// The step of what a checkpoint was trained on.
+/// The step (s) of the data that a checkpoint was trained on.
 fn step_of(config: &Value) -> Option<f64> {
     let places = ["/recipe/data/step_s", "/step_s"];
     let mut steps = places.iter().map(|place| config.pointer(place));
     steps.find_map(|step| step?.as_f64())
 }
 
-fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Portable> {
+fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<ExportModel> {
     let system = library.system(file)?;
-    Ok(Portable::stated(
+    Ok(ExportModel::of_system(
         &system,
-        arguments.integrator.unwrap_or(Integrator::Rk4),
+        arguments.integrator.unwrap_or(Integrator::RK4),
         arguments.step.unwrap_or(STEP_S),
         json!({"config": {"model": file}, "seed": arguments.common.seed}),
     ))
@@ -122,8 +127,8 @@ fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Port
 fn printed(
     format: &Format,
     files: &[File],
-    limits: &[String],
-    measured: &Result<Difference, Unread>,
+    not_carried: &[String],
+    measured: &Result<Difference, ClientError>,
 ) -> Value {
     let file =
         |file: &File| json!({"path": file.path, "bytes": file.bytes.len(), "about": file.about});
@@ -134,13 +139,13 @@ fn printed(
     json!({
         "format": format.name,
         "files": files.iter().map(file).collect::<Vec<_>>(),
-        "not_carried": limits,
+        "not_carried": not_carried,
         "difference": difference,
         "not_measured": measured.as_ref().err().map(ToString::to_string),
     })
 }
 
-fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) -> String {
+fn text(format: &Format, files: &[File], measured: &Result<Difference, ClientError>) -> String {
     let mut out = String::new();
     for File { path, bytes, about } in files {
         let _ = writeln!(out, "{}: {about}, {}", path.display(), size(bytes.len()));
@@ -158,13 +163,13 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) 
                 .collect();
             let _ = writeln!(
                 out,
-                "largest difference to the prediction here, as a share of each state's largest value: {}",
+                "largest difference from the program's own prediction, relative to each state's largest value: {}",
                 parts.join(", ")
             );
             if difference.pointwise() > format.tolerance {
                 let _ = writeln!(
                     out,
-                    "this is more than the {:.0e} it should be",
+                    "this exceeds the tolerance of {:.0e}",
                     format.tolerance
                 );
             }
@@ -172,14 +177,14 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) 
         Err(reason) => {
             let _ = writeln!(
                 out,
-                "difference to the prediction here not measured: {reason}"
+                "difference from the program's own prediction not measured: {reason}"
             );
         }
     }
     out
 }
 
-/// Two digits are enough to compare.
+/// To two digits.
 fn share(difference: f64) -> String {
     if difference == 0.0 {
         return "0".to_owned();

@@ -5,13 +5,13 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
-use crate::export::Imported;
+use crate::formats::Imported;
 
-/// Make a checkpoint of a model that was exported as JSON and safetensors
+/// Make a checkpoint from a model that was exported as JSON and safetensors
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn import --file pendulum.json --out pendulum")]
 pub(super) struct Arguments {
-    /// The JSON file; the weights that it names lie beside it
+    /// The JSON file; the weights that it names are beside it
     #[arg(long, value_name = "JSON")]
     file: PathBuf,
     /// Folder of the checkpoint
@@ -29,7 +29,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let imported = Imported::read(&arguments.file, library.effects())?;
     let (system, by) = (
         imported.system.name.clone(),
-        imported.description.residyn.clone(),
+        imported.written_by().to_owned(),
     );
     imported.save(&arguments.out, seed, device)?;
     let out = arguments.out.display();

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::command::Filter;
+use super::filter::Filter;
 use crate::expr::Program;
 
 /// A physical parameter of a model or an effect.
@@ -23,6 +23,18 @@ pub struct Parameter {
     pub scale: f64,
 }
 
+impl Parameter {
+    /// The same parameter, declared with another value.
+    #[must_use]
+    pub fn with_value(&self, value: f64) -> Self {
+        Self {
+            value,
+            scale: if value == 0.0 { 1.0 } else { value.abs() },
+            ..self.clone()
+        }
+    }
+}
+
 /// A model ready to run: first-order differential equations as one program, and its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
@@ -36,7 +48,7 @@ pub struct Dynamics {
     pub joints: usize,
     pub parameters: Vec<Parameter>,
     pub program: Program,
-    /// What the commanded torques go through first, see [`Commands`](super::Commands).
+    /// What the commanded torques go through first, see [`Commands`](crate::sim::Commands).
     pub filters: Vec<Filter>,
     /// What the sensors show for the angles, from the same inputs, where that is not the rig's own: n outputs. The
     /// torques are those that acted until then.

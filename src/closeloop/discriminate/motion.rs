@@ -1,0 +1,183 @@
+use std::f64::consts::TAU;
+
+use crate::data::Log;
+use crate::identify::{Values, Window};
+use crate::model::Dynamics;
+use crate::sim::{Commands, FIT_S, Point, RK4, Simulator};
+
+/// A motion of a rig before it is simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Motion {
+    /// Number of the study's log that it begins in.
+    pub log: usize,
+    /// Angles, then velocities.
+    pub start: Vec<f64>,
+    /// Time of each row in s.
+    pub time: Vec<f64>,
+    /// `[row][joint]`, each held until the next row.
+    pub tau: Vec<Vec<f64>>,
+}
+
+/// Between motions of one log the rig stands for so long (s) under the torque that the next begins with: longer than
+/// any memory of its drive.
+const PAUSE_S: f64 = 2.0;
+
+/// Simulated logs, each of motions one after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Record {
+    pub logs: Vec<Log>,
+    /// For each of them the log of the study that its motions begin in: what differs by log is as it was there.
+    pub origins: Vec<usize>,
+    /// The rows of each motion.
+    pub motions: Vec<Window>,
+    /// The motions in consecutive parts.
+    pub windows: Vec<Window>,
+}
+
+impl Record {
+    /// Motions as a model has them, cut into windows of `length_s`. `values` gives its parameters in each log of the
+    /// study. `None` where it diverges.
+    pub fn of(
+        motions: &[Motion],
+        dynamics: &Dynamics,
+        values: &Values,
+        length_s: f64,
+    ) -> Option<Self> {
+        let mut record = Self {
+            logs: Vec::new(),
+            origins: Vec::new(),
+            motions: Vec::new(),
+            windows: Vec::new(),
+        };
+        for motion in motions {
+            let index = record.log_of(motion.log, dynamics.joints);
+            let first = append(&mut record.logs[index], motion);
+            let model = Point::new(dynamics, values.of_log(motion.log));
+            simulate(&mut record.logs[index], first, &motion.start, &model)?;
+            let log = &record.logs[index];
+            record.motions.push(Window {
+                log: index,
+                first,
+                last: log.rows() - 1,
+            });
+            record.windows.extend(windows(log, index, first, length_s));
+        }
+        Some(record)
+    }
+
+    /// Number of the record's log for motions that begin in a log of the study.
+    fn log_of(&mut self, origin: usize, joints: usize) -> usize {
+        if let Some(known) = self.origins.iter().position(|known| *known == origin) {
+            return known;
+        }
+        self.origins.push(origin);
+        self.logs.push(Log::empty(joints));
+        self.logs.len() - 1
+    }
+
+    /// This record and then another one, its logs apart.
+    pub fn and(&self, other: &Self) -> Self {
+        let joined = |own: &[Window], others: &[Window]| {
+            let moved = others.iter().map(|window| Window {
+                log: window.log + self.logs.len(),
+                ..*window
+            });
+            own.iter().copied().chain(moved).collect()
+        };
+        Self {
+            motions: joined(&self.motions, &other.motions),
+            windows: joined(&self.windows, &other.windows),
+            logs: [self.logs.as_slice(), &other.logs].concat(),
+            origins: [self.origins.as_slice(), &other.origins].concat(),
+        }
+    }
+
+    /// The true states at the starts of windows.
+    pub fn starts(&self, windows: std::ops::RangeFrom<usize>) -> Vec<Vec<f64>> {
+        let start = |window: &Window| {
+            let log = &self.logs[window.log];
+            let columns = log.q.iter().chain(&log.qd);
+            columns.map(|column| column[window.first]).collect()
+        };
+        self.windows[windows].iter().map(start).collect()
+    }
+
+    /// Length in s of the windows from a number on.
+    pub fn duration_s(&self, windows: std::ops::RangeFrom<usize>) -> f64 {
+        let windows = self.windows[windows].iter();
+        windows.map(|w| w.duration_s(&self.logs)).sum()
+    }
+}
+
+/// Add the torques of a motion to a log, after a pause; the row at which it begins.
+fn append(log: &mut Log, motion: &Motion) -> usize {
+    let earliest = log
+        .time
+        .last()
+        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * PAUSE_S);
+    let delay = (earliest - motion.time[0]).max(0.0);
+    let pause = (motion.time[0] - PAUSE_S, &motion.tau[0]);
+    let rows = motion.time.iter().copied().zip(&motion.tau);
+    for (time, tau) in std::iter::once(pause).chain(rows) {
+        log.time.push(time + delay);
+        for (column, tau) in log.tau.iter_mut().zip(tau) {
+            column.push(*tau);
+        }
+    }
+    log.time.len() - motion.time.len()
+}
+
+/// Fill in the states of a model from row `first` to the end of a log; `None` where it diverges.
+fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Point<'_>) -> Option<()> {
+    let commanded = log.clone();
+    let commands = [&Commands::of_log(model, &commanded)];
+    let mut simulator = Simulator::new(model, RK4);
+    simulator.put(start);
+    // The row of the pause, which nothing reads, is as the motion begins.
+    let columns = log.q.iter_mut().chain(&mut log.qd);
+    columns
+        .zip(start)
+        .for_each(|(column, value)| column.resize(first, *value));
+    for row in first..log.rows() {
+        if row > first {
+            simulator.follow(commands, [row - 1], FIT_S);
+        }
+        if simulator.state.iter().any(|value| !value[0].is_finite()) {
+            return None;
+        }
+        let shown = simulator.shown(commands, [row]).concat();
+        let columns = log.q.iter_mut().chain(&mut log.qd);
+        columns
+            .zip(shown)
+            .for_each(|(column, value)| column.push(value[0]));
+    }
+    Some(())
+}
+
+/// Whether a joint goes round.
+pub(super) fn is_turn(q: &[f64]) -> bool {
+    let low = q.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    high - low > TAU
+}
+
+/// Consecutive windows of `length_s` from a row on.
+fn windows(log: &Log, index: usize, first: usize, length_s: f64) -> Vec<Window> {
+    let step_s = log.median_step();
+    let mut windows = Vec::new();
+    let mut first = first;
+    while first + 1 < log.rows() {
+        let end = log.time[first] + length_s;
+        let last = log.time.partition_point(|t| *t <= end + 0.5 * step_s) - 1;
+        if last == first || log.time[last] < end - 0.5 * step_s {
+            break;
+        }
+        windows.push(Window {
+            log: index,
+            first,
+            last,
+        });
+        first = last;
+    }
+    windows
+}

@@ -1,0 +1,316 @@
+//! Delays and lags between commanded and acting torque: linear filters of the command, independent of the state.
+
+use super::{Hold, Point};
+use crate::data::Log;
+use crate::lanes::Row;
+use crate::model::{CommandFilter, Filter};
+
+/// A history of commanded torques, filtered by the delays and lags of a model.
+///
+/// Each command is held until the next row; the first one held for ever before, the last one holds for ever after. The
+/// filters are linear, so the order of a delay and a lag on one joint does not matter.
+#[derive(Debug, Clone)]
+pub struct Commands<'l> {
+    time: &'l [f64],
+    tau: &'l [Vec<f64>],
+    joints: usize,
+    /// The model's filters, in the order of [`StepTorque::slopes`].
+    filters: Vec<Filter>,
+    /// Per joint the filtered history, if the joint has a filter.
+    histories: Vec<Option<History<'l>>>,
+}
+
+/// The acting torque over one substep.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Mean {
+    /// In N m (or N).
+    value: f64,
+    /// Derivatives of the value with respect to the delay and the time constant, per s.
+    by_delay: f64,
+    by_lag: f64,
+}
+
+impl<'l> Commands<'l> {
+    /// Filter the torques `tau` (`[joint][row]`), each held from `time[row]` (s) on.
+    pub fn new<'p>(model: impl Into<Point<'p>>, time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
+        let model = model.into();
+        let (dynamics, values) = (model.dynamics, model.values());
+        let history = |joint: usize| {
+            let own = |kind: CommandFilter| {
+                let mut filters = dynamics.filters.iter();
+                filters.find(|filter| filter.joint == joint && filter.kind == kind)
+            };
+            let (delay, lag) = (own(CommandFilter::Delay), own(CommandFilter::Lag));
+            let value = |filter: Option<&Filter>| filter.map_or(0.0, |f| values[f.parameter]);
+            (delay.is_some() || lag.is_some())
+                .then(|| History::new(time, &tau[joint], value(delay), value(lag)))
+        };
+        Self {
+            time,
+            tau,
+            joints: dynamics.joints,
+            filters: dynamics.filters.clone(),
+            histories: (0..dynamics.joints).map(history).collect(),
+        }
+    }
+
+    /// Filter the torques of a log.
+    pub fn of_log<'p>(model: impl Into<Point<'p>>, log: &'l Log) -> Self {
+        Self::new(model, &log.time, &log.tau)
+    }
+
+    /// The time (s) of one row per lane.
+    pub(super) fn times<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Row<f64, W> {
+        Row(std::array::from_fn(|lane| commands[lane].time[rows[lane]]))
+    }
+
+    /// The commanded torques (`[joint][lane]`) held from one row per lane on.
+    pub(super) fn held<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
+        (0..commands[0].joints)
+            .map(|joint| {
+                Row(std::array::from_fn(|lane| {
+                    commands[lane].tau[joint][rows[lane]]
+                }))
+            })
+            .collect()
+    }
+
+    /// The torque (`[joint][lane]`) that acted just before one row per lane.
+    pub fn just_before<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
+        let of_lane = |joint: usize, lane: usize| {
+            let (own, row) = (commands[lane], rows[lane]);
+            match &own.histories[joint] {
+                Some(history) => history.at(own.time[row]).output,
+                None => own.tau[joint][row.saturating_sub(1)],
+            }
+        };
+        (0..commands[0].joints)
+            .map(|joint| Row(std::array::from_fn(|lane| of_lane(joint, lane))))
+            .collect()
+    }
+
+    /// The log with commanded torques replaced by the mean acting torque from each row to the next.
+    #[must_use]
+    pub fn acting_on(&self, log: &Log) -> Log {
+        let mut acting = log.clone();
+        for (history, tau) in self.histories.iter().zip(&mut acting.tau) {
+            let Some(history) = history else { continue };
+            for (tau, ends) in tau.iter_mut().zip(log.time.windows(2)) {
+                *tau = history.mean(ends[0], ends[1]).value;
+            }
+        }
+        acting
+    }
+}
+
+/// The torque that acts over a hold, per substep.
+#[derive(Debug, Clone, Default)]
+pub struct StepTorque<const W: usize> {
+    /// `[substep * n + joint][lane]`: mean torque in N m (or N). Without filters one entry per joint stands for all
+    /// substeps.
+    pub mean: Vec<Row<f64, W>>,
+    /// `[substep * filters + filter][lane]`: derivative of the mean on the filter's joint with respect to its
+    /// parameter.
+    pub slopes: Vec<Row<f64, W>>,
+}
+
+impl<const W: usize> StepTorque<W> {
+    /// The torque that acts over a hold.
+    ///
+    /// With means over substeps the integration is accurate to second order in the substep wherever the torque jumps,
+    /// and its result is smooth in the filters' parameters.
+    pub fn new(hold: &Hold<'_, W>) -> Self {
+        let mut torque = Self::default();
+        torque.fill(hold);
+        torque
+    }
+
+    /// As [`StepTorque::new`], reusing the memory.
+    pub fn fill(&mut self, hold: &Hold<'_, W>) {
+        self.mean.clear();
+        self.slopes.clear();
+        let filters = hold.commands[0].filters.len();
+        let parts = if filters == 0 { 1 } else { hold.substeps };
+        for _ in 0..parts {
+            self.mean.extend_from_slice(hold.held);
+        }
+        self.slopes.resize(parts * filters, Row::splat(0.0));
+        for lane in 0..W {
+            self.filter(lane, hold);
+        }
+        for (tau, force) in self.mean.iter_mut().zip(hold.force.iter().cycle()) {
+            for lane in 0..W {
+                tau[lane] += force[lane];
+            }
+        }
+    }
+
+    /// Write the filtered torques of one lane.
+    fn filter(&mut self, lane: usize, hold: &Hold<'_, W>) {
+        let model = hold.commands[lane];
+        let (from, to) = (hold.from[lane], hold.to[lane]);
+        for (joint, history) in model.histories.iter().enumerate() {
+            let Some(history) = history else { continue };
+            for (part, mean) in history.means(from, to, hold.substeps).enumerate() {
+                self.set(lane, joint, model, part, mean);
+            }
+        }
+    }
+
+    /// The mean torque per joint over the last substep, or 0 before the first hold.
+    pub(super) fn at_end(&self, joints: usize) -> Vec<Row<f64, W>> {
+        match self.mean.len().checked_sub(joints) {
+            Some(last) => self.mean[last..].to_vec(),
+            None => vec![Row::splat(0.0); joints],
+        }
+    }
+
+    /// The mean torque per joint over one substep, and its slopes per filter.
+    pub fn part(&self, joints: usize, part: usize) -> (&[Row<f64, W>], &[Row<f64, W>]) {
+        let parts = self.mean.len() / joints;
+        let filters = self.slopes.len() / parts;
+        let part = part % parts;
+        (
+            &self.mean[part * joints..][..joints],
+            &self.slopes[part * filters..][..filters],
+        )
+    }
+
+    fn set(&mut self, lane: usize, joint: usize, model: &Commands<'_>, part: usize, mean: Mean) {
+        self.mean[part * model.joints + joint][lane] = mean.value;
+        for (k, filter) in model.filters.iter().enumerate() {
+            if filter.joint == joint {
+                self.slopes[part * model.filters.len() + k][lane] = match filter.kind {
+                    CommandFilter::Delay => mean.by_delay,
+                    CommandFilter::Lag => mean.by_lag,
+                };
+            }
+        }
+    }
+}
+
+/// The command of one joint, delayed by `delay` and lagged with the time constant `lag` (s), in closed form.
+#[derive(Debug, Clone)]
+struct History<'l> {
+    delay: f64,
+    lag: f64,
+    time: &'l [f64],
+    /// The command held from each row on.
+    command: &'l [f64],
+    /// At each row: integral of the command since the first row, output of the lag, derivative of the output with
+    /// respect to `lag`.
+    integral: Vec<f64>,
+    output: Vec<f64>,
+    output_by_lag: Vec<f64>,
+}
+
+/// The filtered torque just before an instant.
+#[derive(Debug, Clone, Copy)]
+struct Instant {
+    /// The instant less the delay, in s.
+    time: f64,
+    output: f64,
+    /// Integral of the output up to the instant, plus an arbitrary constant.
+    integral: f64,
+    integral_by_lag: f64,
+}
+
+impl<'l> History<'l> {
+    fn new(time: &'l [f64], command: &'l [f64], delay: f64, lag: f64) -> Self {
+        let mut history = Self {
+            delay,
+            lag,
+            time,
+            command,
+            integral: vec![0.0],
+            output: vec![command[0]],
+            output_by_lag: vec![0.0],
+        };
+        for row in 1..time.len() {
+            let span = time[row] - time[row - 1];
+            let (output, output_by_lag) = history.within(row - 1, span);
+            let integral = history.integral[row - 1] + command[row - 1] * span;
+            history.integral.push(integral);
+            history.output.push(output);
+            history.output_by_lag.push(output_by_lag);
+        }
+        history
+    }
+
+    /// Output of the lag and its derivative with respect to the time constant, `span` seconds after a row.
+    fn within(&self, row: usize, span: f64) -> (f64, f64) {
+        let (command, gap) = (self.command[row], self.output[row] - self.command[row]);
+        // After 700 time constants the exponential underflows. This also covers a time constant of zero.
+        if span > 700.0 * self.lag {
+            return (command, 0.0);
+        }
+        let decay = (-span / self.lag).exp();
+        let steeper = gap * span / (self.lag * self.lag);
+        (
+            command + gap * decay,
+            (self.output_by_lag[row] + steeper) * decay,
+        )
+    }
+
+    fn at(&self, time: f64) -> Instant {
+        let time = time - self.delay;
+        let row = self.time.partition_point(|t| *t < time);
+        let (output, output_by_lag, command_integral) = match row.checked_sub(1) {
+            None => (
+                self.command[0],
+                0.0,
+                self.command[0] * (time - self.time[0]),
+            ),
+            Some(row) => {
+                let span = time - self.time[row];
+                let (output, output_by_lag) = self.within(row, span);
+                let integral = self.integral[row] + self.command[row] * span;
+                (output, output_by_lag, integral)
+            }
+        };
+        // From the integral of T dx/dt + x = u.
+        Instant {
+            time,
+            output,
+            integral: command_integral - self.lag * output,
+            integral_by_lag: -output - self.lag * output_by_lag,
+        }
+    }
+
+    fn mean(&self, from: f64, to: f64) -> Mean {
+        self.at(from).mean_until(&self.at(to))
+    }
+
+    /// Means over equal substeps. Neighbouring substeps share the same instant, so a jump at it counts once.
+    #[allow(clippy::cast_precision_loss)] // few parts
+    fn means(&self, from: f64, to: f64, parts: usize) -> impl Iterator<Item = Mean> {
+        let length = (to - from) / parts as f64;
+        let mut before = self.at(from);
+        (1..=parts).map(move |part| {
+            let end = if part == parts {
+                to
+            } else {
+                from + length * part as f64
+            };
+            let now = self.at(end);
+            let mean = before.mean_until(&now);
+            before = now;
+            mean
+        })
+    }
+}
+
+impl Instant {
+    /// The mean over the time until `end`, or zero if no time passes.
+    fn mean_until(&self, end: &Self) -> Mean {
+        let length = end.time - self.time;
+        if length <= 0.0 {
+            return Mean::default();
+        }
+        Mean {
+            value: (end.integral - self.integral) / length,
+            by_delay: (self.output - end.output) / length,
+            by_lag: (end.integral_by_lag - self.integral_by_lag) / length,
+        }
+    }
+}

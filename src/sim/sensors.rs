@@ -1,0 +1,130 @@
+use std::borrow::Cow;
+
+use super::{Commands, Point};
+use crate::data::{Log, half_width_s, local_cubic};
+use crate::expr::Tape;
+use crate::lanes::Row;
+
+/// The position sensors of a model, for `W` trajectories: they measure the angles of the rig unless an effect, such as
+/// backlash, stands between joint and sensor.
+pub struct Sensors<'d, const W: usize> {
+    tape: Option<Tape<'d, f64, W>>,
+    joints: usize,
+    shown: Vec<Row<f64, W>>,
+}
+
+impl<'d, const W: usize> Sensors<'d, W> {
+    /// The sensors of one model.
+    pub fn new(model: impl Into<Point<'d>>) -> Self {
+        let model = model.into();
+        let joints = model.dynamics.joints;
+        let reading = model.dynamics.reading.as_ref();
+        let mut tape = reading.map(|reading| reading.tape());
+        if let Some(tape) = &mut tape {
+            let own = &mut tape.inputs()[3 * joints + 1..];
+            for (slot, value) in own.iter_mut().zip(model.values()) {
+                *slot = Row::splat(*value);
+            }
+        }
+        Self {
+            tape,
+            joints,
+            shown: vec![Row::splat(0.0); joints],
+        }
+    }
+
+    /// Set the value of a parameter in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        let first = 3 * self.joints + 1;
+        if let Some(tape) = &mut self.tape {
+            tape.inputs()[first + parameter][lane] = value;
+        }
+    }
+
+    /// The angles (`[n][lane]`) measured in `state` (`[2n][lane]`) at `time` (s). `tau` (`[n][lane]`) is the torque that
+    /// acted until then.
+    pub fn show<'s>(
+        &'s mut self,
+        state: &'s [Row<f64, W>],
+        tau: impl FnOnce() -> Vec<Row<f64, W>>,
+        time: Row<f64, W>,
+    ) -> &'s [Row<f64, W>] {
+        let n = self.joints;
+        let Some(tape) = &mut self.tape else {
+            return &state[..n];
+        };
+        let inputs = tape.inputs();
+        inputs[..2 * n].copy_from_slice(state);
+        inputs[2 * n..3 * n].copy_from_slice(&tau());
+        inputs[3 * n] = time;
+        tape.run();
+        for (k, shown) in self.shown.iter_mut().enumerate() {
+            *shown = *tape.output(k);
+        }
+        &self.shown
+    }
+
+    /// Replace the measured angles in `state` by those of the rig. Their difference is small, and is evaluated at the
+    /// measured angles.
+    pub fn correct(
+        &mut self,
+        state: &mut [Row<f64, W>],
+        tau: impl FnOnce() -> Vec<Row<f64, W>>,
+        time: Row<f64, W>,
+    ) {
+        let seen = state.to_vec();
+        let shown = self.show(&seen, tau, time);
+        for ((angle, shown), seen) in state.iter_mut().zip(shown).zip(&seen) {
+            for lane in 0..W {
+                angle[lane] -= shown[lane] - seen[lane];
+            }
+        }
+    }
+}
+
+/// The sensor effect may depend on velocities, which are estimated from the corrected angles: number of iterations.
+const PASSES: usize = 5;
+
+/// A log with measured angles replaced by those of the rig.
+pub fn with_own_angles<'l, 'd>(model: impl Into<Point<'d>>, log: &'l Log) -> Cow<'l, Log> {
+    let model = model.into();
+    if model.dynamics.reading.is_none() {
+        return Cow::Borrowed(log);
+    }
+    let commands = Commands::of_log(&model, log);
+    let mut sensors = Sensors::<1>::new(model);
+    let mut own = log.clone();
+    for _ in 0..PASSES {
+        let speeds = speeds(&own);
+        for row in 0..log.rows() {
+            let columns = log.q.iter().chain(&speeds);
+            let mut state: Vec<Row<f64, 1>> = columns.map(|column| Row([column[row]])).collect();
+            let before = || Commands::just_before([&commands], [row]);
+            sensors.correct(&mut state, before, Row([log.time[row]]));
+            for (column, angle) in own.q.iter_mut().zip(&state) {
+                column[row] = angle[0];
+            }
+        }
+    }
+    Cow::Owned(own)
+}
+
+/// Velocities estimated from the angles, because reported velocities are noisy; as reported near the log's ends.
+fn speeds(log: &Log) -> Vec<Vec<f64>> {
+    // Twice as wide as for start states, so that a jump by the backlash does not reverse the sign of a velocity.
+    let half_width = 2.0 * half_width_s(log.median_step());
+    let speed = |q: &Vec<f64>, row: usize, reported: f64| {
+        local_cubic(&log.time, q, row, half_width).map_or(reported, |cubic| cubic.slope)
+    };
+    (log.q.iter().zip(&log.qd))
+        .map(|(q, qd)| (0..).zip(qd).map(|(row, v)| speed(q, row, *v)).collect())
+        .collect()
+}
+
+/// A log in the quantities of the equations of motion: the angles of the rig, and the torques that act.
+#[must_use]
+pub fn as_modelled<'d>(model: impl Into<Point<'d>>, log: &Log) -> Log {
+    let model = model.into();
+    let own = with_own_angles(&model, log);
+    Commands::of_log(model, log).acting_on(&own)
+}
