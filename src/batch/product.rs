@@ -3,14 +3,14 @@ use pulp::Simd;
 use super::{Rows, W};
 use crate::lanes::{Element, Vector};
 
-/// What becomes of a sum before it is stored.
+/// Applied to a sum before it is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finish {
-    /// Nothing.
+    /// The sum itself.
     Plain,
-    /// Negative ones become zero.
+    /// max(sum, 0).
     Relu,
-    /// Zero where the value that it takes the place of is not positive: the derivative of ReLU.
+    /// The sum where the value that it overwrites is positive, else zero: the derivative of ReLU.
     Masked,
 }
 
@@ -28,7 +28,7 @@ impl Product<'_> {
     #[inline(always)]
     pub(crate) fn run<S: Simd>(self, simd: S, from: &[Rows], to: &mut [Rows]) {
         let mut first = 0;
-        // Sums stay in registers: eight outputs of two registers each where there are 32.
+        // The accumulators stay in registers: eight outputs with two registers each where there are 32 registers.
         if S::REGISTER_COUNT >= 32 {
             while to.len() - first >= 8 {
                 self.tile::<S, 8>(simd, first, from, to);
@@ -47,8 +47,8 @@ impl Product<'_> {
 
     /// The outputs `first..first + T`.
     ///
-    /// Plain loops: `array::from_fn` and `array::map` are functions of their own wherever the compiler does not care to
-    /// inline them, and then pass every register through memory.
+    /// Plain loops on purpose: the compiler may leave `array::from_fn` and `array::map` as calls, and then every
+    /// register goes through memory.
     #[inline(always)]
     fn tile<S: Simd, const T: usize>(self, simd: S, first: usize, from: &[Rows], to: &mut [Rows]) {
         for pair in 0..W / (2 * f32::lanes::<S>()) {
@@ -83,7 +83,7 @@ impl Product<'_> {
         let zero = Vector::splat(sum.simd, 0.0);
         match self.finish {
             Finish::Plain => sum,
-            // Comparisons, so that what is not a number stays so.
+            // Comparisons, so that NaN propagates.
             Finish::Relu => sum.if_less(zero, zero, sum),
             Finish::Masked => zero.if_less(before, sum, zero),
         }
