@@ -161,7 +161,7 @@ fn plan(c: &mut Criterion) {
         c.benchmark_group("plan")
             .measurement_time(Duration::from_secs(2))
             .bench_function(BenchmarkId::from_parameter(task.name), |b| {
-                planner.helped(|| {
+                planner.with_workers(|| {
                     b.iter(|| {
                         planner.forget();
                         black_box(planner.plan(start.clone()));
