@@ -2,7 +2,8 @@ use rayon::prelude::*;
 
 use super::fitted::Fitted;
 use super::per_log::values_on;
-use super::select::{PLAIN, gain, p_of_gains};
+use super::select::{gain, p_of_gains};
+use super::settings::ConfirmSettings;
 use super::study::Study;
 use crate::identify::{blocks, fit};
 use crate::model::FittedEffect;
@@ -24,14 +25,6 @@ pub struct Confirmed {
     pub stretches: usize,
 }
 
-/// An effect stands that lowers the loss on data it was not chosen by, with this probability of doing so by
-/// accident, or that plainly helps: they are few, and it was significant over the whole library before.
-const CONFIRMED: f64 = 0.1;
-/// Fewer stretches than this prove nothing either way.
-const FEWEST: usize = 4;
-/// A change of the loss by less than this share: the motion does not show the effect.
-const NOT_SHOWN: f64 = 0.01;
-
 /// Ask of each effect of a model, fitted in `study`, whether it lowers the loss on data set aside, and take back
 /// those that do not, the least sure first.
 pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Confirmed {
@@ -42,7 +35,7 @@ pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Confirmed
         taken_back: Vec::new(),
         stretches,
     };
-    if stretches < FEWEST {
+    if stretches < study.settings.confirm.fewest_stretches {
         confirmed.stretches = 0;
         return confirmed;
     }
@@ -62,6 +55,11 @@ fn most_doubtful(
 ) -> Option<(TakenBack, Fitted)> {
     let with = losses(aside, model, model.fit.scale, members)?;
     let declared = study.system.effects.len();
+    let ConfirmSettings {
+        significance,
+        not_shown,
+        ..
+    } = study.settings.confirm;
     let unsure: Vec<(f64, TakenBack, Fitted)> = (declared..model.effects.len())
         .into_par_iter()
         .filter_map(|k| {
@@ -71,7 +69,7 @@ fn most_doubtful(
             let less = study.refit(&effects, &model.declared, locals, scale).ok()?;
             let without = losses(aside, &less, model.fit.scale, members)?;
             let (p, saved) = (p_of_gains(&without, &with), gain(&without, &with));
-            (p > CONFIRMED && saved < PLAIN && saved.abs() > NOT_SHOWN).then(|| {
+            (p > significance && saved < study.settings.select.plain && saved.abs() > not_shown).then(|| {
                 let reason = format!(
                     "on stretches that it was not chosen by it changes the loss by {:.0} % (p = {p:.2})",
                     -100.0 * saved

@@ -25,10 +25,6 @@ pub struct Found {
     pub unexplained: Unexplained,
 }
 
-/// Where something is left that no effect explains, effects that leave more than this share of the loss do not
-/// explain it either: they mask the real cause.
-const HALF: f64 = 0.5;
-
 /// Stages 3 to 5: fit the declared model, choose effects on a part of the logs, confirm them on the rest, fit what
 /// stood to all of them and test what is left.
 ///
@@ -46,7 +42,8 @@ pub fn find(
     let mut after = on_all(study, &before, &chosen.model);
     progress(Stage::Remainder.into());
     let mut left = unexplained(study, library.probes(), &before, &after, rng);
-    if left.is_significant() && share_left(study, &before, &after) > HALF {
+    if left.is_significant() && share_left(study, &before, &after) > study.settings.confirm.masking
+    {
         chosen.taken_back.extend(masking(study, &after));
         after = before.clone();
         left = unexplained(study, library.probes(), &before, &after, rng);
@@ -76,7 +73,7 @@ fn choose(
     library: &Library,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Chosen, StudyError> {
-    let (kept, aside) = set_aside(study.logs);
+    let (kept, aside) = set_aside(study.logs, study.settings);
     let (mut kept, aside) = (study.on(&kept), study.on(&aside));
     let declared = kept.fit_declared()?;
     let mut search = Search::new(&kept, library.effects(), progress);
@@ -109,7 +106,7 @@ fn on_all(study: &Study<'_>, before: &Fitted, chosen: &Fitted) -> Fitted {
 
 /// Loss that the effects leave, as a share of the declared model's, on stretches left out of the fits.
 fn share_left(study: &Study<'_>, before: &Fitted, after: &Fitted) -> f64 {
-    let folds = folds(&study.shooting);
+    let folds = folds(study);
     // Losses are in units of each fit's own scale.
     let loss = |model: &Fitted| {
         left_out_losses(&model.fit, &folds).iter().sum::<f64>() * model.fit.scale.powi(2)

@@ -19,13 +19,6 @@ pub enum Verdict {
     Inconclusive,
 }
 
-/// Fewer windows than this allow no conclusion.
-const FEWEST_WINDOWS: usize = 8;
-
-/// Effects that raise the error on the test logs by more than noise in the windows' start states does are not
-/// to be trusted: a twentieth.
-const WORSE: f64 = 1.05;
-
 /// The verdict and the reason for it, in a sentence.
 pub(super) fn verdict(study: &Study<'_>, found: &Found, errors: &Errors) -> (Verdict, String) {
     match inconclusive(study, found, errors) {
@@ -41,10 +34,12 @@ fn added(study: &Study<'_>, found: &Found) -> usize {
 
 /// Why the logs allow no conclusion, if they do not.
 fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<String> {
+    let settings = &study.settings.verdict;
     let windows = study.shooting.windows.len();
-    if windows < FEWEST_WINDOWS {
+    if windows < settings.fewest_windows {
         return Some(format!(
-            "the training logs hold only {windows} windows of half a second; record more motion"
+            "the training logs hold only {windows} windows of {} s; record more motion",
+            study.settings.fit.window_s
         ));
     }
     let known = &study.identifiability;
@@ -54,7 +49,7 @@ fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<Str
                 .into(),
         );
     }
-    let worse = errors.after.position_rms() > WORSE * errors.before.position_rms();
+    let worse = errors.after.position_rms() > settings.worse * errors.before.position_rms();
     (added(study, found) > 0 && worse).then(|| {
         "the effects lower the loss on left-out stretches of the training logs but raise the error on the test logs: \
          do not use them before logs of more varied motion confirm them"

@@ -17,9 +17,6 @@ pub struct Alternative {
     pub separation: Option<Separation>,
 }
 
-/// Experiments are simulated for so many alternatives, the best ones: each costs as much as a few fits.
-const SIMULATED: usize = 3;
-
 /// The sets of effects that do as well as the one that stood, the best first; those of which a part was taken back
 /// are none. For the best of them the experiment that tells them from it is simulated.
 pub(in crate::closeloop) fn discriminate(
@@ -37,7 +34,7 @@ pub(in crate::closeloop) fn discriminate(
         .collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let alternative = |(rank, rival): (usize, &Rival)| {
-        let separation = (rank < SIMULATED).then(|| {
+        let separation = (rank < study.settings.discriminate.alternatives).then(|| {
             let text = format!("simulating experiments against {}", rival.effect.label());
             progress(Progress::within(Stage::Discriminate, &text));
             separation(study, model, rival)

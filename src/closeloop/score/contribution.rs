@@ -86,7 +86,7 @@ fn finding(
         study.logs,
     );
     let without = without(study, model, k)?;
-    let folds = folds(&study.shooting);
+    let folds = folds(study);
     let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
     Some(Finding {
         expression,
