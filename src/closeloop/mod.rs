@@ -24,11 +24,13 @@ mod settings;
 mod split;
 mod stage;
 mod study;
+#[cfg(test)]
+mod tests;
 mod verdict;
 
 pub use calibrate::{Calibration, DetectionLimit, Repetition, Smallest, calibrate};
 pub use confirm::TakenBack;
-pub use discriminate::{Alternative, Separation};
+pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;
 pub use find::{Found, find};
 pub use fitted::Fitted;

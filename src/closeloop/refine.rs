@@ -3,7 +3,7 @@
 use super::fitted::Fitted;
 use super::settings::RefineSettings;
 use super::study::{Study, smooth};
-use crate::identify::{Shooting, uncertainty};
+use crate::identify::{FitError, Shooting, uncertainty};
 use crate::model::Parameter;
 
 /// The chosen model, estimated in fine steps.
@@ -13,16 +13,22 @@ pub(super) struct Refined<'a> {
     pub model: Fitted,
     /// All parameters of the model, with their 95 % intervals.
     pub parameters: Vec<Parameter>,
+    /// Why the model is the chosen one as it was, if the estimate failed.
+    pub failure: Option<FitError>,
 }
 
 /// Estimate the chosen model in fine steps.
 pub(super) fn refine<'a>(study: &Study<'a>, chosen: &Fitted) -> Refined<'a> {
     let fine = study.refined();
-    let model = fine.estimate(chosen);
+    let (study, model, failure) = match fine.estimate(chosen) {
+        Ok(model) => (fine, model, None),
+        Err(error) => (study.again(), chosen.clone(), Some(error)),
+    };
     Refined {
-        parameters: with_intervals(&fine, &model, &chosen.fit.values),
-        study: fine,
+        parameters: with_intervals(&study, &model, &chosen.fit.values),
+        study,
         model,
+        failure,
     }
 }
 
@@ -39,16 +45,17 @@ impl Study<'_> {
             sign: smooth(&sign_widths),
             sign_widths,
             shooting: shooting.in_steps_of(step_s),
-            identifiability: self.identifiability.clone(),
-            ..self.on(self.logs)
+            ..self.again()
         }
     }
 
-    /// A chosen model estimated anew; as it was where that fails.
-    pub fn estimate(&self, chosen: &Fitted) -> Fitted {
+    /// Estimate a chosen model anew, from the values that it has.
+    ///
+    /// # Errors
+    /// As [`Study::refit`].
+    pub fn estimate(&self, chosen: &Fitted) -> Result<Fitted, FitError> {
         let locals = chosen.fit.locals.clone();
         self.refit(&chosen.effects, &chosen.declared, locals, None)
-            .unwrap_or_else(|_| chosen.clone())
     }
 }
 

@@ -52,8 +52,8 @@ pub fn close_loop(
     let hybrid = learned.as_ref().map(|learned| &learned.hybrid);
     let models = [&found.before, &refined.model];
     let errors = scorer.errors(system, models, hybrid, &against, rng);
-    let findings = findings(&study, &refined, &scorer, &errors.after);
-    let (verdict, reason) = verdict(&study, &found, &errors);
+    let findings = findings(&study, &found.after, &refined, &scorer, &errors.after);
+    let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     Ok(Outcome {
         verdict,
         reason,

@@ -136,6 +136,14 @@ impl<'a> Study<'a> {
         }
     }
 
+    /// This study once more.
+    pub(super) fn again(&self) -> Self {
+        Self {
+            identifiability: self.identifiability.clone(),
+            ..self.on(self.logs)
+        }
+    }
+
     /// The audits of the logs, in their order.
     pub fn audits(&self) -> &[Audit] {
         let of_logs = || self.logs.iter().map(audit).collect();

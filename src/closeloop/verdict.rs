@@ -1,4 +1,5 @@
 use super::find::Found;
+use super::refine::Refined;
 use super::remainder::{UNKNOWN, Unexplained};
 use super::score::Errors;
 use super::study::Study;
@@ -20,8 +21,13 @@ pub enum Verdict {
 }
 
 /// The verdict and the reason for it, in a sentence.
-pub(super) fn verdict(study: &Study<'_>, found: &Found, errors: &Errors) -> (Verdict, String) {
-    match inconclusive(study, found, errors) {
+pub(super) fn verdict(
+    study: &Study<'_>,
+    found: &Found,
+    refined: &Refined<'_>,
+    errors: &Errors,
+) -> (Verdict, String) {
+    match failure(found, refined).or_else(|| inconclusive(study, found, errors)) {
         Some(reason) => (Verdict::Inconclusive, reason),
         None => conclusion(added(study, found), &found.unexplained),
     }
@@ -30,6 +36,19 @@ pub(super) fn verdict(study: &Study<'_>, found: &Found, errors: &Errors) -> (Ver
 /// Number of effects that were added to the declared model.
 fn added(study: &Study<'_>, found: &Found) -> usize {
     found.after.effects.len() - study.system.effects.len()
+}
+
+/// Which fit failed, if one did that the verdict rests on.
+fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
+    if let Some(error) = &found.failure {
+        return Some(format!(
+            "the effects selected on a part of the training logs could not be fitted to all of them: {error}"
+        ));
+    }
+    let error = refined.failure.as_ref()?;
+    Some(format!(
+        "the final fit in fine steps failed, the values are those of the coarser one: {error}"
+    ))
 }
 
 /// Why the logs allow no conclusion, if they do not.

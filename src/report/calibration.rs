@@ -148,6 +148,7 @@ fn reason(size: &Smallest) -> Option<&'static str> {
         Smallest::Indistinguishable => {
             Some("indistinguishable from the rest of the model at any size")
         }
+        Smallest::Diverged => Some("not computed: the model diverges with it"),
         Smallest::NotComputed => Some("not computed: no parameter value switches the effect off"),
     }
 }

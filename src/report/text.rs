@@ -75,7 +75,10 @@ fn effects(findings: &[Finding]) -> String {
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
-            reduction(finding.error_reduction, "error")
+            match &finding.error_reduction {
+                Ok(part) => reduction(*part, "error"),
+                Err(error) => format!("not computed (refit without it: {error})"),
+            }
         );
     }
     out + "\nError reduction: by how much the position error on the test logs, at the middle horizon, is below that of a refit without this effect.\n\n"

@@ -39,6 +39,8 @@ pub enum Smallest {
     Indistinguishable,
     /// No parameter at zero switches the effect off, so that its size has no scale to start from.
     NotComputed,
+    /// The model diverges with the effect.
+    Diverged,
 }
 
 /// For each effect that could join an accepted model, the smallest size that the search would name.
@@ -132,21 +134,28 @@ impl<'a> Look<'a> {
             parameter.per_log = false;
         }
         let starts = starts(&common);
-        let sizes = starts
+        let mut none = Smallest::Indistinguishable;
+        let tried = starts
             .iter()
-            .flat_map(|start| switches.iter().map(move |&switch| (start, switch)))
+            .flat_map(|start| switches.iter().map(move |&switch| (start, switch)));
+        let sizes: Vec<(usize, Vec<f64>)> = tried
             .filter_map(|(start, switch)| {
-                let size = self.smallest(start, switch, tested, level)?;
+                let Ok(size) = self.smallest(start, switch, tested, level) else {
+                    none = Smallest::Diverged;
+                    return None;
+                };
                 let mut values: Vec<f64> = start.values.iter().map(|(value, _)| *value).collect();
-                values[switch] = size;
+                values[switch] = size?;
                 (candidate.effect.is_valid(&values)).then_some((switch, values))
-            });
+            })
+            .collect();
         let multiple =
             |(switch, values): &(usize, Vec<f64>)| values[*switch] / parameters[*switch].typical;
-        sizes
+        (sizes.into_iter())
             .min_by(|a, b| multiple(a).total_cmp(&multiple(b)))
-            .map_or(Smallest::Indistinguishable, |(switch, values)| {
-                Smallest::Detectable { switch, values }
+            .map_or(none, |(switch, values)| Smallest::Detectable {
+                switch,
+                values,
             })
     }
 
@@ -157,14 +166,19 @@ impl<'a> Look<'a> {
         switch: usize,
         switches: usize,
         level: f64,
-    ) -> Option<f64> {
+    ) -> Result<Option<f64>, FitError> {
         let fit = self.with(start, switch)?;
+        Ok(self.smallest_by(&fit, switches, level))
+    }
+
+    /// The smallest size of the last free value of a fit; `None` where the motion does not tell it from the others.
+    fn smallest_by(&self, fit: &Fit, switches: usize, level: f64) -> Option<f64> {
         let Settings {
             select, calibrate, ..
         } = self.study.settings;
         let power = calibrate.power;
-        let information = own_information(&fit, calibrate.own_information)?;
-        let known = uncertainty(&self.study.shooting, &fit);
+        let information = own_information(fit, calibrate.own_information)?;
+        let known = uncertainty(&self.study.shooting, fit);
         let last = fit.columns.len() - 1;
         let deviation = known.covariance[(last, last)].sqrt();
         let needed = |p: f64, gain: f64| {
@@ -177,7 +191,7 @@ impl<'a> Look<'a> {
     }
 
     /// The accepted model with one more free value, a switch of the effect, at zero.
-    fn with(&self, start: &FittedEffect, switch: usize) -> Option<Fit> {
+    fn with(&self, start: &FittedEffect, switch: usize) -> Result<Fit, FitError> {
         let accepted = self.accepted;
         let mut effects = accepted.effects.clone();
         effects.push(start.clone());
@@ -192,7 +206,6 @@ impl<'a> Look<'a> {
             self.locals.clone(),
             accepted.fit.scale,
         )
-        .ok()
     }
 }
 

@@ -69,7 +69,7 @@ pub fn unexplained(
         .filter_map(|probe| ask(study, after, probe, &losses))
         .collect();
     #[allow(clippy::cast_precision_loss)] // few probes
-    let asked = probed.len() as f64;
+    let asked = probed.len().max(1) as f64;
     let seen = probed
         .iter()
         .filter(|p| p.gain > study.settings.remainder.noteworthy);

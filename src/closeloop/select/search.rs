@@ -10,6 +10,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::stage::{Progress, Stage};
 use crate::closeloop::study::Study;
+use crate::identify::FitError;
 use crate::model::{Effect, EffectParameter, FittedEffect};
 
 /// One look at a model: what was tried beside the effects that it has, best first.
@@ -85,7 +86,10 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
     /// then exchange, simplify and remove until each effect is the best choice beside all others.
-    pub fn select(&mut self, declared: Fitted) -> Fitted {
+    ///
+    /// # Errors
+    /// A selected model that cannot be fitted again.
+    pub fn select(&mut self, declared: Fitted) -> Result<Fitted, FitError> {
         let mut model = declared;
         while model.effects.len() < self.declared() + self.study.settings.select.most_effects {
             let round = self.look(&model, None);
@@ -95,13 +99,13 @@ impl<'a, 'p> Search<'a, 'p> {
                 None => self.exchanged(&model),
             };
             let Some(next) = next else { break };
-            let next = self.simplified(self.rescaled(&next));
+            let next = self.simplified(self.rescaled(&next)?);
             if self.has_passed(&next) {
                 break;
             }
             model = next;
         }
-        model
+        Ok(model)
     }
 
     /// Tell what is being done.
@@ -173,12 +177,11 @@ impl<'a, 'p> Search<'a, 'p> {
         screened.into_iter().map(|(start, _)| start).collect()
     }
 
-    /// The scale of the residuals has fallen: from now on the search looks with sharper eyes.
-    fn rescaled(&self, model: &Fitted) -> Fitted {
+    /// The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
+    fn rescaled(&self, model: &Fitted) -> Result<Fitted, FitError> {
         let locals = model.fit.locals.clone();
         self.study
             .refit(&model.effects, &model.declared, locals, None)
-            .unwrap_or_else(|_| model.clone())
     }
 
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
