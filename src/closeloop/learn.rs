@@ -14,9 +14,9 @@ use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridError, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-    absorbed, as_modelled,
+    Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
 };
+use crate::sim::{Integrator, Point, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
 /// A run that trained the residual network, for its checkpoint, and the hybrid that came of it.
@@ -108,7 +108,7 @@ fn fit_settings(settings: &LearnSettings) -> FitSettings {
         penalty: Penalty::Fixed {
             alpha: settings.alpha,
         },
-        integrator: Integrator::Rk4,
+        integrator: Integrator::RK4,
         record_every: settings.record_every,
         ..FitSettings::default()
     }
@@ -123,8 +123,8 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
         length_s: settings.stretch_s,
     };
     let of_log = |(k, log): (usize, &Log)| {
-        let values = model.fit.values_of_log(k);
-        trajectories(&as_modelled(&model.dynamics, &values, log), thinning)
+        let point = Point::new(&model.dynamics, model.fit.values_of_log(k));
+        trajectories(&as_modelled(&point, log), thinning)
     };
     let logs = study.logs.iter().enumerate();
     let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
