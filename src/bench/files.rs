@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::grid::{Cell, GridError, Group, Source, beside_or_named, id};
 use super::hidden::Hidden;
 
-/// What `cell.json` says of the logs beside it.
+/// The contents of `cell.json`: what is known of the logs beside it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Described {

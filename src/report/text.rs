@@ -86,7 +86,12 @@ fn effects(findings: &[Finding]) -> String {
 
 /// The unit of positions: that of all joints, or both.
 fn position_unit(outcome: &Outcome) -> &'static str {
-    let sliding = outcome.given.prismatic.iter().filter(|slides| **slides).count();
+    let sliding = outcome
+        .given
+        .prismatic
+        .iter()
+        .filter(|slides| **slides)
+        .count();
     match sliding {
         0 => "rad",
         all if all == outcome.given.prismatic.len() => "m",
