@@ -14,9 +14,9 @@ use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridError, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-    absorbed, as_modelled,
+    Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
 };
+use crate::sim::{Integrator, Point, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
 /// Rows nearer than this (s) are put together: the network is to learn a force, not the encoder's noise.
@@ -115,7 +115,7 @@ fn fit_settings() -> FitSettings {
             ..LearningRates::default()
         },
         penalty: Penalty::Fixed { alpha: ALPHA },
-        integrator: Integrator::Rk4,
+        integrator: Integrator::RK4,
         record_every: NonZeroUsize::new(10).expect("not zero"),
         ..FitSettings::default()
     }
@@ -129,8 +129,8 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
         length_s: STRETCH_S,
     };
     let of_log = |(k, log): (usize, &Log)| {
-        let values = model.fit.values_of_log(k);
-        trajectories(&as_modelled(&model.dynamics, &values, log), thinning)
+        let point = Point::new(&model.dynamics, model.fit.values_of_log(k));
+        trajectories(&as_modelled(&point, log), thinning)
     };
     let logs = study.logs.iter().enumerate();
     let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
