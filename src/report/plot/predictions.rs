@@ -97,7 +97,7 @@ fn entries(panels: &[Panel]) -> Vec<Entry> {
     let line = |track: &&Track| Entry::new(Sample::Line(track.role.stroke()), &track.label);
     let mut entries: Vec<Entry> = tracks.iter().map(line).collect();
     if tracks.iter().any(|track| has_start_marks(track)) {
-        entries.push(Entry::new(Sample::Start, "restart from the log"));
+        entries.push(Entry::new(Sample::Start, "restart"));
     }
     entries
 }
