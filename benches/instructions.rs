@@ -9,7 +9,7 @@ use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::batch::{Rollouts, Rows};
+use residyn::sim::batch::{Rollouts, Rows};
 use residyn::data::Log;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, promise};

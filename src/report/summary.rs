@@ -50,7 +50,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: {before} {unit} {FITTED}; {after} {unit} {WITH_EFFECTS}",
+                "  joint {}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}",
                 j + 1
             );
         }

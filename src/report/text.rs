@@ -297,8 +297,8 @@ fn left(outcome: &Outcome) -> String {
     };
     format!(
         "## What is left\n\nOf the residual variance above the sensor noise, {:.1} % is left. {structure}\n{network}\
-         Residual generalised force: {} for the {FITTED}, {} {WITH_EFFECTS} (root mean square over stretches of {} s, \
-         in N m or N).\n\n\
+         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over stretches of {} s in \
+         N m or N.\n\n\
          ![residual](residual.svg)\n\n{}",
         100.0 * left.fraction,
         force(&outcome.remainder.before),
