@@ -1,4 +1,4 @@
-//! What closing the loop said, in the words of the bench.
+//! The outcome of closing the loop, in the bench's own types.
 
 use super::hidden::{Label, label};
 use super::judge::{Answer, Estimate, Named, of_log};

@@ -1,8 +1,8 @@
 use super::error::StudyError;
 use super::settings::Settings;
 use super::split::Split;
-use crate::evaluate::window_count;
 use crate::model::{Library, System};
+use crate::sim::metric::window_count;
 use crate::train::Backend;
 
 /// What closing the loop is asked for.

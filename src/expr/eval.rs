@@ -6,42 +6,33 @@ use super::places::Places;
 use super::steps::{Kind, Step};
 use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
 
-/// The number types that programs run on: f64 to fit, f32 to train and plan.
-pub trait Real:
-    num_traits::Float + num_traits::FromPrimitive + Default + Send + Sync + 'static
-{
-}
-
-impl Real for f32 {}
-impl Real for f64 {}
-
-/// The working memory of one program, `W` independent evaluations side by side, in whole registers of the
-/// processor at hand where `W` is a multiple of theirs and one after the other elsewhere.
+/// Working memory for `W` independent evaluations of one program, vectorised where `W` is a multiple of the processor's
+/// vector length.
 #[derive(Debug, Clone)]
 pub struct Tape<'p, T, const W: usize> {
     inputs: usize,
     program: PhantomData<&'p Program>,
-    /// Steps that depend on held inputs alone.
+    /// Steps that depend only on held inputs.
     held: Runs,
-    /// The others.
+    /// All other steps.
     moving: Runs,
-    /// From this input on inputs are held.
+    /// Index of the first held input.
     held_from: usize,
-    /// Whether the steps of held inputs have been carried out.
+    /// Whether the steps of the held inputs are up to date.
     settled: bool,
     values: Vec<Row<T, W>>,
-    /// Where each output stands among the values.
+    /// Index of each output among the values.
     outputs: Vec<u32>,
 }
 
-/// So many steps of one kind, one after the other.
+/// Consecutive steps of one kind.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     kind: Kind,
     count: usize,
 }
 
-/// Steps and the runs that they form.
+/// Steps, divided into runs.
 #[derive(Debug, Clone)]
 struct Runs {
     steps: Vec<Step>,
@@ -68,8 +59,8 @@ impl Program {
         self.tape_with_held(self.inputs.len())
     }
 
-    /// The same where the inputs from `held_from` on change seldom: what depends on them alone is found anew only
-    /// after [`Tape::inputs`] was asked for, while [`Tape::moving`] gives the others.
+    /// The same where the inputs from `held_from` on change rarely: steps that depend only on them are evaluated
+    /// again only after a call of [`Tape::inputs`]; [`Tape::moving`] gives access to the other inputs.
     pub fn tape_with_held<T: Element, const W: usize>(&self, held_from: usize) -> Tape<'_, T, W> {
         let is_held = |step: &&Step| step.first_input as usize >= held_from;
         let (mut held, mut moving): (Vec<Step>, Vec<Step>) =
@@ -126,7 +117,7 @@ impl Program {
 }
 
 impl<T: Element, const W: usize> Tape<'_, T, W> {
-    /// The same memory, to be kept for longer than the program.
+    /// The same memory without the borrow of its program.
     pub fn into_owned(self) -> Tape<'static, T, W> {
         Tape {
             inputs: self.inputs,
@@ -159,12 +150,12 @@ impl<T: Element, const W: usize> Tape<'_, T, W> {
         &self.values[self.outputs[k] as usize]
     }
 
-    /// Carry out every operation on every lane.
+    /// Evaluate the program in every lane.
     pub fn run(&mut self) {
         Row::<T, W>::dispatch(CarryOut(self));
     }
 
-    /// The same within a function that is on these instructions already.
+    /// [`Tape::run`] from within code that is compiled for these vector instructions already.
     #[inline(always)]
     pub fn run_on<S: Simd>(&mut self, simd: S) {
         if Row::<T, W>::fills::<S>() {
@@ -209,8 +200,7 @@ struct Values<'v, S, T, const W: usize> {
     rows: &'v mut [Row<T, W>],
 }
 
-// The operations are written into the loop over registers as they are: a closure would be a function of its own that
-// does not know the processor's instructions.
+// A macro, not closures: a closure may become a function of its own, compiled without the vector instructions.
 macro_rules! each {
     ($values:ident, $steps:ident, |$a:ident| $value:expr) => {
         for &step in $steps {
@@ -269,7 +259,7 @@ impl<S: Simd, T: Element, const W: usize> Values<'_, S, T, W> {
             Kind::Div => each!(self, steps, |a, b| a / b),
             Kind::Pow => each!(self, steps, |a, b| a.pow(b)),
             Kind::Atan2 => each!(self, steps, |a, b| a.atan2(b)),
-            // What is not a number spreads instead of vanishing.
+            // NaN propagates.
             Kind::Min => each!(self, steps, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
             Kind::Max => each!(self, steps, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
             Kind::Less => each!(self, steps, |a, b| a.if_less(b, a.like(1.0), a.like(0.0))),

@@ -9,10 +9,10 @@ use super::gaussian::Gaussian;
 use super::noise::Noise;
 use super::proposal::Proposal;
 use super::{Cem, Evaluate, Icem, Method, Mppi, Objective, Plan, Planner, Settings, Start};
-use crate::batch::{Rollouts, Rows, W};
 use crate::expr::SignForm;
 use crate::lanes::{Arch, Row};
 use crate::model::{Dynamics, FittedEffect, Library};
+use crate::sim::batch::{Rollouts, Rows, W};
 use crate::sim::{Commands, Environment, Hold, Integrator, RK4, Simulator};
 
 const SETTINGS: Settings = Settings {
@@ -173,7 +173,7 @@ fn a_plan_does_not_depend_on_the_number_of_cores() {
     for settings in all() {
         let alone = near(&settings, &[[-3.0, 3.0]], 5).plan(0.3);
         let with_help = near(&settings, &[[-3.0, 3.0]], 5);
-        assert_eq!(with_help.helped(|| with_help.plan(0.3)), alone);
+        assert_eq!(with_help.with_workers(|| with_help.plan(0.3)), alone);
         let other = near(&settings, &[[-3.0, 3.0]], 6);
         assert_ne!(other.plan(0.3), alone);
     }

@@ -7,8 +7,8 @@ use super::wording::{
 };
 use crate::closeloop::{Finding, Outcome, Proposal, ResidualForce, SplitMethod, UNKNOWN, Verdict};
 use crate::data::Severity;
-use crate::evaluate::{Summary, summarise};
 use crate::identify::FitError;
+use crate::sim::metric::{Summary, summarise};
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
@@ -86,12 +86,7 @@ fn effects(findings: &[Finding]) -> String {
 
 /// The unit of positions: that of all joints, or both.
 fn position_unit(outcome: &Outcome) -> &'static str {
-    let sliding = outcome
-        .given
-        .prismatic
-        .iter()
-        .filter(|slides| **slides)
-        .count();
+    let sliding = outcome.given.prismatic.iter().filter(|slides| **slides).count();
     match sliding {
         0 => "rad",
         all if all == outcome.given.prismatic.len() => "m",
@@ -302,8 +297,8 @@ fn left(outcome: &Outcome) -> String {
     };
     format!(
         "## What is left\n\nOf the residual variance above the sensor noise, {:.1} % is left. {structure}\n{network}\
-         Residual generalised force: {} for the {FITTED}, {} {WITH_EFFECTS} (root mean square over stretches of {} s, \
-         in N m or N).\n\n\
+         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over stretches of {} s in \
+         N m or N.\n\n\
          ![residual](residual.svg)\n\n{}",
         100.0 * left.fraction,
         force(&outcome.remainder.before),

@@ -2,8 +2,8 @@ use rand::Rng;
 
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::statistics::bootstrap;
-use crate::evaluate::OpenLoop;
 use crate::identify::{BLOCK_S, stretches};
+use crate::sim::metric::OpenLoop;
 
 /// 95 % interval of the relative reduction of the position error (all joints together) from `before` to
 /// `after`, by resampling whole trajectories or, where there are fewer than five, stretches of two seconds.

@@ -5,8 +5,8 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
-use crate::evaluate::{Assessment, assess};
 use crate::model::{Dynamics, System};
+use crate::sim::metric::{Assessment, assess};
 
 /// Open-loop errors on the test logs.
 pub struct Errors {
