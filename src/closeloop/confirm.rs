@@ -8,7 +8,7 @@ use super::study::Study;
 use crate::identify::{FitError, blocks, fit};
 use crate::model::FittedEffect;
 
-/// An effect that was chosen and did not stand.
+/// A selected effect that was not confirmed.
 #[derive(Debug, Clone)]
 pub struct TakenBack {
     pub effect: FittedEffect,
@@ -16,7 +16,7 @@ pub struct TakenBack {
     pub reason: String,
 }
 
-/// What came of confirming a choice.
+/// The selected model without the effects that were not confirmed.
 #[derive(Debug, Clone)]
 pub struct Confirmed {
     pub model: Fitted,

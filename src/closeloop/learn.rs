@@ -114,8 +114,8 @@ fn fit_settings(settings: &LearnSettings) -> FitSettings {
     }
 }
 
-/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees what
-/// the model does.
+/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network's inputs are the
+/// model's own angles and torques.
 fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     let settings = &study.settings.learn;
     let thinning = Thinning {
@@ -136,7 +136,7 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     ];
     for (index, stretch) in stretches.iter().enumerate() {
         let set = &mut sets[usize::from(index % settings.every == settings.every - 1)];
-        // A stretch that is too short holds no segment; that is no error here.
+        // A stretch too short for a segment is skipped.
         let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
     }
     let [training, validation] = sets;

@@ -15,8 +15,8 @@ use super::study::Study;
 use super::verdict::verdict;
 use crate::data::audit;
 
-/// Fit the declared model, add effects while they help on trajectories left out of the fit, train the residual
-/// network on what is left, and measure before and after on the test logs.
+/// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
+/// network on the remainder, and score the models before and after on the test logs.
 ///
 /// # Errors
 /// Logs without a usable window, or a declared model that diverges from its starting values.

@@ -8,7 +8,7 @@ use crate::expr::SignForm;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
 use crate::model::{Dynamics, FittedEffect, System};
 
-/// A declared system, logs to learn from, and what both imply.
+/// A declared system and the logs to learn from, with what follows from both.
 pub struct Study<'a> {
     pub system: &'a System,
     pub settings: &'a Settings,
@@ -22,7 +22,7 @@ pub struct Study<'a> {
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub shooting: Shooting<'a>,
-    /// A few of its windows, spread evenly, for first looks.
+    /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
     /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
     pub identifiability: Identifiability,

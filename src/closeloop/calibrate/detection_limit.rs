@@ -35,9 +35,9 @@ pub enum Smallest {
     /// One switch alone, the one that shows at the smallest multiple of its typical value; the values of all
     /// parameters, inner ones at the searched values that show the effect best, other switches at zero.
     Detectable { switch: usize, values: Vec<f64> },
-    /// No size: the motion does not tell it from what the model has.
+    /// None: the motion does not distinguish it from what the model has.
     Indistinguishable,
-    /// No parameter at zero switches the effect off, so that its size has no scale to start from.
+    /// No parameter at zero switches the effect off, so that its size has no natural zero.
     NotComputed,
     /// The model diverges with the effect.
     Diverged,
@@ -56,7 +56,7 @@ pub(super) fn detection_limits(
     let (chosen_by, _) = set_aside(study.logs, study.settings);
     let mut part = study.on(&chosen_by);
     part.identifiability = study.identifiability.clone();
-    let look = Look::new(&part, accepted)?;
+    let baseline = Baseline::new(&part, accepted)?;
     let all = candidates(&part, library, &accepted.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
     #[allow(clippy::cast_precision_loss)] // few trials
@@ -64,7 +64,7 @@ pub(super) fn detection_limits(
     Ok(all
         .into_iter()
         .map(|candidate| {
-            let smallest = look.size(&candidate, level);
+            let smallest = baseline.size(&candidate, level);
             DetectionLimit {
                 effect: candidate,
                 smallest,
@@ -75,7 +75,7 @@ pub(super) fn detection_limits(
 }
 
 /// An accepted model on the logs that effects are chosen by.
-struct Look<'a> {
+struct Baseline<'a> {
     study: &'a Study<'a>,
     accepted: &'a Fitted,
     locals: Vec<Vec<f64>>,
@@ -83,7 +83,7 @@ struct Look<'a> {
     loss: f64,
 }
 
-impl<'a> Look<'a> {
+impl<'a> Baseline<'a> {
     fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
         let values = values_on(study.logs, &accepted.declared, &accepted.effects);
         let scale = accepted.fit.scale;

@@ -1,4 +1,4 @@
-//! Stage 10: what some logs could show: how often the search names an effect where there is none, and how small an effect
+//! Stage 10: what some logs can show: how often the search names an effect where there is none, and how small an effect
 //! it would name.
 
 mod detection_limit;
@@ -20,12 +20,12 @@ use crate::data::Log;
 use crate::data::statistics::wilson;
 use crate::model::{FittedEffect, Library, System};
 
-/// What the search makes of logs simulated from the accepted model, with the torques and the noise of the user's.
+/// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// What was named in each simulation of the accepted model: every one a false alarm.
     pub named: Vec<Vec<FittedEffect>>,
-    /// In how many of them something was left that nothing explains.
+    /// Number of them with a significant unexplained remainder.
     pub unexplained: usize,
     pub limits: Vec<DetectionLimit>,
     /// Effects were hidden at this multiple of their smallest size.
@@ -149,7 +149,7 @@ fn declared(system: &System, accepted: &Fitted) -> System {
     declared
 }
 
-/// The whole search, once again and again.
+/// Repeats the whole search.
 struct Repeat<'a> {
     study: &'a Study<'a>,
     library: &'a Library,

@@ -10,8 +10,8 @@ use crate::model::FittedEffect;
 /// The training logs as they would be if an accepted model were the truth.
 ///
 /// A rig that balances upright cannot be simulated open loop over a whole log. Each window is simulated
-/// from its fitted start state instead, under the logged torques, and the windows stand apart in time:
-/// whatever cuts such logs into windows finds these again, and no motion leaps within one.
+/// from its fitted start state instead, under the logged torques, and the windows are set apart in time:
+/// cutting such logs into windows finds the same windows again, and no motion jumps within one.
 pub(super) struct SimulatedLogs<'a> {
     study: &'a Study<'a>,
     accepted: &'a Fitted,

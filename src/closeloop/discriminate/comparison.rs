@@ -49,7 +49,7 @@ impl Hypothesis {
         }
     }
 
-    /// What it says the rig does; `None` where it diverges.
+    /// The motion that it predicts; `None` where it diverges.
     fn simulate(&self, motions: &[Motion], window_s: f64) -> Option<Record> {
         Record::of(motions, &self.dynamics, &self.values, window_s)
     }
@@ -79,7 +79,7 @@ impl Hypothesis {
     }
 }
 
-/// One of two explanations taken for the truth, the other for what is to be told from it.
+/// Two explanations, of which one is simulated as the truth and the other is fitted to it.
 pub(super) struct Comparison<'a> {
     study: &'a Study<'a>,
     truth: Hypothesis,
@@ -97,7 +97,7 @@ pub(super) struct Comparison<'a> {
     inflation: f64,
 }
 
-/// What came of simulating one experiment.
+/// The result of simulating one experiment.
 pub(super) struct Trial {
     /// What to do.
     pub text: String,
@@ -135,7 +135,7 @@ impl<'a> Comparison<'a> {
         let loss = loss_of(&found);
         let windows = study.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
-        // The logs did not tell, whatever the noise says: they hold no more than was needed.
+        // The present logs did not discriminate, whatever the noise suggests: they hold no more than was needed.
         let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
         let differences = differences(&shooting, &other, &found, 0);
         Some(Self {

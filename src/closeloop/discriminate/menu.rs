@@ -2,7 +2,7 @@ use super::motion::Motion;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 
-/// What drives the rig.
+/// The torque of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drive {
     /// The logged torque times a factor, run off at another pace.
@@ -35,9 +35,9 @@ struct MenuItem {
     text: &'static str,
     drive: Drive,
     start: Start,
-    /// Rows in place of one.
+    /// Rows in place of each row.
     finer: u32,
-    /// Worth its name only where the joint goes round.
+    /// Applies only where the joint makes full turns.
     turns: bool,
 }
 
@@ -79,7 +79,7 @@ const fn turning(text: &'static str, torque: f64) -> MenuItem {
     }
 }
 
-/// Smallest changes of what the user does already first.
+/// Ordered by how little each changes the user's own experiment.
 const MENU: [MenuItem; 12] = [
     AS_LOGGED,
     MenuItem {
@@ -125,7 +125,7 @@ const MENU: [MenuItem; 12] = [
 pub(super) struct Experiment {
     pub text: String,
     pub motions: Vec<Motion>,
-    /// A joint that must go round.
+    /// A joint that must make a full turn.
     pub turns: Option<usize>,
 }
 
@@ -267,7 +267,7 @@ impl MenuItem {
     }
 }
 
-/// The torques with some more on one joint.
+/// The torques with an additional torque on one joint.
 fn with(torques: impl Iterator<Item = f64>, joint: usize, more: f64) -> Vec<f64> {
     let mut torques: Vec<f64> = torques.collect();
     torques[joint] += more;
@@ -286,7 +286,7 @@ fn triangle(phase: f64) -> f64 {
     }
 }
 
-/// Whether the logs show the joint going round.
+/// Whether the logs show full turns of the joint.
 fn goes_round(study: &Study<'_>, joint: usize) -> bool {
     study
         .logs

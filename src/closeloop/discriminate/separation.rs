@@ -28,7 +28,7 @@ pub struct Separation {
 
 /// The experiment that would tell a rival from the model chosen, by T-optimality (Atkinson and Fedorov 1975): each
 /// experiment of the menu is simulated with one of the two, the other is refitted to it and to the present logs
-/// together, all its parameters and start states free, and what then still differs is weighed against the noise.
+/// together, all its parameters and start states free, and the remaining difference is compared with the noise.
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
 pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
@@ -85,7 +85,7 @@ impl Separation {
 }
 
 impl Trial {
-    /// What the best experiment has least of: seconds, as far as they matter.
+    /// Length in s by which experiments are ranked: short ones are equal.
     fn worth(&self, settings: &DiscriminateSettings) -> f64 {
         self.seconds.max(settings.short_s)
     }

@@ -5,7 +5,7 @@ use crate::closeloop::study::Study;
 use crate::data::Log;
 use crate::identify::{FitError, Shooting, Window, cut, fit};
 
-/// What the model lacks over one short stretch of a log: the constant generalised force that, added to
+/// The residual force of a model over one short stretch of a log: the constant generalised force that, added to
 /// the torque, makes the model follow the logged positions best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForceSample {

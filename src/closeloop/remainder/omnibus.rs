@@ -19,7 +19,7 @@ pub struct Omnibus {
     pub p_value: f64,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
     pub shares: Vec<f64>,
-    /// What of the declared model's residual variance above noise is still there.
+    /// Share of the declared model's residual variance above noise that remains.
     pub fraction: f64,
 }
 
@@ -79,12 +79,12 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
     }
 }
 
-/// One window: its residual, and what the test needs to know of the fit and the sensor there.
+/// The residual of one window, with the fit and the sensor there.
 struct Window {
     joints: usize,
     /// In m or rad, `[row * joints + joint]`.
     residual: DVector<f64>,
-    /// What changes of the start state can do to the residual: orthonormal columns.
+    /// Basis of the residual's changes with the start state: orthonormal columns.
     absorbed: DMatrix<f64>,
     /// Smooth waves over the rows of the window: orthonormal columns.
     waves: DMatrix<f64>,
@@ -146,7 +146,7 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
         let sensor = |j: usize| {
             let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
             let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
-            // Where the audit sees neither, any noise will do: shares do not depend on its size.
+            // Where the audit finds neither, any noise will do: shares do not depend on its size.
             [
                 if step > 0.0 {
                     noise
@@ -173,9 +173,9 @@ fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
 }
 
 impl Window {
-    /// What the sensor adds to the model's positions.
+    /// A draw of the error that the sensor adds to the model's positions.
     fn noise(&self, rng: &mut impl Rng) -> DVector<f64> {
-        // Where within a step of the encoder the zero lies is not known to the fraction that matters.
+        // The zero's place within a step of the encoder is unknown.
         let phases: Vec<f64> = (0..self.joints).map(|_| rng.random()).collect();
         DVector::from_fn(self.positions.len(), |i, _| {
             let [noise, step] = self.sensor[i % self.joints];
@@ -191,7 +191,7 @@ impl Window {
         })
     }
 
-    /// Smooth and whole energy of what the fit of the start state leaves of `signal`, one each a joint.
+    /// Slow and total energy of what the fit of the start state leaves of `signal`, one each a joint.
     fn energies(&self, signal: &DVector<f64>) -> Vec<[f64; 2]> {
         let left = signal - &self.absorbed * (self.absorbed.tr_mul(signal));
         (0..self.joints)
@@ -258,7 +258,7 @@ impl NoiseShare {
         }
     }
 
-    /// In deviations.
+    /// In standard deviations.
     fn excess(&self, share: f64) -> f64 {
         (share - self.mean) / self.deviation.max(f64::MIN_POSITIVE)
     }

@@ -8,7 +8,7 @@ use crate::data::statistics::{mean, standard_error};
 use crate::identify::uncertainty;
 use crate::model::FittedEffect;
 
-/// What speaks for one candidate beside the effects that a model has already.
+/// The evidence for one candidate beside the effects that a model already has.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// The model with this candidate, fitted.
@@ -35,7 +35,7 @@ impl Evidence {
     }
 
     /// Judge a model whose last effect is the candidate against the one without it, by their losses on `folds`.
-    /// `None` where the fitted values make no sense together.
+    /// `None` where the fitted values are inconsistent with each other.
     pub(super) fn of(
         study: &Study<'_>,
         model: Fitted,
@@ -59,7 +59,7 @@ impl Evidence {
         })
     }
 
-    /// Whether the losses on left-out stretches do not tell this candidate from a better one.
+    /// Whether the losses on left-out stretches do not distinguish this candidate from a better one.
     pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
         let differences = differences(&self.losses, &best.losses);
         mean(&differences) <= settings.as_good * standard_error(&differences)

@@ -10,7 +10,7 @@ use super::force::ForceSample;
 use crate::closeloop::settings::CurveSettings;
 use crate::identify::{BLOCK_S, stretches};
 
-/// The residual force of a joint as a smooth curve over one variable, the others' shares taken off.
+/// The residual force of a joint as a smooth curve over one variable, without the shares of the other variables.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curve {
     /// Counted from 1.
@@ -22,12 +22,12 @@ pub struct Curve {
     pub x: Vec<f64>,
     /// In N m (or N).
     pub force: Vec<f64>,
-    /// Ends of the pointwise 95 % band.
+    /// Limits of the pointwise 95 % confidence band.
     pub low: Vec<f64>,
     pub high: Vec<f64>,
 }
 
-/// A variable that a force may follow.
+/// A variable that a force may depend on.
 struct Variable {
     name: &'static str,
     /// On a turning joint and on a sliding one.
@@ -59,7 +59,7 @@ const VARIABLES: [Variable; 4] = [
 ];
 
 /// One curve for each joint and each variable that takes more than one value; none for logs too short to give
-/// a band. The curves of a joint are fitted together, so that none borrows the shape of another.
+/// a band. The curves of a joint are fitted together, so that none takes on the shape of another.
 pub(super) fn curves(
     samples: &[ForceSample],
     prismatic: &[bool],
