@@ -27,7 +27,7 @@ pub enum PlantError {
     Diverged { time_s: f64 },
 }
 
-/// A rig to simulate: a model, its true parameters and hidden effects, how it is driven and measured.
+/// A rig to simulate: its model, true parameters, hidden effects, excitation and sensors.
 #[derive(Debug, Clone)]
 pub struct Plant {
     pub system: System,
@@ -39,15 +39,15 @@ pub struct Plant {
     pub recording: Recording,
 }
 
-/// How the rig is measured.
+/// The sensors of the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
-    /// Rows a second.
+    /// Sampling rate in Hz.
     pub rate_hz: f64,
     /// Standard deviation of the noise on the angles, in rad (or m).
     pub position_noise: f64,
-    /// Step of the encoder in rad (or m); 0 for none.
+    /// Resolution of the encoder in rad (or m); 0 for continuous measurements.
     pub position_step: f64,
 }
 
@@ -80,12 +80,12 @@ pub struct HiddenEffect {
     pub name: String,
     /// Counted from 1.
     pub joint: usize,
-    /// Of its parameters; those that are not given are at their typical value.
+    /// Values of its parameters; the others have their typical values.
     #[serde(flatten)]
     pub values: BTreeMap<String, f64>,
 }
 
-/// Rates, torques and times of a desk-sized rig, for a plant that is given as a model file alone.
+/// Sensors, excitation and recording of a desktop rig, for a plant that is given as a model file alone.
 const USUAL_SENSOR: Sensor = Sensor {
     rate_hz: 100.0,
     position_noise: 1e-3,
@@ -96,8 +96,8 @@ const USUAL_SENSOR: Sensor = Sensor {
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/configs/plants");
 
 impl Plant {
-    /// Read a plant file or, where there is no such file, take the embedded plant of that name. For a model file (or
-    /// the name of an embedded system) it is the rig that it declares with a usual sensor and drive.
+    /// Read a plant file, or take the embedded plant of that name. A model file, or the name of an embedded system,
+    /// gives the rig that the model declares, with the sensors and excitation of a desktop rig.
     ///
     /// # Errors
     /// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
@@ -207,7 +207,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Let effects act.
+    /// Add effects.
     ///
     /// # Errors
     /// As [`Plant::add_effect`].
@@ -219,7 +219,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Let an effect act on a joint (counted from 1); parameters that are not given are at their typical value.
+    /// Add an effect on a joint (counted from 1). Parameters that are not given have their typical values.
     ///
     /// # Errors
     /// Unknown effect, joint or parameter, with what is known.
