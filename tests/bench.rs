@@ -40,7 +40,7 @@ fn true_value(mechanics: &Mechanics, name: &str) -> Option<f64> {
 /// The library's effect with the true numbers, where it is one of force, torque, angle or inertia.
 fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     let effect = library.effect(&hidden.name).ok()?;
-    let mut known = FittedEffect::absent(effect, hidden.joint - 1);
+    let mut known = FittedEffect::absent(effect, hidden.joint);
     for (slot, parameter) in known.values.iter_mut().zip(&effect.parameters) {
         slot.0 = *hidden.values.get(&parameter.name)?;
     }

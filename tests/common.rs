@@ -7,7 +7,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use residyn::data::Log;
+use residyn::data::{Joint, Log};
 use residyn::expr::{Graph, Program, SignForm};
 use residyn::lanes::Row;
 use residyn::model::{
@@ -31,7 +31,7 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
     assert_eq!(effect.parameters.len(), values.len());
     FittedEffect {
         effect: effect.clone(),
-        joint,
+        joint: Joint::at(joint),
         values: values.iter().map(|value| (*value, None)).collect(),
         own: Vec::new(),
         fixed: false,
@@ -93,7 +93,7 @@ pub fn catalog(sign: SignForm) -> Vec<Case> {
                         "{} with {} on joint {}",
                         system.name,
                         effect.name,
-                        joint + 1
+                        Joint::at(joint)
                     ),
                     dynamics: dynamics(&system, &effects, sign),
                 }

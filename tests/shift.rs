@@ -109,7 +109,7 @@ fn what_is_fixed_may_be_shifted_but_not_gravity() {
     let found: Vec<(String, usize)> = read(&fixed)
         .shifts()
         .iter()
-        .map(|shift| (shift.effect.parameters[0].name.clone(), shift.joint))
+        .map(|shift| (shift.effect.parameters[0].name.clone(), shift.joint.index()))
         .collect();
     // The first link moves with the first joint alone; whatever else there is turns with the second.
     let wanted = [

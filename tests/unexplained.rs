@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use residyn::closeloop::{Proposal, Study, Unexplained, proposal, unexplained};
-use residyn::data::Log;
+use residyn::data::{Joint, Log};
 use residyn::model::{FittedEffect, Library, System};
 use residyn::plant::Plant;
 
@@ -56,7 +56,7 @@ fn declared(effects: &[&str]) -> System {
     let mut system = library.system(Path::new("pendulum")).unwrap();
     system.parameters[0].value = -17.0;
     system.parameters[1].value = 4.0;
-    let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), 0);
+    let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0));
     system.effects = effects.iter().map(absent).collect();
     system
 }

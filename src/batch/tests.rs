@@ -4,6 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Rollouts, Rows, W};
+use crate::data::Joint;
 use crate::expr::SignForm;
 use crate::lanes::Row;
 use crate::model::{
@@ -164,7 +165,7 @@ fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
     let effects: Vec<_> = filters
         .iter()
         .map(|(name, joint, value)| {
-            let mut effect = FittedEffect::absent(library.effect(name).unwrap(), *joint);
+            let mut effect = FittedEffect::absent(library.effect(name).unwrap(), Joint::at(*joint));
             effect.values[0].0 = *value;
             effect
         })

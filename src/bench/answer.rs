@@ -57,7 +57,7 @@ fn named(finding: &Finding) -> Named {
 
 fn label_of(effect: &FittedEffect) -> Label {
     let (name, parameters) = (&effect.effect.name, &effect.effect.parameters);
-    label(name, effect.joint + 1, &parameters[0].name)
+    label(name, effect.joint, &parameters[0].name)
 }
 
 fn estimate(name: &str, parameter: &Parameter) -> Estimate {

@@ -81,7 +81,7 @@ impl Cell {
         let mut offset = [0.0; 2];
         for effect in &self.effects {
             if effect.name == "sensor_offset" {
-                offset[effect.joint - 1] = effect.values["q_z"] * rng.random_range(-1.0..=1.0);
+                offset[effect.joint] = effect.values["q_z"] * rng.random_range(-1.0..=1.0);
             }
         }
         offset

@@ -10,13 +10,13 @@ use super::judge::{Label, label};
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use super::transmission::Transmission;
+use crate::data::Joint;
 
 /// One effect that a rig has and its model does not declare.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hidden {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// Its numbers, in N m, rad and s; of a shift, the parameter's true value; of a sensor's offset, the
     /// spread `q_z` over the logs.
     #[serde(flatten)]
@@ -65,14 +65,14 @@ impl Machine {
 
     fn add(&mut self, hidden: &Hidden) -> Result<(), String> {
         let joints = self.joints();
-        if !(1..=joints).contains(&hidden.joint) {
+        if !hidden.joint.is_of(joints) {
             let name = &hidden.name;
             return Err(format!("`{name}`: `joint` is from 1 to {joints}"));
         }
         if hidden.name == "parameter_shift" {
             return self.shift(hidden);
         }
-        let j = hidden.joint - 1;
+        let j = hidden.joint.index();
         let mut numbers = Numbers {
             of: hidden,
             left: hidden.values.clone(),
@@ -172,11 +172,12 @@ mod tests {
     use crate::bench::drive::Approach;
     use crate::bench::machine::{Machine, State};
     use crate::bench::mechanics::tests::double_pendulum;
+    use crate::data::Joint;
 
     fn hidden(name: &str, values: &[(&str, f64)]) -> Hidden {
         Hidden {
             name: name.to_owned(),
-            joint: 1,
+            joint: Joint::at(0),
             values: values
                 .iter()
                 .map(|(name, value)| ((*name).to_owned(), *value))

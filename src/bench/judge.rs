@@ -10,11 +10,12 @@ use super::hidden::Hidden;
 use super::mechanics::Pair;
 use super::recording::log_name;
 use crate::closeloop::Verdict;
+use crate::data::Joint;
 
-/// `coulomb_friction@1`, the joint counted from 1; of a shift `parameter_shift(m1)`.
+/// `coulomb_friction@1`; of a shift `parameter_shift(m1)`.
 pub type Label = String;
 
-pub fn label(name: &str, joint: usize, parameter: &str) -> Label {
+pub fn label(name: &str, joint: Joint, parameter: &str) -> Label {
     match name {
         "parameter_shift" => format!("{name}({parameter})"),
         _ => format!("{name}@{joint}"),
@@ -109,8 +110,7 @@ fn values(effect: &Hidden, offsets: &[Pair]) -> BTreeMap<String, f64> {
     if effect.name != "sensor_offset" {
         return effect.values.clone();
     }
-    let in_log =
-        |(k, offset): (usize, &Pair)| (of_log("q_z", &log_name(k)), offset[effect.joint - 1]);
+    let in_log = |(k, offset): (usize, &Pair)| (of_log("q_z", &log_name(k)), offset[effect.joint]);
     offsets.iter().enumerate().map(in_log).collect()
 }
 
@@ -364,7 +364,7 @@ mod tests {
     fn an_offset_is_asked_for_in_each_log() {
         let hidden = Hidden {
             name: "sensor_offset".to_owned(),
-            joint: 2,
+            joint: Joint::at(1),
             values: [("q_z".to_owned(), 0.1)].into(),
         };
         let values = values(&hidden, &[[0.0, 0.05], [0.0, -0.02]]);

@@ -33,7 +33,7 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     if hidden.name == "parameter_shift" {
         return shift(study.system, hidden);
     }
-    let joint = hidden.joint - 1;
+    let joint = hidden.joint;
     let effect = library.effect(&hidden.name).ok()?;
     let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
     let mut fitted = FittedEffect::absent(&effect, joint);

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::inputs::{self, Source};
 use super::{Answer, Common};
-use crate::data::{LeaveOut, Log};
+use crate::data::{Joint, LeaveOut, Log};
 use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
 use crate::model::{Dynamics, System};
 
@@ -132,15 +132,14 @@ fn table(summary: &Summary) -> String {
     let mut out =
         String::from("horizon  joint  windows  position rmse    median  velocity rmse  diverged\n");
     for (h, horizon) in summary.horizons_s.iter().enumerate() {
-        for j in 0..summary.position_rmse[h].len() {
+        for joint in Joint::all(summary.position_rmse[h].len()) {
             let _ = writeln!(
                 out,
-                "{horizon:>5} s  {:>5}  {:>7}  {:>13.6}  {:>8.6}  {:>13.6}  {:>8}",
-                j + 1,
+                "{horizon:>5} s  {joint:>5}  {:>7}  {:>13.6}  {:>8.6}  {:>13.6}  {:>8}",
                 summary.windows[h],
-                summary.position_rmse[h][j],
-                summary.position_median[h][j],
-                summary.velocity_rmse[h][j],
+                summary.position_rmse[h][joint],
+                summary.position_median[h][joint],
+                summary.velocity_rmse[h][joint],
                 summary.diverged[h]
             );
         }

@@ -102,7 +102,7 @@ fn plants(library: &Library) -> Result<(String, serde_json::Value)> {
     for name in Plant::names() {
         let plant = Plant::read(Path::new(name), library)?;
         let effects: Vec<String> = (plant.effects.iter())
-            .map(|e| format!("{} on joint {}", e.effect.name, e.joint + 1))
+            .map(|e| format!("{} on joint {}", e.effect.name, e.joint))
             .collect();
         let with = if effects.is_empty() {
             "no effects".to_owned()

@@ -2,7 +2,8 @@ use rayon::prelude::*;
 
 use super::per_log::values_on;
 use super::study::{Fitted, Study};
-use crate::identify::{Shooting, promise};
+use crate::data::Joint;
+use crate::identify::{Shooting, predicted_cost};
 use crate::model::{Effect, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
@@ -22,7 +23,7 @@ pub fn candidates(
 pub(super) fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in effects {
-        for joint in 0..study.system.joints {
+        for joint in Joint::all(study.system.joints) {
             if is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
             {
@@ -38,7 +39,7 @@ pub(super) fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect>
 }
 
 /// Effects of the torque cannot be seen where there is none.
-fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
+fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: Joint) -> bool {
     !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
 }
 
@@ -96,7 +97,7 @@ fn promised(
     let dynamics = study.system.dynamics_with(&effects, &study.sign);
     let values = values_on(study.logs, &model.declared, &effects);
     let (active, scale) = (study.active(&dynamics), model.fit.scale);
-    promise(shooting, &dynamics, &active, values, locals, scale)
+    predicted_cost(shooting, &dynamics, &active, values, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares

@@ -3,13 +3,13 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::residual::ForceSample;
+use crate::data::Joint;
 use crate::identify::{BLOCK_S, stretches};
 
 /// The residual force of a joint as a smooth curve over one variable, the others' shares taken off.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curve {
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// `q1`, `qd1`, `tau1` or `t`.
     pub variable: String,
     /// Of the variable.
@@ -27,7 +27,7 @@ struct Variable {
     name: &'static str,
     /// On a turning joint and on a sliding one.
     units: [&'static str; 2],
-    value: fn(&ForceSample, usize) -> f64,
+    value: fn(&ForceSample, Joint) -> f64,
 }
 
 const VARIABLES: [Variable; 4] = [
@@ -77,8 +77,7 @@ pub fn curves(samples: &[ForceSample], prismatic: &[bool]) -> Vec<Curve> {
     if blocks.last().is_none_or(|last| last + 1 < FEWEST_STRETCHES) {
         return Vec::new();
     }
-    let joints = 0..prismatic.len();
-    joints
+    Joint::all(prismatic.len())
         .flat_map(|joint| of_joint(samples, &blocks, joint, prismatic[joint]))
         .collect()
 }
@@ -86,7 +85,7 @@ pub fn curves(samples: &[ForceSample], prismatic: &[bool]) -> Vec<Curve> {
 fn of_joint(
     samples: &[ForceSample],
     blocks: &[usize],
-    joint: usize,
+    joint: Joint,
     prismatic: bool,
 ) -> Vec<Curve> {
     let bases: Vec<(&Variable, Basis)> = VARIABLES
@@ -107,12 +106,12 @@ fn of_joint(
         .map(|(k, (variable, basis))| {
             let numbered = match variable.name {
                 "t" => "t".to_owned(),
-                name => format!("{name}{}", joint + 1),
+                stem => joint.name(stem),
             };
             fit.curve(
                 k,
                 basis,
-                joint + 1,
+                joint,
                 numbered,
                 variable.units[usize::from(prismatic)],
             )
@@ -244,7 +243,7 @@ impl Additive {
         &self,
         k: usize,
         basis: &Basis,
-        joint: usize,
+        joint: Joint,
         variable: String,
         unit: &'static str,
     ) -> Curve {

@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use super::study::{Fitted, Study};
-use crate::data::audit;
+use crate::data::{Joint, audit};
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,12 +21,12 @@ pub struct Omnibus {
 }
 
 impl Omnibus {
-    /// The joint (counted from 0) with the largest share, and that share.
-    pub fn most(&self) -> (usize, f64) {
-        let shares = self.shares.iter().copied().enumerate();
+    /// The joint with the largest share, and that share.
+    pub fn most(&self) -> (Joint, f64) {
+        let shares = Joint::all(self.shares.len()).zip(self.shares.iter().copied());
         shares
             .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((0, 0.0))
+            .unwrap_or((Joint::at(0), 0.0))
     }
 }
 

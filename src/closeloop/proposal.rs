@@ -8,13 +8,14 @@ use super::evidence::gain;
 use super::folds::{folds, left_out_losses};
 use super::study::{Fitted, Study};
 use super::unexplained::{NOTEWORTHY, Unexplained};
+use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// A formula for what is left: a proposal to think about, no finding. Nothing but its fit speaks for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     /// Force in N m (or N), such as `-0.0012 * qd1^3`.
     pub formula: String,
     /// Share of the loss that noise does not explain which it takes away, on stretches left out of its fit.
@@ -108,7 +109,7 @@ struct Sum {
 fn longer(
     study: &Study<'_>,
     model: &Fitted,
-    joint: usize,
+    joint: Joint,
     terms: &[Term],
     folds: &[usize],
 ) -> Option<Sum> {

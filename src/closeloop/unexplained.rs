@@ -7,6 +7,7 @@ use super::evidence::{gain, p_value};
 use super::folds::{folds, left_out_losses};
 use super::omnibus::{Omnibus, omnibus};
 use super::study::{Fitted, Study};
+use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// What is left when no effect helps any more.
@@ -20,8 +21,8 @@ pub struct Unexplained {
     /// The variable over which most of it lives: `q1`, `qd2`, `tau1`, `t`, products of them such as `q1*qd1`,
     /// `unknown` where it follows none of them, `none` where nothing that matters is left.
     pub place: String,
-    /// The joint (counted from 0) where most of it is.
-    pub joint: usize,
+    /// The joint where most of it is.
+    pub joint: Joint,
     pub omnibus: Omnibus,
     pub probes: Vec<Probed>,
 }
@@ -32,9 +33,8 @@ pub struct Probed {
     /// The variables it asked about.
     #[serde(rename = "where")]
     pub place: String,
-    /// Counted from 0.
     #[serde(skip)]
-    pub joint: usize,
+    pub joint: Joint,
     /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
     pub p_value: f64,
     /// Fall of the loss on left-out stretches, as a share.
@@ -109,7 +109,7 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
 }
 
 /// The variable and the joint of the probe that saves most; one test among all probes and the omnibus test.
-fn place(omnibus: &Omnibus, probed: &[Probed]) -> (String, usize) {
+fn place(omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
     #[allow(clippy::cast_precision_loss)] // few probes
     let level = 0.5 * SIGNIFICANT / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
@@ -129,7 +129,7 @@ fn place(omnibus: &Omnibus, probed: &[Probed]) -> (String, usize) {
 fn variables(probe: &FittedEffect) -> String {
     let numbered = |name: &str| match name {
         "t" => name.to_owned(),
-        own => format!("{own}{}", probe.joint + 1),
+        own => probe.joint.name(own),
     };
     let names: Vec<String> = probe.effect.name.split('*').map(numbered).collect();
     names.join("*")

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use crate::data::{Interval, Log};
+use crate::data::{Interval, Joint, Log};
 use crate::expr::Graph;
 use crate::identify::{FitError, Shooting, cut, fit};
 use crate::model::{Dynamics, Parameter};
@@ -99,9 +99,9 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         .collect();
     let mut parameters = dynamics.parameters.clone();
     let logged = inputs[..n].to_vec();
-    for (joint, input) in inputs[..n].iter_mut().enumerate() {
+    for (joint, input) in Joint::all(n).zip(&mut inputs[..n]) {
         // No formula can hold such a name, so none is taken.
-        let name = format!("offset of q{}", joint + 1);
+        let name = format!("offset of q{joint}");
         let offset = graph.input(&name);
         *input = graph.sub(*input, offset);
         parameters.push(Parameter {

@@ -324,10 +324,10 @@ impl Session {
     }
 }
 
-/// An effect of a plant: name, joint counted from 1, values.
+/// An effect of a plant: name, joint, values.
 fn effect(effect: &FittedEffect) -> Value {
     let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
-    json!([effect.effect.name, effect.joint + 1, values])
+    json!([effect.effect.name, effect.joint, values])
 }
 
 /// Say in `dir` what is done there, or find that it is this.

@@ -195,7 +195,7 @@ impl Equations {
             filters: (equations.filters.iter())
                 .map(|filter| {
                     let name = &equations.parameters[filter.parameter].name;
-                    json!({"joint": filter.joint + 1, "kind": filter.kind, "parameter": name})
+                    json!({"joint": filter.joint, "kind": filter.kind, "parameter": name})
                 })
                 .collect(),
             held: HeldFilter::all(model),

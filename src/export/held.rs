@@ -3,13 +3,15 @@ use serde::{Serialize, Serializer};
 use crate::model::CommandFilter;
 
 use super::Portable;
+use crate::data::Joint;
 
 /// What the filters of one joint make of torques that are held over equal steps. They are linear: everything is a sum
 /// of what the lag has come to and of two of the torques commanded so far.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldFilter {
-    /// Counted from 0.
-    pub joint: usize,
+    /// Written as the place in a list of torques, from 0: that is how readers of a step use it.
+    #[serde(serialize_with = "as_index")]
+    pub joint: Joint,
     /// How many earlier torques matter; the last of them is the one that acts first.
     pub past: usize,
     /// Where in `[torque of this step, earlier ones, the newest first]` the torques stand that act when the step begins
@@ -40,7 +42,7 @@ const LEAST_REST: f64 = 1e-9;
 impl HeldFilter {
     /// The filters of a model, one for each joint that has any.
     pub fn all(model: &Portable) -> Vec<Self> {
-        let of_joint = |joint: usize| {
+        let of_joint = |joint: Joint| {
             let delay = model.filter(joint, CommandFilter::Delay);
             let lag = model.filter(joint, CommandFilter::Lag);
             (delay.is_some() || lag.is_some()).then(|| {
@@ -48,10 +50,10 @@ impl HeldFilter {
                 Self::new(joint, delay, lag, model.step_s, model.integrator.parts())
             })
         };
-        (0..model.joints()).filter_map(of_joint).collect()
+        Joint::all(model.joints()).filter_map(of_joint).collect()
     }
 
-    fn new(joint: usize, delay: f64, lag: Option<f64>, step_s: f64, parts: usize) -> Self {
+    fn new(joint: Joint, delay: f64, lag: Option<f64>, step_s: f64, parts: usize) -> Self {
         let (whole, rest) = split(delay / step_s);
         let change = rest * step_s;
         // What the lag has come to, as the step goes on.
@@ -114,6 +116,10 @@ fn split(steps: f64) -> (usize, f64) {
     (whole, if rest < LEAST_REST { 0.0 } else { rest })
 }
 
+fn as_index<S: Serializer>(joint: &Joint, serializer: S) -> Result<S::Ok, S::Error> {
+    joint.index().serialize(serializer)
+}
+
 impl Serialize for Sum {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         [self.lagged, self.first, self.then].serialize(serializer)
@@ -146,11 +152,12 @@ impl Sum {
 #[cfg(test)]
 mod tests {
     use super::HeldFilter;
+    use crate::data::Joint;
 
     #[test]
     fn a_delay_of_whole_steps_is_an_earlier_torque() {
         for (delay, past) in [(0.0, 0), (0.04, 2), (0.06, 3)] {
-            let filter = HeldFilter::new(0, delay, None, 0.02, 2);
+            let filter = HeldFilter::new(Joint::at(0), delay, None, 0.02, 2);
             assert_eq!((filter.past, filter.places), (past, [past, past]));
             assert!(filter.mean.iter().all(|sum| (sum.then - 1.0).abs() < 1e-12));
         }
@@ -158,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_torque_takes_its_place_within_the_step() {
-        let filter = HeldFilter::new(0, 0.025, None, 0.02, 1);
+        let filter = HeldFilter::new(Joint::at(0), 0.025, None, 0.02, 1);
         assert_eq!((filter.past, filter.places), (2, [2, 1]));
         let mean = filter.mean[0];
         assert!((mean.first - 0.25).abs() < 1e-12 && (mean.then - 0.75).abs() < 1e-12);
@@ -166,7 +173,7 @@ mod tests {
 
     #[test]
     fn factors_of_a_constant_torque_come_to_one() {
-        let filter = HeldFilter::new(0, 0.03, Some(0.05), 0.02, 3);
+        let filter = HeldFilter::new(Joint::at(0), 0.03, Some(0.05), 0.02, 3);
         for sum in filter.mean.iter().chain([&filter.end]) {
             assert!(
                 (sum.lagged + sum.first + sum.then - 1.0).abs() < 1e-12,

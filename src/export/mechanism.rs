@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{CarriedEffect, ExportError, File, Portable};
+use crate::data::Joint as Number;
 use crate::expr::SignForm;
 use crate::mechanism::{Inertia, Joint, Pose, Spring, recover, rounded};
 
@@ -90,8 +91,10 @@ impl Rig {
                 .map_or(0.0, |p| p.value)
         };
         let values: Vec<f64> = effect.parameters.iter().map(value).collect();
-        let k = effect.joint - 1;
-        let (joint, drive) = (&mut self.joints[k], &mut self.drives[k]);
+        let (joint, drive) = (
+            &mut self.joints[effect.joint],
+            &mut self.drives[effect.joint],
+        );
         match (effect.name.as_str(), &values[..]) {
             ("viscous_friction", [b]) => joint.drivetrain.damping += b,
             ("coulomb_friction", [level]) => joint.drivetrain.friction += level,
@@ -118,11 +121,10 @@ impl Rig {
 
     /// What is added to a torque is added before its limit there, and after it here.
     fn note_conflicts(&mut self) {
-        for (k, drive) in self.drives.iter_mut().enumerate() {
+        for (joint, drive) in Number::all(self.joints.len()).zip(&mut self.drives) {
             if drive.limit.is_some() && drive.constant != 0.0 {
                 self.limits.push(format!(
-                    "constant_torque on joint {}, beside the limit of its drive",
-                    k + 1
+                    "constant_torque on joint {joint}, beside the limit of its drive"
                 ));
                 drive.constant = 0.0;
             }

@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::prediction::Prediction;
 use super::{Answers, Samples};
+use crate::data::Joint;
 use crate::model::{
     CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
     nothing_but, with_residual,
@@ -34,8 +35,7 @@ pub struct Portable {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CarriedEffect {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     pub expression: String,
     pub parameters: Vec<String>,
 }
@@ -124,8 +124,8 @@ impl Portable {
         }
     }
 
-    /// Unit of a joint's (counted from 0) position, and of its torque.
-    pub fn units(&self, joint: usize) -> [&'static str; 2] {
+    /// Unit of a joint's position, and of its torque.
+    pub fn units(&self, joint: Joint) -> [&'static str; 2] {
         if self.system.prismatic[joint] {
             ["m", "N"]
         } else {
@@ -185,8 +185,8 @@ impl Portable {
         shown.into_iter().chain(own).collect()
     }
 
-    /// The time constant of a filter on a joint (counted from 0) in s, where the model has such a filter.
-    pub fn filter(&self, joint: usize, kind: CommandFilter) -> Option<f64> {
+    /// The time constant of a filter on a joint in s, where the model has such a filter.
+    pub fn filter(&self, joint: Joint, kind: CommandFilter) -> Option<f64> {
         let mut filters = self.equations.filters.iter();
         let filter = filters.find(|filter| filter.joint == joint && filter.kind == kind)?;
         Some(self.equations.parameters[filter.parameter].value)
@@ -261,7 +261,7 @@ fn carried(system: &System, equations: &Dynamics) -> Vec<CarriedEffect> {
         let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
         CarriedEffect {
             name: effect.effect.name.clone(),
-            joint: effect.joint + 1,
+            joint: effect.joint,
             expression: effect.expression(&names),
             parameters: names,
         }

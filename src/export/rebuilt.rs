@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::prediction::Prediction;
 use super::{Answers, Samples, Unread};
+use crate::data::Joint;
 use crate::expr::{Graph, Node, Program};
 use crate::model::{CommandFilter, Dynamics, Filter, Integrator, ModelWeights, with_residual};
 use crate::train::Shape;
@@ -34,8 +35,7 @@ struct Equations {
 
 #[derive(Deserialize)]
 struct SavedFilter {
-    /// Counted from 1.
-    joint: usize,
+    joint: Joint,
     kind: CommandFilter,
     parameter: String,
 }
@@ -92,9 +92,8 @@ impl Equations {
     fn filters(&self, parameters: &[&str]) -> Result<Vec<Filter>, String> {
         let filter = |saved: &SavedFilter| {
             let parameter = parameters.iter().position(|name| *name == saved.parameter);
-            let joint = saved.joint.checked_sub(1);
             Ok(Filter {
-                joint: joint.ok_or("joints are counted from 1")?,
+                joint: saved.joint,
                 kind: saved.kind,
                 parameter: parameter.ok_or_else(|| format!("no parameter {}", saved.parameter))?,
             })

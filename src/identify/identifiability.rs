@@ -73,7 +73,7 @@ fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
 }
 
 fn relative_information(dynamics: &Dynamics, fit: &Fit) -> DMatrix<f64> {
-    let mut all = fit.nothing();
+    let mut all = fit.zero_equations();
     fit.reduced
         .iter()
         .for_each(|window| window.add_to(&mut all));

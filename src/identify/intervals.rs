@@ -55,8 +55,8 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let count = blocks.last().map_or(0, |last| last + 1);
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
-    let mut all = fit.nothing();
-    let mut parts = vec![fit.nothing(); count];
+    let mut all = fit.zero_equations();
+    let mut parts = vec![fit.zero_equations(); count];
     for (window, &block) in fit.reduced.iter().zip(&blocks) {
         window.add_to(&mut all);
         window.add_to(&mut parts[block]);

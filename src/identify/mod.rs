@@ -7,14 +7,18 @@
 mod fit;
 mod identifiability;
 mod intervals;
+mod levenberg_marquardt;
+mod normal_equations;
 mod sensitivity;
 mod shooting;
 mod values;
 mod window;
 
-pub use fit::{Fit, FitError, Reduced, as_it_stands, fit, promise};
+pub use fit::{Fit, FitError, as_it_stands, fit, predicted_cost};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
+pub use levenberg_marquardt::Termination;
+pub use normal_equations::Reduced;
 pub use sensitivity::Local;
 pub use shooting::{Shooting, WindowTerms};
 pub use values::{Column, Own, Values};

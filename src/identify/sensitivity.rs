@@ -55,7 +55,7 @@ impl Tangent {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
                 continue;
             };
-            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint]]);
+            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint.index()]]);
             for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
                 row[2 * n + column] = graph.mul(by_torque[0], slope);
             }

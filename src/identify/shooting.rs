@@ -467,7 +467,7 @@ mod tests {
     use std::path::Path;
 
     use super::Shooting;
-    use crate::data::Log;
+    use crate::data::{Joint, Log};
     use crate::expr::SignForm;
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
@@ -492,7 +492,7 @@ mod tests {
     fn gradients_by_effects_with_memory_are_slopes_of_the_cost() {
         let library = Library::built_in();
         let effects = ["actuator_delay", "actuator_lag", "backlash"]
-            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), 0));
+            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
         let pendulum = library.system(Path::new("pendulum")).unwrap();
         let model = pendulum.dynamics_with(&effects, &[SignForm::DEFAULT]);
         let logs = [log()];

@@ -3,6 +3,7 @@ use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
 use super::{Dynamics, Parameter};
+use crate::data::Joint;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
 impl System {
@@ -61,8 +62,8 @@ fn filters(declared: usize, effects: &[FittedEffect]) -> Vec<Filter> {
 }
 
 impl FittedEffect {
-    /// The effect on a joint (counted from 0) with all parameters zero.
-    pub fn absent(effect: &Effect, joint: usize) -> Self {
+    /// The effect on a joint with all parameters zero.
+    pub fn absent(effect: &Effect, joint: Joint) -> Self {
         Self {
             effect: effect.clone(),
             joint,
@@ -74,7 +75,7 @@ impl FittedEffect {
 
     /// What tells this effect from others in one model.
     pub fn label(&self) -> String {
-        format!("{} on joint {}", self.title(), self.joint + 1)
+        format!("{} on joint {}", self.title(), self.joint)
     }
 
     /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
@@ -88,7 +89,7 @@ impl FittedEffect {
     pub fn expression(&self, names: &[String]) -> String {
         match self.program(names) {
             Ok(program) => program.formula(0),
-            Err(filter) => filter.expression(&format!("tau{}", self.joint + 1), &names[0]),
+            Err(filter) => filter.expression(&self.joint.name("tau"), &names[0]),
         }
     }
 
@@ -106,12 +107,11 @@ impl FittedEffect {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         for name in EFFECT_NAMES {
-            let suffix = if name == "t" {
-                String::new()
-            } else {
-                (self.joint + 1).to_string()
+            let of_joint = match name {
+                "t" => name.to_owned(),
+                stem => self.joint.name(stem),
             };
-            let node = graph.input(&format!("{name}{suffix}"));
+            let node = graph.input(&of_joint);
             scope.bind(name, node);
         }
         for (parameter, name) in self.effect.parameters.iter().zip(names) {
@@ -126,10 +126,9 @@ impl FittedEffect {
 
     /// The names of the effect's parameters on its joint, told apart from names already `taken`.
     pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
-        let joint = self.joint + 1;
         let plain = |own: &str| match self.shifted() {
             Some(_) => format!("{own}_shift"),
-            None => format!("{own}{joint}"),
+            None => self.joint.name(own),
         };
         let name = |own: &str| match plain(own) {
             plain if taken.contains(&plain.as_str()) => {
@@ -165,8 +164,8 @@ impl<'a> Assembly<'a> {
     fn new(system: &'a System, effects: &'a [FittedEffect], sign: &'a [SignForm]) -> Self {
         let mut graph = Graph::new();
         let mut numbered = |stem: &str| -> Vec<Node> {
-            (1..=system.joints)
-                .map(|j| graph.input(&format!("{stem}{j}")))
+            Joint::all(system.joints)
+                .map(|joint| graph.input(&joint.name(stem)))
                 .collect()
         };
         let (q, qd, tau) = (numbered("q"), numbered("qd"), numbered("tau"));
@@ -216,7 +215,7 @@ impl<'a> Assembly<'a> {
 
     fn apply_forces(&mut self) {
         // All forces see the torque as it was before any of them.
-        let forces: Vec<(usize, Node)> = self
+        let forces: Vec<(Joint, Node)> = self
             .entries(|effect| matches!(effect.entry, Entry::Force(_)))
             .into_iter()
             .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
@@ -227,7 +226,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// The effects that enter in one way: number, joint and formula.
-    fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, usize, &'a Formula)> {
+    fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, Joint, &'a Formula)> {
         let effects = self.effects.iter().enumerate();
         let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect));
         wanted
@@ -319,10 +318,10 @@ impl<'a> Assembly<'a> {
     fn declared_scope(&mut self) -> Scope {
         let angles = self.declared_angles();
         let mut scope = Scope::new(self.narrowest_sign());
-        for j in 0..self.system.joints {
-            scope.bind(&format!("q{}", j + 1), angles[j]);
-            scope.bind(&format!("qd{}", j + 1), self.qd[j]);
-            scope.bind(&format!("tau{}", j + 1), self.tau[j]);
+        for joint in Joint::all(self.system.joints) {
+            scope.bind(&joint.name("q"), angles[joint]);
+            scope.bind(&joint.name("qd"), self.qd[joint]);
+            scope.bind(&joint.name("tau"), self.tau[joint]);
         }
         scope.bind("t", self.time);
         for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {

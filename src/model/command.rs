@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Dynamics;
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::lanes::Row;
 
 /// How a command is filtered; each kind has one parameter, in s. At zero both leave the command as it is.
@@ -38,8 +38,7 @@ impl CommandFilter {
 /// A filter of one joint's commanded torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Filter {
-    /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     pub kind: CommandFilter,
     /// Index into the model's parameters.
     pub parameter: usize,
@@ -74,7 +73,7 @@ impl<'l> Commands<'l> {
     /// The filters of `dynamics` with parameters `values`, in its order, acting on torques `tau` (`[joint][row]`)
     /// that are held from `time[row]` (s) on.
     pub fn new(dynamics: &Dynamics, values: &[f64], time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
-        let history = |joint: usize| {
+        let history = |joint: Joint| {
             let own = |kind: CommandFilter| {
                 let mut filters = dynamics.filters.iter();
                 filters.find(|filter| filter.joint == joint && filter.kind == kind)
@@ -89,7 +88,7 @@ impl<'l> Commands<'l> {
             tau,
             joints: dynamics.joints,
             filters: dynamics.filters.clone(),
-            histories: (0..dynamics.joints).map(history).collect(),
+            histories: Joint::all(dynamics.joints).map(history).collect(),
         }
     }
 
@@ -175,7 +174,7 @@ impl<const W: usize> StepTorque<W> {
         self.slopes
             .resize(parts * model.filters.len(), Row::splat(0.0));
         for lane in 0..W {
-            for joint in 0..model.joints {
+            for joint in Joint::all(model.joints) {
                 if let Some(history) = &commands[lane].histories[joint] {
                     for (part, mean) in history.means(from[lane], to[lane], parts).enumerate() {
                         self.set(lane, joint, model, part, mean);
@@ -196,8 +195,8 @@ impl<const W: usize> StepTorque<W> {
         )
     }
 
-    fn set(&mut self, lane: usize, joint: usize, model: &Commands<'_>, part: usize, mean: Mean) {
-        self.mean[part * model.joints + joint][lane] = mean.value;
+    fn set(&mut self, lane: usize, joint: Joint, model: &Commands<'_>, part: usize, mean: Mean) {
+        self.mean[part * model.joints + joint.index()][lane] = mean.value;
         for (k, filter) in model.filters.iter().enumerate() {
             if filter.joint == joint {
                 self.slopes[part * model.filters.len() + k][lane] = match filter.kind {

@@ -3,6 +3,7 @@
 use super::Parameter;
 use super::effect::{Effect, EffectParameter, Entry, Measure};
 use super::system::{FittedEffect, Motion, System};
+use crate::data::Joint;
 use crate::expr::{Formula, parse};
 
 /// The name of the effect.
@@ -27,7 +28,7 @@ impl System {
     }
 
     /// The last joint in whose equation a parameter appears, directly or through intermediates.
-    fn outermost_joint(&self, parameter: &str) -> Option<usize> {
+    fn outermost_joint(&self, parameter: &str) -> Option<Joint> {
         let mut carriers = vec![parameter];
         let carries = |formula: &Formula, carriers: &[&str]| {
             formula
@@ -40,14 +41,14 @@ impl System {
                 carriers.push(name);
             }
         }
-        let enters = |joint: &usize| match &self.motion {
+        let enters = |joint: &Joint| match &self.motion {
             Motion::Accelerations(formulas) => carries(&formulas[*joint].value, &carriers),
             Motion::MassAndBias { mass, bias } => {
                 let mut row = mass[*joint].iter().chain([&bias[*joint]]);
                 row.any(|formula| carries(&formula.value, &carriers))
             }
         };
-        (0..self.joints).rev().find(enters)
+        Joint::all(self.joints).rev().find(enters)
     }
 }
 

@@ -3,7 +3,7 @@ use std::path::Path;
 use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
 use super::{Dynamics, Parameter, sections};
-use crate::data::{Columns, Log};
+use crate::data::{Columns, Joint, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// How a model file states the motion.
@@ -29,8 +29,7 @@ pub(super) struct Energy {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedEffect {
     pub effect: Effect,
-    /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     /// One for each of the effect's parameters: value and 95 % interval.
     pub values: Vec<(f64, Option<[f64; 2]>)>,
     /// Values that single logs have of their own; where there is none, that of `values` holds.
@@ -239,13 +238,13 @@ impl System {
         })
     }
 
-    /// Whether an effect can act on a joint (counted from 0) of this system.
+    /// Whether an effect can act on a joint of this system.
     ///
     /// # Errors
     /// Why not.
-    pub fn can_carry(&self, effect: &Effect, joint: usize) -> Result<(), String> {
+    pub fn can_carry(&self, effect: &Effect, joint: Joint) -> Result<(), String> {
         let name = &effect.name;
-        if effect.first_joint_only && (joint > 0 || self.prismatic[joint]) {
+        if effect.first_joint_only && (joint.index() > 0 || self.prismatic[joint]) {
             return Err(format!(
                 "`{name}` acts on the first joint, where that turns"
             ));
@@ -270,8 +269,7 @@ impl System {
         if let Some(old) = others.find(|old| old.excludes(new)) {
             return Err(format!(
                 "`{}` acts on joint {} already",
-                old.effect.name,
-                new.joint + 1
+                old.effect.name, new.joint
             ));
         }
         let common = (0..).zip(new.values.iter().map(|(value, _)| value));

@@ -53,7 +53,7 @@ impl FittedEffect {
         match self.program(names) {
             Ok(program) => program.latex_formula(0),
             Err(filter) => {
-                let tau = latex_name(&format!("tau{}", self.joint + 1));
+                let tau = latex_name(&self.joint.name("tau"));
                 filter.latex(&tau, &latex_name(&names[0]))
             }
         }

@@ -10,6 +10,7 @@ use super::noise::Noise;
 use super::proposal::Proposal;
 use super::{Cem, Evaluate, Icem, Method, Mppi, Objective, Plan, Planner, Settings, Start};
 use crate::batch::{Rollouts, Rows, W};
+use crate::data::Joint;
 use crate::expr::SignForm;
 use crate::lanes::{Arch, Row};
 use crate::model::{Commands, Dynamics, FittedEffect, Integrator, Library, Rollout, StepTorque};
@@ -542,7 +543,7 @@ fn swung_up_late(rig: &Dynamics, model: &Dynamics) -> f64 {
 #[test]
 fn a_pendulum_is_swung_up_through_a_delay() {
     let library = Library::built_in();
-    let mut effect = FittedEffect::absent(library.effect("actuator_delay").unwrap(), 0);
+    let mut effect = FittedEffect::absent(library.effect("actuator_delay").unwrap(), Joint::at(0));
     effect.values[0].0 = 0.06;
     let late = pendulum(&[effect]);
     let [knows, does_not] = [&late, &pendulum(&[])].map(|model| swung_up_late(&late, model));

@@ -165,6 +165,7 @@ mod tests {
     use burn::tensor::{Tensor, TensorData};
 
     use super::Environment;
+    use crate::data::Joint;
     use crate::expr::SignForm;
     use crate::model::{HybridModel, Integrator, Library};
     use crate::plant::Plant;
@@ -206,7 +207,7 @@ mod tests {
         let torques = [1.0, -2.0, 3.0, 0.5, -1.5, 2.0];
         let delay = ("d".to_owned(), 0.04);
         plant
-            .add_effect(&library, "actuator_delay", 1, &[delay])
+            .add_effect(&library, "actuator_delay", Joint::at(0), &[delay])
             .unwrap();
         let (late, values) = (plant.dynamics(), plant.values());
         let steps = 4.try_into().unwrap();

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Excitation;
+use crate::data::Joint;
 use crate::expr::suggestion;
 use crate::model::{FileError, FittedEffect, Library, System};
 
@@ -77,8 +78,7 @@ struct File {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HiddenEffect {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// Of its parameters; those that are not given are at their typical value.
     #[serde(flatten)]
     pub values: BTreeMap<String, f64>,
@@ -219,7 +219,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Let an effect act on a joint (counted from 1); parameters that are not given are at their typical value.
+    /// Let an effect act on a joint; parameters that are not given are at their typical value.
     ///
     /// # Errors
     /// Unknown effect, joint or parameter, with what is known.
@@ -227,11 +227,11 @@ impl Plant {
         &mut self,
         library: &Library,
         name: &str,
-        joint: usize,
+        joint: Joint,
         values: &[(String, f64)],
     ) -> Result<(), PlantError> {
         let effect = library.effect(name).map_err(PlantError::Effect)?;
-        if !(1..=self.system.joints).contains(&joint) {
+        if !joint.is_of(self.system.joints) {
             let message = format!(
                 "effect `{name}`: `joint` is from 1 to {}, found {joint}",
                 self.system.joints
@@ -256,7 +256,7 @@ impl Plant {
         }
         let new = FittedEffect {
             effect: effect.clone(),
-            joint: joint - 1,
+            joint,
             values: own,
             own: Vec::new(),
             fixed: false,

@@ -1,5 +1,6 @@
 use super::plot::{Animation, Chain, PlotError, Quantity, Strip, StripLine, animation};
 use crate::control::{Episode, Meter, Task};
+use crate::data::Joint;
 use crate::expr::FormulaError;
 
 /// An episode to watch, as SVG text; none for a task without a figure.
@@ -20,9 +21,9 @@ pub fn film(task: &Task, episode: &Episode, title: &str) -> Result<Option<String
         .log
         .tau
         .iter()
-        .enumerate()
-        .map(|(j, tau)| StripLine {
-            label: format!("joint {}", j + 1),
+        .zip(Joint::all(task.joints()))
+        .map(|(tau, joint)| StripLine {
+            label: format!("joint {joint}"),
             values: tau.clone(),
         });
     let last = episode.rewards.last().copied();

@@ -5,7 +5,7 @@ use crate::closeloop::{
     Alternative, Contradicted, Curve, Finding, How, Outcome, Probed, Separation, TakenBack,
     Verdict, norm,
 };
-use crate::data::Finding as AuditFinding;
+use crate::data::{Finding as AuditFinding, Joint};
 use crate::evaluate::{Assessment, Summary, summarise};
 use crate::model::{FittedEffect, OwnValue, Parameter};
 
@@ -43,7 +43,7 @@ pub struct Report {
 #[derive(Debug, Serialize)]
 struct EffectEntry {
     name: String,
-    joint: usize,
+    joint: Joint,
     expression: String,
     parameters: Vec<ParameterEntry>,
     p_value: f64,
@@ -73,7 +73,7 @@ struct ContradictedEntry {
 #[derive(Debug, Serialize)]
 struct EffectName {
     name: String,
-    joint: usize,
+    joint: Joint,
     /// Of a shift: the parameter that is shifted.
     #[serde(skip_serializing_if = "Option::is_none")]
     parameter: Option<String>,
@@ -118,7 +118,7 @@ struct OmnibusEntry {
 /// A formula for what is left: no finding.
 #[derive(Debug, Serialize)]
 struct ProposalEntry {
-    joint: usize,
+    joint: Joint,
     formula: String,
     explains: f64,
 }
@@ -194,7 +194,7 @@ struct AuditEntry {
 #[derive(Debug, Serialize)]
 struct TriedEntry {
     name: String,
-    joint: usize,
+    joint: Joint,
     #[serde(skip_serializing_if = "Option::is_none")]
     parameter: Option<String>,
     /// Fall of the loss on left-out stretches, as a share.
@@ -270,7 +270,7 @@ impl Report {
 fn effect(finding: &Finding) -> EffectEntry {
     EffectEntry {
         name: finding.effect.effect.name.clone(),
-        joint: finding.effect.joint + 1,
+        joint: finding.effect.joint,
         expression: finding.expression.clone(),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
@@ -309,7 +309,7 @@ fn contradicted(contradicted: &Contradicted) -> ContradictedEntry {
 fn effect_name(effect: &FittedEffect) -> EffectName {
     EffectName {
         name: effect.effect.name.clone(),
-        joint: effect.joint + 1,
+        joint: effect.joint,
         parameter: shifted(effect),
     }
 }
@@ -349,7 +349,7 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
         probes: left.probes.clone(),
         curves: outcome.curves_after.clone(),
         proposal: outcome.proposal.as_ref().map(|proposal| ProposalEntry {
-            joint: proposal.joint + 1,
+            joint: proposal.joint,
             formula: proposal.formula.clone(),
             explains: proposal.explains,
         }),
@@ -429,7 +429,7 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
     let round = |round: &crate::closeloop::Round| {
         let entry = |(i, evidence): (usize, &crate::closeloop::Evidence)| TriedEntry {
             name: evidence.effect.effect.name.clone(),
-            joint: evidence.effect.joint + 1,
+            joint: evidence.effect.joint,
             parameter: shifted(&evidence.effect),
             gain: evidence.gain,
             p_value: evidence.p_value,

@@ -20,8 +20,7 @@ pub fn model_file(system: &System, outcome: &Outcome) -> String {
         let _ = write!(
             text,
             "\n[[effect]]\nname = \"{}\"\njoint = {}\n",
-            effect.effect.name,
-            effect.joint + 1
+            effect.effect.name, effect.joint
         );
         for (k, parameter) in effect.effect.parameters.iter().enumerate() {
             let (value, ci95) = effect.values[k];

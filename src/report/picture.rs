@@ -4,7 +4,7 @@ use super::plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapePanel, ShapeSample, Track,
 };
 use crate::closeloop::{Curve, ForceSample, Outcome};
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::evaluate::{Assessment, summarise, traces};
 use crate::model::Dynamics;
 
@@ -43,8 +43,8 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             learned.hybrid.values(),
         ));
     }
-    let panel = |joint: usize| Panel {
-        joint: joint + 1,
+    let panel = |joint: Joint| Panel {
+        joint,
         kind: kind(outcome, joint),
         tracks: std::iter::once(measured(log, joint))
             .chain(models.iter().map(|(role, label, dynamics, values)| Track {
@@ -54,7 +54,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    let panels: Vec<Panel> = Joint::all(outcome.after.dynamics.joints)
+        .map(panel)
+        .collect();
     let title = format!(
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
@@ -62,7 +64,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     super::plot::predictions(&panels, &title)
 }
 
-fn kind(outcome: &Outcome, joint: usize) -> JointKind {
+fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
     if outcome.prismatic[joint] {
         JointKind::Prismatic
     } else {
@@ -74,7 +76,7 @@ fn end(log: &Log) -> f64 {
     log.time.first().map_or(0.0, |start| start + SHOWN_S)
 }
 
-fn measured(log: &Log, joint: usize) -> Track {
+fn measured(log: &Log, joint: Joint) -> Track {
     let points = log.time.iter().copied().zip(log.q[joint].iter().copied());
     Track {
         label: "measured".into(),
@@ -87,7 +89,7 @@ fn predicted(
     dynamics: &Dynamics,
     values: &[f64],
     log: &Log,
-    joint: usize,
+    joint: Joint,
     horizon: f64,
 ) -> Vec<Vec<(f64, f64)>> {
     traces(dynamics, values, log, horizon)
@@ -105,7 +107,7 @@ fn predicted(
 
 /// The residual generalised force over angle, speed, torque and time, before and after.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    let samples = |all: &[ForceSample], joint: usize| {
+    let samples = |all: &[ForceSample], joint: Joint| {
         all.iter()
             .map(|s| ShapeSample {
                 values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
@@ -113,19 +115,17 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
             })
             .collect()
     };
-    let names = |joint: usize| {
+    let names = |joint: Joint| {
         [
-            format!("q{joint}"),
-            format!("qd{joint}"),
-            format!("tau{joint}"),
+            joint.name("q"),
+            joint.name("qd"),
+            joint.name("tau"),
             "t".to_owned(),
         ]
     };
-    let curves = |all: &[Curve], joint: usize| {
-        names(joint + 1).map(|name| {
-            let found = all
-                .iter()
-                .find(|c| c.joint == joint + 1 && c.variable == name);
+    let curves = |all: &[Curve], joint: Joint| {
+        names(joint).map(|name| {
+            let found = all.iter().find(|c| c.joint == joint && c.variable == name);
             found.map(|c| ShapeCurve {
                 x: c.x.clone(),
                 force: c.force.clone(),
@@ -134,15 +134,17 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
             })
         })
     };
-    let panel = |joint: usize| ShapePanel {
-        joint: joint + 1,
+    let panel = |joint: Joint| ShapePanel {
+        joint,
         kind: kind(outcome, joint),
         before: samples(&outcome.residual_before, joint),
         after: samples(&outcome.residual_after, joint),
         curves_before: curves(&outcome.curves_before, joint),
         curves_after: curves(&outcome.curves_after, joint),
     };
-    let panels: Vec<ShapePanel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    let panels: Vec<ShapePanel> = Joint::all(outcome.after.dynamics.joints)
+        .map(panel)
+        .collect();
     super::plot::residual_shape(&panels, "What the model lacks, before and after")
 }
 
@@ -163,8 +165,8 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     models.extend(hybrid.map(|m| named(Role::Hybrid, "hybrid: with a network for the rest", m)));
     let others = errors.against.iter().enumerate();
     models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
-    let row = |joint: usize, h: usize| ErrorRow {
-        joint: joint + 1,
+    let row = |joint: Joint, h: usize| ErrorRow {
+        joint,
         kind: kind(outcome, joint),
         horizon_s: errors.before.horizons[h].horizon_s,
         bars: models
@@ -176,9 +178,9 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
             })
             .collect(),
     };
-    let rows: Vec<ErrorRow> = (0..joints)
+    let rows: Vec<ErrorRow> = Joint::all(joints)
         .flat_map(|joint| (0..errors.before.horizons.len()).map(move |h| (joint, h)))
-        .map(|(j, h)| row(j, h))
+        .map(|(joint, h)| row(joint, h))
         .collect();
     super::plot::error_bars(&rows, "Open-loop position error on the test logs")
 }

@@ -3,6 +3,7 @@ use std::fmt::Write;
 use super::calibration::line;
 use super::text::{headline, proposal_line, small, values};
 use crate::closeloop::Outcome;
+use crate::data::Joint;
 use crate::evaluate::{Assessment, Summary, summarise};
 
 /// The answer for a terminal: a few lines, and where the rest is.
@@ -13,7 +14,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         outcome.reason
     );
     for finding in &outcome.findings {
-        let (name, joint) = (finding.effect.title(), finding.effect.joint + 1);
+        let (name, joint) = (finding.effect.title(), finding.effect.joint);
         let _ = writeln!(
             out,
             "  {name} on joint {joint}: {}\n    {}",
@@ -38,14 +39,13 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         numbers(&outcome.errors.after),
     );
     for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
-        for j in 0..joints {
-            let unit = if outcome.prismatic[j] { "m" } else { "rad" };
-            let (before, after) = (small(before[h][j]), small(after[h][j]));
+        for joint in Joint::all(joints) {
+            let unit = if outcome.prismatic[joint] { "m" } else { "rad" };
+            let (before, after) = (small(before[h][joint]), small(after[h][joint]));
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after",
-                j + 1
+                "  joint {joint}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after"
             );
         }
     }
@@ -69,11 +69,14 @@ fn errors(outcome: &Outcome, model: &Assessment) -> String {
         ..
     } = summarise(&model.horizons, joints);
     let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(", ");
-    let joint = |j: usize| {
-        let unit = if outcome.prismatic[j] { "m" } else { "rad" };
-        let errors = list(&mut position_rmse.iter().map(|row| small(row[j])));
-        format!("joint {} {errors} {unit}", j + 1)
+    let of_joint = |joint: Joint| {
+        let unit = if outcome.prismatic[joint] { "m" } else { "rad" };
+        let errors = list(&mut position_rmse.iter().map(|row| small(row[joint])));
+        format!("joint {joint} {errors} {unit}")
     };
     let seconds = list(&mut horizons_s.iter().map(f64::to_string));
-    format!("{} at {seconds} s", list(&mut (0..joints).map(joint)))
+    format!(
+        "{} at {seconds} s",
+        list(&mut Joint::all(joints).map(of_joint))
+    )
 }

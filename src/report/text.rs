@@ -4,7 +4,7 @@ use super::calibration::section;
 use crate::closeloop::{
     Finding, How, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, SIGNIFICANT, UNKNOWN, Verdict, norm,
 };
-use crate::data::Severity;
+use crate::data::{Joint, Severity};
 use crate::evaluate::{Summary, summarise};
 use crate::model::{OwnValue, Parameter};
 
@@ -43,7 +43,7 @@ pub(super) fn headline(outcome: &Outcome) -> String {
     let found: Vec<String> = outcome
         .findings
         .iter()
-        .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint + 1))
+        .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint))
         .collect();
     match (outcome.verdict, found.is_empty()) {
         (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
@@ -84,7 +84,7 @@ fn effects(findings: &[Finding]) -> String {
             out,
             "| {} | {} | `{}` | {} | {} | {} |",
             finding.effect.title(),
-            finding.effect.joint + 1,
+            finding.effect.joint,
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
@@ -203,16 +203,19 @@ fn errors(outcome: &Outcome) -> String {
     );
     let (before, after) = (&models[1].1, &models[2].1);
     for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for j in 0..outcome.after.dynamics.joints {
-            let rmse = |s: &Summary| s.position_rmse[h][j];
+        for joint in Joint::all(outcome.after.dynamics.joints) {
+            let rmse = |s: &Summary| s.position_rmse[h][joint];
             let cell = |(_, s): &(&str, Summary)| {
-                format!("{} ({})", small(rmse(s)), small(s.position_median[h][j]))
+                format!(
+                    "{} ({})",
+                    small(rmse(s)),
+                    small(s.position_median[h][joint])
+                )
             };
             let cells: Vec<String> = models.iter().map(cell).collect();
             let _ = writeln!(
                 out,
-                "| {horizon} s | {} | {} | {} | {:.2} |",
-                j + 1,
+                "| {horizon} s | {joint} | {} | {} | {:.2} |",
                 before.windows[h],
                 cells.join(" | "),
                 rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
@@ -315,7 +318,7 @@ fn alternatives(outcome: &Outcome) -> String {
             out,
             "- **{}** on joint {}: {}. To tell: {}.",
             alternative.effect.title(),
-            alternative.effect.joint + 1,
+            alternative.effect.joint,
             alternative.reason,
             alternative.experiment()
         );
@@ -389,7 +392,7 @@ fn proposed(proposal: &Proposal) -> String {
 pub(super) fn proposal_line(proposal: &Proposal) -> String {
     format!(
         "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of what is left on stretches left out)",
-        proposal.joint + 1,
+        proposal.joint,
         proposal.formula,
         100.0 * proposal.explains
     )
@@ -411,7 +414,7 @@ fn tried(outcome: &Outcome) -> String {
                 out,
                 "| {} | {} | {} | {} | {} |",
                 evidence.effect.title(),
-                evidence.effect.joint + 1,
+                evidence.effect.joint,
                 share(evidence.gain),
                 probability(evidence.p_value),
                 if round.chosen == Some(i) { "added" } else { "" }

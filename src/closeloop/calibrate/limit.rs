@@ -185,7 +185,7 @@ impl<'a> Look<'a> {
 /// Information on the last free value, the others free as well; `None` where it is no more than rounding.
 fn own_information(fit: &Fit) -> Option<f64> {
     let last = fit.columns.len() - 1;
-    let mut terms = fit.nothing();
+    let mut terms = fit.zero_equations();
     fit.reduced
         .iter()
         .for_each(|window| window.add_to(&mut terms));

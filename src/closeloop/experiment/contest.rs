@@ -6,7 +6,7 @@ use super::payload::Payload;
 use crate::closeloop::per_log::values_on;
 use crate::closeloop::search::Rival;
 use crate::closeloop::study::{Fitted, Study, WINDOW_S};
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect};
 
@@ -107,8 +107,8 @@ pub(super) struct Contest<'a> {
 pub(super) struct Test {
     /// What to do.
     pub text: String,
-    /// The joint, counted from 0, on which the difference is largest beside the noise.
-    pub joint: usize,
+    /// The joint on which the difference is largest beside the noise.
+    pub joint: Joint,
     /// Root mean squares on that joint after refitting, in rad (or m): in the experiment, and in the present logs.
     pub difference: f64,
     pub present: f64,
@@ -160,7 +160,7 @@ impl<'a> Contest<'a> {
     }
 
     /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
-    pub fn tests(&self, model: &Fitted, joints: &[usize]) -> Vec<Test> {
+    pub fn tests(&self, model: &Fitted, joints: &[Joint]) -> Vec<Test> {
         let changes = proposals(self.study, model, joints);
         let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
         let payloads = self.payloads();
@@ -208,8 +208,8 @@ impl<'a> Contest<'a> {
         let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
         let differences = differences(&shooting, &other, &found, present);
-        let share = |j: &usize| differences[*j] / self.noise[*j];
-        let joint = (0..differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+        let share = |joint: &Joint| differences[*joint] / self.noise[*joint];
+        let joint = Joint::all(differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
         Some(Test {
             text: proposal.text.clone(),
             joint,
@@ -220,14 +220,14 @@ impl<'a> Contest<'a> {
         })
     }
 
-    fn is_possible(&self, record: &Record, turns: Option<usize>) -> bool {
+    fn is_possible(&self, record: &Record, turns: Option<Joint>) -> bool {
         let slow = |log: &Log| {
             let mut joints = log.qd.iter().zip(&self.study.top_speed);
             joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= FASTEST * top))
         };
-        let turned = |j: usize| {
+        let turned = |joint: Joint| {
             let mut motions = record.motions.iter();
-            motions.any(|m| is_turn(&record.logs[m.log].q[j][m.first..=m.last]))
+            motions.any(|m| is_turn(&record.logs[m.log].q[joint][m.first..=m.last]))
         };
         record.logs.iter().all(slow) && turns.is_none_or(turned)
     }
@@ -286,7 +286,7 @@ fn differences(shooting: &Shooting<'_>, model: &Contender, fit: &Fit, first: usi
 fn inflation(study: &Study<'_>, model: &Fitted) -> f64 {
     let size = model.fit.columns.len();
     let covariance = uncertainty(&study.shooting, &model.fit).covariance;
-    let mut all = model.fit.nothing();
+    let mut all = model.fit.zero_equations();
     for window in &model.fit.reduced {
         window.add_to(&mut all);
     }

@@ -1,5 +1,6 @@
 use super::motion::Motion;
 use crate::closeloop::study::{Fitted, Study};
+use crate::data::Joint;
 
 /// What drives the rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,16 +135,20 @@ pub(super) struct Proposal {
     pub text: String,
     pub motions: Vec<Motion>,
     /// A joint that must go round.
-    pub turns: Option<usize>,
+    pub turns: Option<Joint>,
 }
 
 /// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
 /// states are where motions begin.
-pub(super) fn proposals(study: &Study<'_>, model: &Fitted, joints: &[usize]) -> Vec<Proposal> {
+pub(super) fn proposals(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -> Vec<Proposal> {
     let of_one_joint = |entry: &Entry| entry.text.contains("{joint}");
     let mut all = Vec::new();
     for entry in &MENU {
-        let joints = if of_one_joint(entry) { joints } else { &[0] };
+        let joints = if of_one_joint(entry) {
+            joints
+        } else {
+            &[Joint::at(0)]
+        };
         let able = joints
             .iter()
             .filter(|joint| entry.is_possible(study, **joint));
@@ -158,11 +163,11 @@ pub(super) fn proposals(study: &Study<'_>, model: &Fitted, joints: &[usize]) -> 
 
 /// Motions under the logged torque, for an experiment that changes the rig.
 pub(super) fn as_logged(study: &Study<'_>, model: &Fitted) -> Vec<Motion> {
-    AS_LOGGED.motions(study, model, 0)
+    AS_LOGGED.motions(study, model, Joint::at(0))
 }
 
 impl Entry {
-    fn is_possible(&self, study: &Study<'_>, joint: usize) -> bool {
+    fn is_possible(&self, study: &Study<'_>, joint: Joint) -> bool {
         let undriven = [AS_LOGGED.drive, Drive::Nothing].contains(&self.drive);
         let driven = match self.drive {
             Drive::Logged { .. } => study.top_torque.iter().any(|torque| *torque > 0.0),
@@ -174,7 +179,7 @@ impl Entry {
             && !(self.turns && (study.system.prismatic[joint] || goes_round(study, joint)))
     }
 
-    fn words(&self, study: &Study<'_>, joint: usize) -> String {
+    fn words(&self, study: &Study<'_>, joint: Joint) -> String {
         let (force, length) = if study.system.prismatic[joint] {
             ("N", "m")
         } else {
@@ -189,12 +194,12 @@ impl Entry {
             _ => 0.0,
         };
         self.text
-            .replace("{joint}", &(joint + 1).to_string())
+            .replace("{joint}", &joint.to_string())
             .replace("{torque}", &format!("{torque:.2} {force}"))
             .replace("{speed}", &format!("{speed:.1} {length}/s"))
     }
 
-    fn motions(&self, study: &Study<'_>, model: &Fitted, joint: usize) -> Vec<Motion> {
+    fn motions(&self, study: &Study<'_>, model: &Fitted, joint: Joint) -> Vec<Motion> {
         let windows = &study.shooting.windows;
         let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
         let starts: Vec<usize> = match self.start {
@@ -211,7 +216,7 @@ impl Entry {
     }
 
     /// One motion that begins like window `w` of the logs.
-    fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: usize) -> Motion {
+    fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: Joint) -> Motion {
         let window = study.shooting.windows[w];
         let log = &study.logs[window.log];
         let step_s = log.median_step() / f64::from(self.finer);
@@ -255,7 +260,7 @@ impl Entry {
         motion
     }
 
-    fn state(&self, study: &Study<'_>, logged: &[f64], joint: usize) -> Vec<f64> {
+    fn state(&self, study: &Study<'_>, logged: &[f64], joint: Joint) -> Vec<f64> {
         let mut state = logged.to_vec();
         let velocities = &mut state[study.system.joints..];
         match self.start {
@@ -270,7 +275,7 @@ impl Entry {
 }
 
 /// The torques with some more on one joint.
-fn with(torques: impl Iterator<Item = f64>, joint: usize, more: f64) -> Vec<f64> {
+fn with(torques: impl Iterator<Item = f64>, joint: Joint, more: f64) -> Vec<f64> {
     let mut torques: Vec<f64> = torques.collect();
     torques[joint] += more;
     torques
@@ -289,7 +294,7 @@ fn triangle(phase: f64) -> f64 {
 }
 
 /// Whether the logs show the joint going round.
-fn goes_round(study: &Study<'_>, joint: usize) -> bool {
+fn goes_round(study: &Study<'_>, joint: Joint) -> bool {
     study
         .logs
         .iter()

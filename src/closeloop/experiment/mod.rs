@@ -10,14 +10,15 @@ use serde::Serialize;
 use self::contest::{Contender, Contest, Test};
 use super::search::Rival;
 use super::study::{Fitted, Study};
+use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Separation {
     /// What to do; `None` where nothing that was simulated tells them apart.
     pub experiment: Option<String>,
-    /// Joint, counted from 1, on which the difference shows most.
-    pub joint: usize,
+    /// The joint on which the difference shows most.
+    pub joint: Joint,
     /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
     /// the other does, in rad (or m).
     pub difference_rad: f64,
@@ -60,7 +61,7 @@ pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Op
     let shown = best.unwrap_or(widest);
     Some(Separation {
         experiment: best.map(|test| test.text.clone()),
-        joint: shown.joint + 1,
+        joint: shown.joint,
         difference_rad: shown.difference,
         present_difference_rad: shown.present,
         noise_rad: shown.noise,

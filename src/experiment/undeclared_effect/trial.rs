@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use super::Lab;
 use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, close_loop};
 use crate::control::{Predictor, Purpose, stream};
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::experiment::ExperimentError;
 use crate::mbrl::{Experience, Judge, Judged, Learner, Prior, RunError};
 use crate::model::Dynamics;
@@ -58,8 +58,7 @@ pub struct Closed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Named {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     pub parameters: Vec<(String, f64)>,
 }
 
@@ -83,7 +82,7 @@ impl Closed {
         let parameter = |p: &crate::model::Parameter| (p.name.clone(), p.value);
         let named = |finding: &Finding| Named {
             name: finding.effect.title(),
-            joint: finding.effect.joint + 1,
+            joint: finding.effect.joint,
             parameters: finding.parameters.iter().map(parameter).collect(),
         };
         let declared = outcome.after.declared.len();

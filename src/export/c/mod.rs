@@ -10,6 +10,7 @@ pub(super) use compiler::{compile, compiler};
 pub(super) use names::Names;
 
 use super::{ExportError, File, Format, Portable, Reader};
+use crate::data::Joint;
 use crate::expr::Notation;
 use crate::model::{CommandFilter, Integrator};
 
@@ -150,11 +151,12 @@ fn memory(model: &Portable, names: &Names) -> String {
         return include_str!("memoryless.h").to_owned();
     }
     let of_joints = |kind: CommandFilter| {
-        let of_joint = |joint: usize| names.filter(model, joint, kind);
-        let each: Vec<String> = (0..model.joints()).map(of_joint).collect();
+        let of_joint = |joint: Joint| names.filter(model, joint, kind);
+        let each: Vec<String> = Joint::all(model.joints()).map(of_joint).collect();
         each.join(", ")
     };
-    let delays = (0..model.joints()).filter_map(|joint| model.filter(joint, CommandFilter::Delay));
+    let delays =
+        Joint::all(model.joints()).filter_map(|joint| model.filter(joint, CommandFilter::Delay));
     let longest = delays.fold(0.0, f64::max);
     let past = (HEADROOM * longest / model.step_s).ceil() + 2.0;
     include_str!("memory.h")

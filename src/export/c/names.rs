@@ -1,5 +1,6 @@
 use std::collections::HashMap;
 
+use crate::data::Joint;
 use crate::export::Portable;
 use crate::expr::{Notation, Part};
 use crate::model::CommandFilter;
@@ -134,10 +135,15 @@ impl Names {
     pub fn new(model: &Portable) -> Self {
         let lower = prefix(model.name());
         let n = model.joints();
-        let moving = (0..n)
-            .map(|j| (format!("q{}", j + 1), format!("state[{j}]")))
-            .chain((0..n).map(|j| (format!("qd{}", j + 1), format!("state[{}]", n + j))))
-            .chain((0..n).map(|j| (format!("tau{}", j + 1), format!("torque[{j}]"))))
+        let of_joints = |stem: &'static str, member: &'static str, first: usize| {
+            Joint::all(n).map(move |joint| {
+                let place = first + joint.index();
+                (joint.name(stem), format!("{member}[{place}]"))
+            })
+        };
+        let moving = of_joints("q", "state", 0)
+            .chain(of_joints("qd", "state", n))
+            .chain(of_joints("tau", "torque", 0))
             .chain([("t".to_owned(), "time".to_owned())]);
         let held = model.equations.parameters.iter().map(|parameter| {
             let field = variable(&parameter.name);
@@ -162,7 +168,7 @@ impl Names {
     }
 
     /// The parameter of a joint's filter, or zero.
-    pub fn filter(&self, model: &Portable, joint: usize, kind: CommandFilter) -> String {
+    pub fn filter(&self, model: &Portable, joint: Joint, kind: CommandFilter) -> String {
         let mut filters = model.equations.filters.iter();
         let filter = filters.find(|filter| filter.joint == joint && filter.kind == kind);
         filter.map_or_else(

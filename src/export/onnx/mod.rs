@@ -12,6 +12,7 @@ use prost::Message;
 use serde_json::json;
 
 use super::{ExportError, File, Format, HeldFilter, Portable, PythonClient, Reader};
+use crate::data::Joint;
 use builder::Builder;
 use flow::Flow;
 use proto::{Graph, Model, OperatorSet, Property};
@@ -105,11 +106,11 @@ fn packed(model: &Portable, graph: Graph) -> Vec<u8> {
     let parameters: Vec<_> = (model.equations.parameters.iter())
         .map(|p| json!({"name": p.name, "value": p.value, "unit": p.unit, "ci95": p.ci95}))
         .collect();
-    let units: Vec<_> = (0..model.joints())
+    let units: Vec<_> = Joint::all(model.joints())
         .map(|joint| model.units(joint))
         .collect();
     let memory: Vec<_> = (HeldFilter::all(model).iter())
-        .map(|f| json!({"joint": f.joint + 1, "past_torques": f.past, "lagged_torque": f.lags}))
+        .map(|f| json!({"joint": f.joint, "past_torques": f.past, "lagged_torque": f.lags}))
         .collect();
     let json = |value: serde_json::Value| value.to_string();
     let message = Model {

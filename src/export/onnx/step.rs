@@ -3,6 +3,7 @@
 use super::builder::{Builder, Value};
 use super::flow::Flow;
 use super::proto::Graph;
+use crate::data::Joint;
 use crate::export::{HeldFilter, HeldSum, Portable};
 use crate::model::Integrator;
 
@@ -16,7 +17,9 @@ pub struct Inputs {
 
 pub fn inputs(builder: &mut Builder, model: &Portable, torque: &str) -> Inputs {
     let n = model.joints();
-    let units: Vec<_> = (0..n).map(|joint| model.units(joint).join(", ")).collect();
+    let units: Vec<_> = Joint::all(n)
+        .map(|joint| model.units(joint).join(", "))
+        .collect();
     let about = format!("of joints in {}", units.join("; "));
     let state = builder.input(
         "state",

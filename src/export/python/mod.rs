@@ -11,6 +11,7 @@ use serde_json::json;
 
 use super::{ExportError, File, Format, HeldFilter, Portable, PythonClient, Reader};
 use crate::control::Task;
+use crate::data::Joint;
 use crate::expr::Program;
 use crate::model::{Angles, Integrator, MlpWeights, ResidualOn};
 use notation::{Python, literal};
@@ -85,14 +86,8 @@ fn module(model: &Portable, task: Option<&Task>) -> String {
 
 fn head(model: &Portable) -> String {
     let n = model.joints();
-    let units: Vec<String> = (0..n)
-        .map(|joint| {
-            format!(
-                "joint {} in {}",
-                joint + 1,
-                model.units(joint).join(" and ")
-            )
-        })
+    let units: Vec<String> = Joint::all(n)
+        .map(|joint| format!("joint {joint} in {}", model.units(joint).join(" and ")))
         .collect();
     let about = json!(model.system.about).to_string();
     let provenance = json!(model.provenance().to_string());
@@ -176,7 +171,7 @@ fn filters(out: &mut String, model: &Portable) {
         let _ = writeln!(
             out,
             "    {{\"joint\": {}, \"past\": {}, \"lags\": {}, \"places\": {:?}, \"mean\": [{}], \"end\": {}}},",
-            filter.joint,
+            filter.joint.index(),
             filter.past,
             if filter.lags { "True" } else { "False" },
             filter.places,

@@ -8,6 +8,7 @@ use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, WIDTH};
 use super::{JointKind, PlotError};
+use crate::data::Joint;
 
 /// Enough to show the cloud; a curve stands in front of it.
 const MAX_CLOUD_POINTS: usize = 1500;
@@ -37,8 +38,7 @@ pub struct ShapeCurve {
 /// The residual forces of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapePanel {
-    /// Number of the joint, from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// How the joint moves.
     pub kind: JointKind,
     /// Left by the declared model.
@@ -211,12 +211,13 @@ fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG 
 #[cfg(test)]
 mod tests {
     use super::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
+    use crate::data::Joint;
     use crate::report::plot::{JointKind, PlotError};
 
     fn panel(before: Vec<ShapeSample>) -> ShapePanel {
         let kind = JointKind::Revolute;
         ShapePanel {
-            joint: 1,
+            joint: Joint::at(0),
             kind,
             before,
             after: vec![],
