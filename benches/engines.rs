@@ -11,7 +11,6 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::batch::{Rollouts, Rows};
 use residyn::closeloop::{Request, Split, close_loop};
-use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn::model::{
     Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
@@ -53,7 +52,7 @@ impl Task {
         let system = Library::built_in()
             .system(Path::new(self.name))
             .expect("a built-in system");
-        let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; system.joints]);
+        let mut dynamics = system.dynamics();
         for (name, value) in self.parameters {
             let found = dynamics.parameters.iter_mut().find(|p| p.name == *name);
             found.expect("a parameter of the system").value = *value;

@@ -10,7 +10,6 @@ use std::time::Instant;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::batch::Rollouts;
-use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit};
 use residyn::model::{
     Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
@@ -161,7 +160,7 @@ fn chain(joints: usize) -> Dynamics {
          g = {{ value = 9.8, unit = \"m/s^2\" }}\n[dynamics]\nmass = [{mass}]\nbias = [{bias}]\n"
     );
     let system = System::from_text(Path::new("chain.toml"), &text, &[]).expect("a model file");
-    system.dynamics(&vec![SignForm::DEFAULT; joints])
+    system.dynamics()
 }
 
 /// Seconds of fitting the pendulum to logs of this length.
@@ -175,7 +174,7 @@ fn identification(duration_s: f64) -> f64 {
     let dynamics = library
         .system(Path::new("pendulum"))
         .expect("a built-in system");
-    let dynamics = dynamics.dynamics(&[SignForm::DEFAULT]);
+    let dynamics = dynamics.dynamics();
     let logs = [log];
     let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
     let active = [0, 1];

@@ -18,18 +18,18 @@
 //! use std::path::Path;
 //!
 //! use rand::SeedableRng;
+//! use residyn::data::Joint;
 //! use residyn::evaluate::{assess, summarise};
-//! use residyn::expr::SignForm;
 //! use residyn::model::Library;
 //! use residyn::plant::Plant;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let library = Library::built_in();
 //! let mut rig = Plant::read(Path::new("pendulum"), &library)?;
-//! rig.add_effect(&library, "coulomb_friction", 1, &[("F_c".to_owned(), 0.2)])?;
+//! rig.add_effect(&library, "coulomb_friction", Joint::at(0), &[("F_c".to_owned(), 0.2)])?;
 //! let log = rig.record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
 //!
-//! let declared = library.system(Path::new("pendulum"))?.dynamics(&[SignForm::DEFAULT]);
+//! let declared = library.system(Path::new("pendulum"))?.dynamics();
 //! let values = declared.values();
 //! let errors = assess(&declared, |_| &values, &[log], &[0.5]);
 //! let summary = summarise(&errors.horizons, declared.joints);

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
 use residyn::evaluate::assess;
-use residyn::expr::SignForm;
 use residyn::model::{FittedEffect, Library};
 
 use crate::support::{refuses, succeeds, text};
@@ -80,8 +79,8 @@ fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code(
         let system = library.system(&cell.model).unwrap();
         let (logs, _) = cell.record(&system).unwrap();
         let error = |effects: &[FittedEffect]| {
-            let sign = vec![SignForm::Smooth { width: 1e-4 }; system.joints];
-            let dynamics = system.dynamics_with(effects, &sign);
+            let rig = system.with_effects(effects.to_vec());
+            let dynamics = rig.with_sign_widths(vec![1e-4; system.joints]).dynamics();
             let mut values = dynamics.values();
             for (value, parameter) in values.iter_mut().zip(&system.parameters) {
                 *value = true_value(&mechanics, &parameter.name).expect("the rig has it");

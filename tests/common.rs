@@ -40,7 +40,14 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
 
 /// The same form of the sign on every joint.
 pub fn dynamics(system: &System, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
-    system.dynamics_with(effects, &vec![sign; system.joints])
+    let width = match sign {
+        SignForm::Exact => 0.0,
+        SignForm::Smooth { width } => width,
+    };
+    let model = system.with_effects(effects.to_vec());
+    model
+        .with_sign_widths(vec![width; system.joints])
+        .dynamics()
 }
 
 /// Whether the effect has anything to act on there.

@@ -169,7 +169,7 @@ fn job_dynamics(job: &Job) -> residyn::model::Dynamics {
     Library::built_in()
         .system(Path::new(&name))
         .unwrap()
-        .dynamics(&vec![residyn::expr::SignForm::DEFAULT; job.model.joints()])
+        .dynamics()
 }
 
 /// Rounding differs between processors and grows over thousands of epochs, so what must come again everywhere is how

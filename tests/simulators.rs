@@ -199,7 +199,7 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
             let text = model_text(&chain);
             let back = System::from_text(Path::new(name), &text, library.effects()).unwrap();
             let n = model.joints();
-            let back = dynamics(&back, &back.effects, SignForm::DEFAULT);
+            let back = back.dynamics();
             for point in points(&back, 50, 1) {
                 let moving = &point[..=3 * n];
                 let [found, wanted] = [&back, &model.equations]

@@ -5,7 +5,6 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Rollouts, Rows, W};
 use crate::data::Joint;
-use crate::expr::SignForm;
 use crate::lanes::Row;
 use crate::model::{
     Angles, Commands, Dynamics, FittedEffect, InputScaling, Integrator, LastLayer, Library,
@@ -19,7 +18,7 @@ const STEPS: usize = 12;
 
 fn equations(name: &str) -> Dynamics {
     let system = Library::built_in().system(Path::new(name)).unwrap();
-    system.dynamics(&vec![SignForm::DEFAULT; system.joints])
+    system.dynamics()
 }
 
 fn network(joints: usize, angles: Angles, on: ResidualOn) -> MlpWeights {
@@ -170,7 +169,7 @@ fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
             effect
         })
         .collect();
-    system.dynamics_with(&effects, &vec![SignForm::DEFAULT; system.joints])
+    system.with_effects(effects).dynamics()
 }
 
 fn filtered_rollouts(equations: &Dynamics, objective: &Objective) -> Rollouts {

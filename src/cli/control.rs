@@ -188,7 +188,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
         }
         Source::File(file) => {
             let system = library.system(file)?;
-            let dynamics = system.dynamics(&system.sign());
+            let dynamics = system.dynamics();
             Ok(Predictor::of_equations(dynamics, task.integrator))
         }
     }

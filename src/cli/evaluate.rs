@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .calibrate
         .map(|share| calibrate(&dynamics, &values, &mut logs, share))
         .transpose()?;
-    let known = logs.iter().map(|log| system.values_in(&dynamics, log));
+    let known = logs.iter().map(|log| dynamics.in_log(log).values());
     let known: Vec<Vec<f64>> = known.collect();
     let assessment = match &offsets {
         Some(Offsets {
@@ -117,7 +117,7 @@ fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
     match arguments.model.source() {
         Source::File(file) => {
             let system = library.system(file)?;
-            let dynamics = system.dynamics(&system.sign());
+            let dynamics = system.dynamics();
             Ok((system, dynamics))
         }
         Source::Checkpoint(dir) => {

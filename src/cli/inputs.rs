@@ -65,7 +65,7 @@ pub(super) fn checkpoint(
     let checkpoint = Checkpoint::load(dir)?;
     let file = dir.join("model.toml");
     let system = System::from_text(&file, &checkpoint.model_toml, library.effects())?;
-    let physics = system.dynamics(&system.sign());
+    let physics = system.dynamics();
     let model = checkpoint.model(&physics, &backend.device())?;
     Ok((checkpoint, system, model))
 }

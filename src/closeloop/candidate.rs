@@ -94,7 +94,7 @@ fn promised(
 ) -> Option<f64> {
     let mut effects = model.effects.clone();
     effects.push(start.clone());
-    let dynamics = study.system.dynamics_with(&effects, &study.sign);
+    let dynamics = study.dynamics(effects.clone());
     let values = values_on(study.logs, &model.declared, &effects);
     let (active, scale) = (study.active(&dynamics), model.fit.scale);
     predicted_cost(shooting, &dynamics, &active, values, locals, scale)

@@ -44,7 +44,8 @@ pub fn learn_residual(
     };
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
     let (declared, effects) = absorbed(&model.declared, &model.effects);
-    let dynamics = (study.system.dynamics_with(&effects, &study.sign))
+    let dynamics = study
+        .dynamics(effects.clone())
         .with_values(joined(&declared, &effects));
     let settings = MlpSettings {
         hidden: study.system.hidden.clone(),

@@ -125,9 +125,9 @@ pub fn close_loop(
         )
     };
     let judge_as_is = |model: &System| {
-        let dynamics = model.dynamics(&model.sign());
+        let dynamics = model.dynamics();
         let values: Vec<Vec<f64>> = (split.test.iter())
-            .map(|log| model.values_in(&dynamics, log))
+            .map(|log| dynamics.in_log(log).values())
             .collect();
         assess(&dynamics, |log| &values[log], &split.test, &horizons_s)
     };
@@ -160,7 +160,7 @@ pub fn close_loop(
         taken_back,
         confirmed_on,
         contradicted: contradicted(
-            &system.dynamics(&system.sign()).values(),
+            &system.dynamics().values(),
             &with_intervals(&study, &before, &before.fit.values),
         ),
         before,

@@ -2,9 +2,8 @@ use thiserror::Error;
 
 use super::per_log::{take_over, values_on};
 use crate::data::{Audit, Log, audit};
-use crate::expr::SignForm;
 use crate::identify::{Fit, FitError, Identifiability, Shooting, cut, fit, identifiability};
-use crate::model::{Dynamics, FittedEffect, System, put_own};
+use crate::model::{Dynamics, FittedEffect, System};
 
 /// Why the loop could not be closed at all.
 #[derive(Debug, Error)]
@@ -39,7 +38,6 @@ const FINE_STEP_S: f64 = 5e-4;
 pub struct Study<'a> {
     pub system: &'a System,
     pub logs: &'a [Log],
-    pub sign: Vec<SignForm>,
     /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
     /// Top speed and top torque of each joint.
@@ -124,7 +122,6 @@ impl<'a> Study<'a> {
         Self {
             system,
             logs,
-            sign: smooth(&sign_widths),
             sign_widths,
             sample: Sample::of(&shooting),
             shooting,
@@ -143,7 +140,6 @@ impl<'a> Study<'a> {
         Study {
             system: self.system,
             logs,
-            sign: self.sign.clone(),
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
@@ -161,7 +157,6 @@ impl<'a> Study<'a> {
         let windows = self.shooting.windows.clone();
         let shooting = Shooting::new(self.logs, windows, &self.shooting.noise);
         Self {
-            sign: smooth(&sign_widths),
             sign_widths,
             shooting: shooting.in_steps_of(FINE_STEP_S),
             identifiability: self.identifiability.clone(),
@@ -261,7 +256,7 @@ impl<'a> Study<'a> {
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
-        let dynamics = self.system.dynamics_with(effects, &self.sign);
+        let dynamics = self.dynamics(effects.to_vec());
         let values = values_on(self.logs, declared, effects);
         let fit = fit(
             shooting,
@@ -280,17 +275,18 @@ impl<'a> Study<'a> {
         ))
     }
 
+    /// The declared equations with these effects, compiled with the study's smoothing of friction.
+    pub fn dynamics(&self, effects: Vec<FittedEffect>) -> Dynamics {
+        let model = self.system.with_effects(effects);
+        model.with_sign_widths(self.sign_widths.clone()).dynamics()
+    }
+
     /// Parameters that a fit may change.
     pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
         let free =
             |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
     }
-}
-
-fn smooth(widths: &[f64]) -> Vec<SignForm> {
-    let smooth = |&width: &f64| SignForm::Smooth { width };
-    widths.iter().map(smooth).collect()
 }
 
 /// Declared values, then those of the effects: all parameters of the model, in its order, as they are in a log
@@ -334,7 +330,12 @@ impl Fitted {
     /// All parameters as they are in a log; one that the fit has not seen has no values of its own.
     pub fn values_in(&self, log: &Log) -> Vec<f64> {
         let mut values = joined(&self.declared, &self.effects);
-        put_own(&mut values, self.declared.len(), &self.effects, log);
+        for (k, effect) in self.effects.iter().enumerate() {
+            let first = self.range_of(k).start;
+            for own in effect.own.iter().filter(|own| log.is_called(&own.log)) {
+                values[first + own.parameter] = own.value;
+            }
+        }
         values
     }
 

@@ -134,5 +134,6 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         program: graph.finish(&outputs),
         filters: dynamics.filters.clone(),
         reading,
+        own: dynamics.own.clone(),
     }
 }

@@ -354,5 +354,5 @@ fn claim(dir: &Path, resolved: &Value) -> Result<(), ExperimentError> {
 
 /// The equations of a system with their declared values.
 pub(super) fn equations(system: &System) -> crate::model::Dynamics {
-    system.dynamics(&system.sign())
+    system.dynamics()
 }

@@ -60,7 +60,7 @@ impl ExportModel {
         } = numbers;
         let mut equations = match &prior {
             Some(prior) => nothing_but(&system.name, system.joints, prior.on),
-            None => system.dynamics(&system.sign()).with_values(parameters),
+            None => system.dynamics().with_values(parameters),
         };
         keep_intervals(&mut equations);
         Self {
@@ -83,7 +83,7 @@ impl ExportModel {
         origin: serde_json::Value,
     ) -> Self {
         let numbers = ModelWeights {
-            parameters: system.dynamics(&system.sign()).values(),
+            parameters: system.dynamics().values(),
             prior: None,
             residual: None,
         };
@@ -92,7 +92,7 @@ impl ExportModel {
 
     /// The equations without effects.
     pub fn declared(&self) -> Dynamics {
-        let declared = self.system.dynamics_with(&[], &self.system.sign());
+        let declared = self.system.with_effects(Vec::new()).dynamics();
         declared.with_values(self.equations.values())
     }
 

@@ -468,7 +468,6 @@ mod tests {
 
     use super::Shooting;
     use crate::data::{Joint, Log};
-    use crate::expr::SignForm;
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::model::{FittedEffect, Library};
@@ -494,7 +493,7 @@ mod tests {
         let effects = ["actuator_delay", "actuator_lag", "backlash"]
             .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
         let pendulum = library.system(Path::new("pendulum")).unwrap();
-        let model = pendulum.dynamics_with(&effects, &[SignForm::DEFAULT]);
+        let model = pendulum.with_effects(effects.to_vec()).dynamics();
         let logs = [log()];
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
         for local in [Local::State, Local::StateAndForce] {

@@ -7,7 +7,6 @@ use serde_json::json;
 use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
 use crate::control::Task;
 use crate::data::Joint;
-use crate::expr::SignForm;
 use crate::model::{Angles, Dynamics, Library, MlpSettings};
 use crate::plant::{Noise, Plant};
 use crate::train::{Backend, FitSettings, Origin, Penalty};
@@ -41,7 +40,7 @@ fn setting() -> Setting {
             &[("d".to_owned(), 0.03)],
         )
         .unwrap();
-    let dynamics = plant.system.dynamics(&[SignForm::DEFAULT]);
+    let dynamics = plant.system.dynamics();
     let network = MlpSettings {
         hidden: vec![4],
         angles: Angles::SinCos,

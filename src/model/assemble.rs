@@ -1,31 +1,20 @@
+use std::ops::Range;
+
 use super::command::{CommandFilter, Filter};
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::reader::Located;
-use super::system::{FittedEffect, Motion, System};
+use super::system::{FittedEffect, Motion, OwnValue, System};
 use super::{Dynamics, Parameter};
 use crate::data::Joint;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
 impl System {
-    /// The declared equations with the file's own effects, ready to run.
-    pub fn dynamics(&self, sign: &[SignForm]) -> Dynamics {
-        self.dynamics_with(&self.effects, sign)
-    }
-
-    /// The declared equations with `effects` in place of the file's own.
+    /// The equations and effects compiled into one program, with the model's own values and smoothing.
     ///
-    /// Filters of the command act first, then other effects of the torque, in the order given, then forces are
-    /// added. `load` is the torque before the latter. `sign` says for each joint how dry friction is written.
-    ///
-    /// # Panics
-    /// When an effect names a joint that the system does not have, or `sign` has not one entry a joint.
-    pub fn dynamics_with(&self, effects: &[FittedEffect], sign: &[SignForm]) -> Dynamics {
-        assert_eq!(
-            sign.len(),
-            self.joints,
-            "one form of the sign for each joint"
-        );
-        let mut assembly = Assembly::new(self, effects, sign);
+    /// Filters of the command act first, then other effects of the torque, in their order, then forces are added.
+    /// `load` is the torque before the latter.
+    pub fn dynamics(&self) -> Dynamics {
+        let mut assembly = Assembly::new(self, &self.effects, &self.sign());
         let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
@@ -38,27 +27,35 @@ impl System {
             joints: self.joints,
             parameters: assembly.parameters,
             program: assembly.graph.finish(&outputs),
-            filters: filters(self.parameters.len(), effects),
+            filters: self.filters(),
             reading,
+            own: self.own_values(),
         }
     }
-}
 
-/// The filters among `effects`, whose parameters follow the `declared` ones.
-fn filters(declared: usize, effects: &[FittedEffect]) -> Vec<Filter> {
-    let mut parameter = declared;
-    let mut filters = Vec::new();
-    for effect in effects {
-        if let Entry::Command(kind) = effect.effect.entry {
-            filters.push(Filter {
+    fn filters(&self) -> Vec<Filter> {
+        let filter = |(effect, place): (&FittedEffect, Range<usize>)| match effect.effect.entry {
+            Entry::Command(kind) => Some(Filter {
                 joint: effect.joint,
                 kind,
-                parameter,
-            });
-        }
-        parameter += effect.values.len();
+                parameter: place.start,
+            }),
+            _ => None,
+        };
+        self.placed().filter_map(filter).collect()
     }
-    filters
+
+    /// The values that single logs have of their own, by the parameters of the whole model.
+    fn own_values(&self) -> Vec<OwnValue> {
+        let of_effect = |(effect, place): (&FittedEffect, Range<usize>)| {
+            let own = effect.own.iter().map(move |own| OwnValue {
+                parameter: place.start + own.parameter,
+                ..own.clone()
+            });
+            own.collect::<Vec<_>>()
+        };
+        self.placed().flat_map(of_effect).collect()
+    }
 }
 
 impl FittedEffect {

@@ -1,6 +1,10 @@
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::command::Filter;
+use super::system::OwnValue;
+use crate::data::Log;
 use crate::expr::Program;
 
 /// A physical parameter of a model or an effect.
@@ -41,6 +45,8 @@ pub struct Dynamics {
     /// What the sensors show for the angles, from the same inputs, where that is not the rig's own: n outputs. The
     /// torques are those that acted until then.
     pub reading: Option<Program>,
+    /// The values that single logs have of their own, each of the parameter at that index of `parameters`.
+    pub own: Vec<OwnValue>,
 }
 
 impl Dynamics {
@@ -56,6 +62,15 @@ impl Dynamics {
             parameter.value = value;
         }
         self
+    }
+
+    /// The same as it is in a log: with the values that the log has of its own.
+    pub fn in_log(&self, log: &Log) -> Cow<'_, Self> {
+        let mut in_log = Cow::Borrowed(self);
+        for own in self.own.iter().filter(|own| log.is_called(&own.log)) {
+            in_log.to_mut().parameters[own.parameter].value = own.value;
+        }
+        in_log
     }
 
     /// Number of states, 2n.

@@ -42,4 +42,4 @@ pub use rollout::Rollout;
 pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use shift::absorbed;
 pub(crate) use stack::Stack;
-pub use system::{FittedEffect, OwnValue, System, put_own};
+pub use system::{FittedEffect, OwnValue, System};

@@ -1,10 +1,14 @@
+use std::ops::Range;
 use std::path::Path;
 
 use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
-use super::{Dynamics, Parameter, sections};
-use crate::data::{Columns, Joint, Log};
+use super::{Parameter, sections};
+use crate::data::{Columns, Joint};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
+
+/// Dry friction reverses over this speed (rad/s or m/s) where neither the file nor a fit to logs says otherwise.
+const DEFAULT_SIGN_WIDTH: f64 = 0.01;
 
 /// How a model file states the motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,17 +64,6 @@ impl OwnValue {
     }
 }
 
-/// Put what a log has of its own into the `values` of all parameters: `declared` ones, then those of the effects.
-pub fn put_own(values: &mut [f64], declared: usize, effects: &[FittedEffect], log: &Log) {
-    let mut first = declared;
-    for effect in effects {
-        for own in effect.own.iter().filter(|own| log.is_called(&own.log)) {
-            values[first + own.parameter] = own.value;
-        }
-        first += effect.values.len();
-    }
-}
-
 /// A declared model: what a model file says, checked.
 #[derive(Debug, Clone)]
 pub struct System {
@@ -79,8 +72,8 @@ pub struct System {
     pub joints: usize,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
-    /// For each joint the speed (rad/s or m/s) over which dry friction reverses; where the file gives none,
-    /// fits choose it by the speeds in the logs.
+    /// For each joint the speed (rad/s or m/s) over which dry friction reverses, 0 for at once; where the file gives
+    /// none, fits choose it by the speeds in the logs.
     pub sign_width: Option<Vec<f64>>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
@@ -222,19 +215,71 @@ impl System {
         names
     }
 
-    /// All parameters of `dynamics`, of this model or of one with a network on top, as they are in a log.
-    pub fn values_in(&self, dynamics: &Dynamics, log: &Log) -> Vec<f64> {
-        let mut values = dynamics.values();
-        put_own(&mut values, self.parameters.len(), &self.effects, log);
-        values
+    /// For each joint the speed (rad/s or m/s) over which dry friction reverses; 0 where it does so at once.
+    pub fn sign_widths(&self) -> Vec<f64> {
+        let default = || vec![DEFAULT_SIGN_WIDTH; self.joints];
+        self.sign_width.clone().unwrap_or_else(default)
     }
 
-    /// How dry friction is written in each joint: as the file says, else in the default width.
-    pub fn sign(&self) -> Vec<SignForm> {
-        let width = |width: &f64| SignForm::Smooth { width: *width };
-        let given = self.sign_width.as_ref();
-        given.map_or(vec![SignForm::DEFAULT; self.joints], |widths| {
-            widths.iter().map(width).collect()
+    /// How dry friction is written in each joint.
+    pub(super) fn sign(&self) -> Vec<SignForm> {
+        let form = |width: f64| match width {
+            0.0 => SignForm::Exact,
+            width => SignForm::Smooth { width },
+        };
+        self.sign_widths().into_iter().map(form).collect()
+    }
+
+    /// The same with these effects.
+    #[must_use]
+    pub fn with_effects(&self, effects: Vec<FittedEffect>) -> Self {
+        Self {
+            effects,
+            ..self.clone()
+        }
+    }
+
+    /// The same with dry friction that reverses over these speeds (rad/s or m/s), one a joint; 0 for at once.
+    ///
+    /// # Panics
+    /// When there is not one width a joint.
+    #[must_use]
+    pub fn with_sign_widths(&self, widths: Vec<f64>) -> Self {
+        assert_eq!(widths.len(), self.joints, "one width for each joint");
+        Self {
+            sign_width: Some(widths),
+            ..self.clone()
+        }
+    }
+
+    /// The same with other values of all parameters: the declared ones, then those of the effects, in their order.
+    ///
+    /// # Panics
+    /// When there is not one value a parameter.
+    #[must_use]
+    pub fn with_values(&self, values: &[f64]) -> Self {
+        let mut model = self.clone();
+        let declared = model.parameters.iter_mut().map(|p| &mut p.value);
+        let of_effects = model
+            .effects
+            .iter_mut()
+            .flat_map(|effect| &mut effect.values);
+        let slots: Vec<&mut f64> = declared.chain(of_effects.map(|(value, _)| value)).collect();
+        assert_eq!(slots.len(), values.len(), "one value for each parameter");
+        slots
+            .into_iter()
+            .zip(values)
+            .for_each(|(slot, value)| *slot = *value);
+        model
+    }
+
+    /// Each effect with the place of its parameters among all of the model.
+    pub fn placed(&self) -> impl Iterator<Item = (&FittedEffect, Range<usize>)> {
+        let mut first = self.parameters.len();
+        self.effects.iter().map(move |effect| {
+            let place = first..first + effect.values.len();
+            first = place.end;
+            (effect, place)
         })
     }
 

@@ -11,7 +11,6 @@ use super::proposal::Proposal;
 use super::{Cem, Evaluate, Icem, Method, Mppi, Objective, Plan, Planner, Settings, Start};
 use crate::batch::{Rollouts, Rows, W};
 use crate::data::Joint;
-use crate::expr::SignForm;
 use crate::lanes::{Arch, Row};
 use crate::model::{Commands, Dynamics, FittedEffect, Integrator, Library, Rollout, StepTorque};
 use crate::plant::Environment;
@@ -461,7 +460,7 @@ fn coloured_numbers_have_their_spectrum() {
 
 fn pendulum(effects: &[FittedEffect]) -> Dynamics {
     let system = Library::built_in().system(Path::new("pendulum")).unwrap();
-    system.dynamics_with(effects, &[SignForm::DEFAULT])
+    system.with_effects(effects.to_vec()).dynamics()
 }
 
 fn swing_up(method: Method) -> Settings {

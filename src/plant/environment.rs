@@ -166,7 +166,6 @@ mod tests {
 
     use super::Environment;
     use crate::data::Joint;
-    use crate::expr::SignForm;
     use crate::model::{HybridModel, Integrator, Library};
     use crate::plant::Plant;
     use crate::train::Backend;
@@ -174,7 +173,7 @@ mod tests {
     #[test]
     fn steps_are_those_of_training() {
         let system = Library::built_in().system(Path::new("acrobot")).unwrap();
-        let dynamics = system.dynamics(&[SignForm::DEFAULT; 2]);
+        let dynamics = system.dynamics();
         let device = Backend::NdArray.device();
         let model = HybridModel::physics(&dynamics, &device).unwrap();
         let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);

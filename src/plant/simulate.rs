@@ -4,7 +4,6 @@ use rand_distr::{Distribution, Normal};
 use super::file::{Plant, PlantError};
 use crate::closeloop::joined;
 use crate::data::Log;
-use crate::expr::SignForm;
 use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
@@ -16,8 +15,9 @@ const SIGN_WIDTH: f64 = 1e-3;
 impl Plant {
     /// The true equations of motion.
     pub fn dynamics(&self) -> Dynamics {
-        let sign = vec![SignForm::Smooth { width: SIGN_WIDTH }; self.system.joints];
-        self.system.dynamics_with(&self.effects, &sign)
+        let rig = self.system.with_effects(self.effects.clone());
+        rig.with_sign_widths(vec![SIGN_WIDTH; self.system.joints])
+            .dynamics()
     }
 
     /// The same with their true values.

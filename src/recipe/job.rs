@@ -5,7 +5,6 @@ use serde_json::json;
 use super::difference::first_difference;
 use super::material::{Purpose, stream};
 use super::{Kind, Material, Recipe, RecipeError};
-use crate::expr::SignForm;
 use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, System};
 use crate::train::{Backend, Checkpoint, Origin, Training};
 
@@ -39,7 +38,7 @@ impl Job {
         seed: u64,
     ) -> Result<Self, RecipeError> {
         let Declared { system, text } = declared(&recipe, library)?;
-        let mut dynamics = equations(&system);
+        let mut dynamics = system.dynamics();
         recipe.set_parameters(&mut dynamics)?;
         let material = Material::gather(&recipe, &system, library, seed)?;
         let last = recipe.kind.last_layer();
@@ -126,10 +125,6 @@ pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, R
         },
     };
     Ok(Declared { system, text })
-}
-
-pub(super) fn equations(system: &System) -> Dynamics {
-    system.dynamics(&vec![SignForm::DEFAULT; system.joints])
 }
 
 pub(super) fn new_network(

@@ -4,7 +4,6 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::data::{Data, Logged, Simulated};
-use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{Library, System, as_modelled};
@@ -64,7 +63,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
         step_s: logged.step_s,
         length_s: f64::INFINITY,
     };
-    let dynamics = equations(system);
+    let dynamics = system.dynamics();
     let values = dynamics.values();
     let modelled = |log: &Log| match recipe.kind {
         // A network alone has no effects: it learns from what was commanded and shown.

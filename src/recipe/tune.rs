@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::job::{declared, equations, fingerprint, new_network};
+use super::job::{declared, fingerprint, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
 use crate::model::{LastLayer, Library, System};
 use crate::train::{Backend, Checkpoint, Origin};
@@ -32,7 +32,7 @@ impl Job {
             ));
         }
         // Only to refuse a checkpoint of another system: the equations come from beside the weights.
-        let meant = equations(&declared(&recipe, library)?.system);
+        let meant = declared(&recipe, library)?.system.dynamics();
         let refused = |source| RecipeError::OtherModel {
             path: recipe.path.clone(),
             source: Box::new(source),
@@ -67,7 +67,7 @@ fn tuned(
     seed: u64,
 ) -> Result<Job, RecipeError> {
     let system = beside(checkpoint, library)?;
-    let dynamics = equations(&system);
+    let dynamics = system.dynamics();
     let prior = checkpoint.model(&dynamics, &backend.device())?;
     let material = Material::gather(&recipe, &system, library, seed)?;
     let residual = || new_network(&recipe, &system, &material, seed, LastLayer::Zero);

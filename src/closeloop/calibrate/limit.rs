@@ -167,7 +167,7 @@ impl<'a> Look<'a> {
         let accepted = self.accepted;
         let mut effects = accepted.effects.clone();
         effects.push(start.clone());
-        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
+        let dynamics = self.study.dynamics(effects.clone());
         let values = values_on(self.study.logs, &accepted.declared, &effects);
         let switch = values.common.len() - start.values.len() + switch;
         as_it_stands(

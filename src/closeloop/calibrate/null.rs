@@ -58,7 +58,7 @@ impl<'a> Null<'a> {
     /// 2008): colour, rounding and size stay, whatever is systematic goes. `None` where the motion diverges.
     pub fn draw(&self, more: &[FittedEffect], rng: &mut impl Rng) -> Option<Vec<Log>> {
         let effects = [self.accepted.effects.as_slice(), more].concat();
-        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
+        let dynamics = self.study.dynamics(effects.clone());
         let values = values_on(&self.apart, &self.accepted.declared, &effects);
         let rig = self.study.on(&self.apart);
         let motion = rig.shooting.residuals(&dynamics, &values, &self.locals);

@@ -32,7 +32,7 @@ pub(super) struct Contender {
 impl Contender {
     pub fn new(study: &Study<'_>, effects: &[FittedEffect], declared: &[f64]) -> Self {
         Self {
-            dynamics: study.system.dynamics_with(effects, &study.sign),
+            dynamics: study.dynamics(effects.to_vec()),
             values: values_on(study.logs, declared, effects),
         }
     }

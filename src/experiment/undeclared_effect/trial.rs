@@ -154,7 +154,7 @@ impl Lab {
     }
 
     fn declared(&self) -> Dynamics {
-        self.declared.dynamics(&self.declared.sign())
+        self.declared.dynamics()
     }
 
     fn predictor(&self, dynamics: Dynamics) -> Predictor {

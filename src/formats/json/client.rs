@@ -66,6 +66,7 @@ impl SavedModel {
             program: self.equations.program()?,
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),
             reading: None,
+            own: Vec::new(),
         };
         let networks = numbers.prior.iter().chain(&numbers.residual);
         ReferenceModel::new(equations, networks, self.integrator, self.step_s)

@@ -81,7 +81,7 @@ impl Imported {
         let file = description.weights.to_string_lossy();
         let numbers = from_bytes(shape, &bytes, &file, folder)?;
         let system = System::from_text(path, &description.model_toml, effects)?;
-        let dynamics = system.dynamics(&system.sign());
+        let dynamics = system.dynamics();
         check(path, shape, &dynamics.parameters)?;
         Ok(Self {
             description,
@@ -95,7 +95,7 @@ impl Imported {
     /// # Errors
     /// A folder that cannot be written, or that holds anything but a checkpoint.
     pub fn save(self, dir: &Path, seed: u64, backend: Backend) -> Result<(), ImportError> {
-        let dynamics = self.system.dynamics(&self.system.sign());
+        let dynamics = self.system.dynamics();
         let shape = &self.description.shape;
         let model = shape.model(&self.numbers, &dynamics, &backend.device())?;
         let Description {

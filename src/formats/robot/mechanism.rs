@@ -7,7 +7,6 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::data;
-use crate::expr::SignForm;
 use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
 use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
 
@@ -193,11 +192,7 @@ fn at_zero(joint: &Joint) -> Pose {
 
 /// For each joint the speed over which dry friction reverses; 0 where it does so at once.
 pub(in crate::formats) fn friction_widths(model: &ExportModel) -> String {
-    let widths = model.system.sign().into_iter().map(|sign| match sign {
-        SignForm::Exact => 0.0,
-        SignForm::Smooth { width } => width,
-    });
-    numbers(widths)
+    numbers(model.system.sign_widths())
 }
 
 /// Numbers of 15 digits with blanks between them; what rounding left of zero is zero.

@@ -530,11 +530,10 @@ mod tests {
     use std::path::Path;
 
     use super::recover;
-    use crate::expr::SignForm;
     use crate::model::{Library, System};
 
     fn recovered(system: &System) -> Result<super::Recovered, String> {
-        let declared = system.dynamics_with(&[], &vec![SignForm::DEFAULT; system.joints]);
+        let declared = system.with_effects(Vec::new()).dynamics();
         recover(&declared, &system.prismatic)
     }
 

@@ -8,7 +8,6 @@ use burn::tensor::{Device, Gradients};
 use rand::RngExt;
 
 use super::{hybrid, one_joint, parameter, rng, transitions};
-use crate::expr::SignForm;
 use crate::model::{
     Angles, Dynamics, HybridModel, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
     PRIOR_ID, RESIDUAL_ID, ResidualOn,
@@ -46,7 +45,7 @@ pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
 pub(super) fn equations(joints: usize) -> Dynamics {
     let name = ["pendulum", "acrobot"][joints - 1];
     let system = Library::built_in().system(Path::new(name)).unwrap();
-    let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; joints]);
+    let mut dynamics = system.dynamics();
     dynamics.parameters[1].fixed = true;
     dynamics
 }
