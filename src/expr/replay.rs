@@ -5,10 +5,6 @@ use super::{Node, Program};
 
 /// A value on the way through a replay: constants stay numbers until they meet a tensor.
 #[derive(Clone)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "a replay holds few values, each for a moment"
-)]
 enum Value {
     Number(f64),
     Column(Tensor<1>),

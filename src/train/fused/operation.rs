@@ -1,7 +1,9 @@
+// `train::Backend` says why this backend.
+#![allow(deprecated)]
+
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex};
 
-#[allow(deprecated)] // see `train::Backend`
 use burn::backend::NdArray;
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
 use burn::backend::autodiff::grads::Gradients;
