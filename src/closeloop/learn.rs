@@ -1,13 +1,21 @@
+//! Stage 8: train a small network on what the refined model leaves.
+
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
 
-use super::study::{Fitted, Study, joined};
+use super::fitted::Fitted;
+use super::per_log::joined;
+use super::refine::Refined;
+use super::stage::{Progress, Stage};
+use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
-    as_modelled,
+    Dynamics, HybridError, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
+    absorbed, as_modelled,
 };
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
@@ -30,50 +38,73 @@ pub struct Learned {
     pub hybrid: Dynamics,
 }
 
-/// Train the residual MLP on what the fitted model leaves, with the physics held, and return the hybrid of the
-/// epoch that predicts stretches best that it was not trained on; the untrained one is among them.
-pub fn learn_residual(
-    study: &Study<'_>,
-    model: &Fitted,
-    backend: Backend,
-    rng: &mut ChaCha8Rng,
-    progress: &mut dyn FnMut(&str),
-) -> Result<Option<Learned>, TrainError> {
+/// Why the residual network could not be trained.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LearnError {
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    #[error(transparent)]
+    Hybrid(#[from] HybridError),
+}
+
+/// Train the residual network on what the refined model leaves, with the physics held, and return the hybrid of the
+/// epoch that predicts best the stretches that it was not trained on; the untrained one is among them. `None` where
+/// no network is asked for or the logs are too few to train it.
+pub(super) fn learn(
+    refined: &Refined<'_>,
+    backend: Option<Backend>,
+    rng: &mut impl Rng,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Result<Option<Learned>, LearnError> {
+    let Refined { study, model, .. } = refined;
+    let Some(backend) = backend else {
+        return Ok(None);
+    };
     let Some((training, validation)) = segments(study, model) else {
         return Ok(None);
     };
+    let hybrid = untrained(study, model, &training, backend, rng)?;
+    // Training takes numbers from a stream of its own, which its checkpoint carries on.
+    let mut run = Training::new(hybrid, fit_settings(), ChaCha8Rng::from_rng(rng))?;
+    run.run(&training, Some(&validation), &mut |at| {
+        let text = format!(
+            "{}, epoch {} of {}",
+            Stage::Learn.text(),
+            at.epoch,
+            at.epochs
+        );
+        progress(Progress::within(Stage::Learn, &text));
+        ControlFlow::Continue(())
+    })?;
+    Ok(Some(Learned {
+        hybrid: run.result()?.to_dynamics()?,
+        training: run,
+    }))
+}
+
+/// The model with a network that adds nothing yet.
+fn untrained(
+    study: &Study<'_>,
+    model: &Fitted,
+    training: &Segments,
+    backend: Backend,
+    rng: &mut impl Rng,
+) -> Result<HybridModel, LearnError> {
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
     let (declared, effects) = absorbed(&model.declared, &model.effects);
     let dynamics = study
         .dynamics(effects.clone())
         .with_values(joined(&declared, &effects));
+    let joints = study.system.joints;
     let settings = MlpSettings {
         hidden: study.system.hidden.clone(),
         on: ResidualOn::Accelerations,
-        ..MlpSettings::for_joints(study.system.joints)
+        ..MlpSettings::for_joints(joints)
     };
     let scaling = training.scaling(settings.angles);
-    let weights = MlpWeights::new(
-        study.system.joints,
-        &settings,
-        scaling,
-        LastLayer::Zero,
-        rng,
-    );
-    let hybrid = HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?;
-    let mut run = Training::new(hybrid, fit_settings(), rng.clone())?;
-    run.run(&training, Some(&validation), &mut |at| {
-        progress(&format!(
-            "training the residual network, epoch {} of {}",
-            at.epoch, at.epochs
-        ));
-        ControlFlow::Continue(())
-    })?;
-    let hybrid = run.result()?.to_dynamics()?;
-    Ok(Some(Learned {
-        training: run,
-        hybrid,
-    }))
+    let weights = MlpWeights::new(joints, &settings, scaling, LastLayer::Zero, rng);
+    Ok(HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?)
 }
 
 fn fit_settings() -> FitSettings {

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::text::{listed, small};
-use crate::closeloop::{Calibration, HIDDEN, Limit, Size};
+use crate::closeloop::{Calibration, DetectionLimit, HIDDEN, Smallest};
 use crate::data::Joint;
 use crate::model::{EffectParameter, FittedEffect};
 
@@ -96,11 +96,11 @@ fn alarms(calibration: &Calibration) -> Vec<AlarmEntry> {
         .collect()
 }
 
-fn smallest(limit: &Limit, top_torque: &[f64]) -> SmallestEntry {
+fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
     let effect = &limit.effect;
     let parameters = &effect.effect.parameters;
     let (leading, values) = match &limit.smallest {
-        Size::Named { switch, values } => (*switch, values.as_slice()),
+        Smallest::Detectable { switch, values } => (*switch, values.as_slice()),
         // The parameter that its size would be told by.
         _ => (
             parameters.iter().position(|p| p.is_switch()).unwrap_or(0),
@@ -141,16 +141,16 @@ fn smallest(limit: &Limit, top_torque: &[f64]) -> SmallestEntry {
     }
 }
 
-fn reason(size: &Size) -> Option<&'static str> {
+fn reason(size: &Smallest) -> Option<&'static str> {
     match size {
-        Size::Named { .. } => None,
-        Size::NeverTold => Some("not told from the rest of the model at any size"),
-        Size::NotComputed => Some("not computed: no value of a parameter switches it off"),
+        Smallest::Detectable { .. } => None,
+        Smallest::Indistinguishable => Some("not told from the rest of the model at any size"),
+        Smallest::NotComputed => Some("not computed: no value of a parameter switches it off"),
     }
 }
 
 /// What was named beside the hidden effect, or in its place.
-fn besides(limit: &Limit) -> impl Iterator<Item = &FittedEffect> {
+fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &FittedEffect> {
     let named = limit.named.iter().flatten();
     named.filter(|named| named.label() != limit.effect.label())
 }
@@ -231,7 +231,7 @@ fn alarms_in_words(calibration: &Calibration) -> String {
     out
 }
 
-fn hidden(limit: &Limit) -> String {
+fn hidden(limit: &DetectionLimit) -> String {
     let others: Vec<String> = besides(limit).map(FittedEffect::label).collect();
     match (limit.verified(), others.is_empty()) {
         (None, _) => "not tried".to_owned(),

@@ -3,9 +3,10 @@
 use super::plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapePanel, ShapeSample, Track,
 };
-use crate::closeloop::{Curve, ForceSample, Outcome};
+use crate::closeloop::{Outcome, ResidualForce};
 use crate::data::{Joint, Log};
 use crate::evaluate::{Assessment, summarise, traces};
+use crate::identify::FitError;
 use crate::model::Dynamics;
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
@@ -13,7 +14,7 @@ const SHOWN_S: f64 = 8.0;
 
 /// Measured motion and open-loop predictions on the beginning of the first test log.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
-    let Some(log) = outcome.test.first() else {
+    let Some(log) = outcome.given.test.first() else {
         return Err(PlotError::Empty {
             title: "predictions".into(),
         });
@@ -25,14 +26,14 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
         (
             Role::Before,
             "declared model",
-            &outcome.before.dynamics,
-            outcome.before.values_in(log),
+            &outcome.models.before.dynamics,
+            outcome.models.before.values_in(log),
         ),
         (
             Role::After,
             "with effects",
-            &outcome.after.dynamics,
-            outcome.after.values_in(log),
+            &outcome.models.after.dynamics,
+            outcome.models.after.values_in(log),
         ),
     ];
     if let Some(learned) = &outcome.learned {
@@ -54,7 +55,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = Joint::all(outcome.after.dynamics.joints)
+    let panels: Vec<Panel> = Joint::all(outcome.models.after.dynamics.joints)
         .map(panel)
         .collect();
     let title = format!(
@@ -65,7 +66,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
 }
 
 fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
-    if outcome.prismatic[joint] {
+    if outcome.given.prismatic[joint] {
         JointKind::Prismatic
     } else {
         JointKind::Revolute
@@ -107,8 +108,9 @@ fn predicted(
 
 /// The residual generalised force over angle, speed, torque and time, before and after.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    let samples = |all: &[ForceSample], joint: Joint| {
-        all.iter()
+    type Force = Result<ResidualForce, FitError>;
+    let samples = |force: &Force, joint: Joint| {
+        (force.iter().flat_map(|force| &force.samples))
             .map(|s| ShapeSample {
                 values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
                 residual: s.force[joint],
@@ -123,9 +125,10 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
             "t".to_owned(),
         ]
     };
-    let curves = |all: &[Curve], joint: Joint| {
+    let curves = |force: &Force, joint: Joint| {
         names(joint).map(|name| {
-            let found = all.iter().find(|c| c.joint == joint && c.variable == name);
+            let found = (force.iter().flat_map(|force| &force.curves))
+                .find(|c| c.joint == joint && c.variable == name);
             found.map(|c| ShapeCurve {
                 x: c.x.clone(),
                 force: c.force.clone(),
@@ -137,12 +140,12 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
     let panel = |joint: Joint| ShapePanel {
         joint,
         kind: kind(outcome, joint),
-        before: samples(&outcome.residual_before, joint),
-        after: samples(&outcome.residual_after, joint),
-        curves_before: curves(&outcome.curves_before, joint),
-        curves_after: curves(&outcome.curves_after, joint),
+        before: samples(&outcome.remainder.before, joint),
+        after: samples(&outcome.remainder.after, joint),
+        curves_before: curves(&outcome.remainder.before, joint),
+        curves_after: curves(&outcome.remainder.after, joint),
     };
-    let panels: Vec<ShapePanel> = Joint::all(outcome.after.dynamics.joints)
+    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.dynamics.joints)
         .map(panel)
         .collect();
     super::plot::residual_shape(&panels, "What the model lacks, before and after")
@@ -151,7 +154,7 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
 /// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let errors = &outcome.errors;
     let named = |role: Role, label: &str, model: &Assessment| {
         let rmse = summarise(&model.horizons, joints).position_rmse;

@@ -13,7 +13,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         headline(outcome).replace("**", ""),
         outcome.reason
     );
-    for finding in &outcome.findings {
+    for finding in &outcome.effects.findings {
         let (name, joint) = (finding.effect.title(), finding.effect.joint);
         let _ = writeln!(
             out,
@@ -22,17 +22,17 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             values(finding).join("\n    ")
         );
     }
-    if let Some(proposal) = &outcome.proposal {
+    if let Some(proposal) = &outcome.remainder.proposal {
         let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
-    for &k in &outcome.identifiability.hold {
-        let name = &outcome.before.dynamics.parameters[k].name;
+    for &k in &outcome.models.identifiability.hold {
+        let name = &outcome.models.before.dynamics.parameters[k].name;
         let _ = writeln!(
             out,
             "  {name} is held, the logs do not determine it: the other values are relative to it"
         );
     }
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
     let (before, after) = (
         numbers(&outcome.errors.before),
@@ -40,7 +40,11 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
     );
     for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
         for joint in Joint::all(joints) {
-            let unit = if outcome.prismatic[joint] { "m" } else { "rad" };
+            let unit = if outcome.given.prismatic[joint] {
+                "m"
+            } else {
+                "rad"
+            };
             let (before, after) = (small(before[h][joint]), small(after[h][joint]));
             let seconds = horizon.horizon_s;
             let _ = writeln!(
@@ -62,7 +66,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
 
 /// `joint 1 0.00942, 0.157, 0.375 rad at 0.1, 0.5, 1 s`
 fn errors(outcome: &Outcome, model: &Assessment) -> String {
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let Summary {
         horizons_s,
         position_rmse,
@@ -70,7 +74,11 @@ fn errors(outcome: &Outcome, model: &Assessment) -> String {
     } = summarise(&model.horizons, joints);
     let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(", ");
     let of_joint = |joint: Joint| {
-        let unit = if outcome.prismatic[joint] { "m" } else { "rad" };
+        let unit = if outcome.given.prismatic[joint] {
+            "m"
+        } else {
+            "rad"
+        };
         let errors = list(&mut position_rmse.iter().map(|row| small(row[joint])));
         format!("joint {joint} {errors} {unit}")
     };

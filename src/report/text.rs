@@ -2,17 +2,19 @@ use std::fmt::Write;
 
 use super::calibration::section;
 use crate::closeloop::{
-    Finding, How, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, SIGNIFICANT, UNKNOWN, Verdict, norm,
+    Finding, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, ResidualForce, SIGNIFICANT, SplitMethod,
+    UNKNOWN, Verdict,
 };
 use crate::data::{Joint, Severity};
 use crate::evaluate::{Summary, summarise};
+use crate::identify::FitError;
 use crate::model::{OwnValue, Parameter};
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
     let sections = [
         answer(outcome),
-        effects(&outcome.findings),
+        effects(&outcome.effects.findings),
         confirmed(outcome),
         errors(outcome),
         parameters(outcome),
@@ -33,7 +35,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 fn answer(outcome: &Outcome) -> String {
     format!(
         "# {}: {}\n\n{}.\n\n",
-        outcome.after.dynamics.name,
+        outcome.models.after.dynamics.name,
         headline(outcome),
         capitalised(&outcome.reason)
     )
@@ -41,6 +43,7 @@ fn answer(outcome: &Outcome) -> String {
 
 pub(super) fn headline(outcome: &Outcome) -> String {
     let found: Vec<String> = outcome
+        .effects
         .findings
         .iter()
         .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint))
@@ -180,7 +183,7 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
     let hybrid = errors.hybrid.iter();
     models.extend(hybrid.map(|m| ("with effects and network", m)));
     models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     models
         .into_iter()
         .map(|(name, model)| (name, summarise(&model.horizons, joints)))
@@ -203,7 +206,7 @@ fn errors(outcome: &Outcome) -> String {
     );
     let (before, after) = (&models[1].1, &models[2].1);
     for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for joint in Joint::all(outcome.after.dynamics.joints) {
+        for joint in Joint::all(outcome.models.after.dynamics.joints) {
             let rmse = |s: &Summary| s.position_rmse[h][joint];
             let cell = |(_, s): &(&str, Summary)| {
                 format!(
@@ -249,11 +252,11 @@ pub(super) fn small(x: f64) -> String {
 }
 
 fn parameters(outcome: &Outcome) -> String {
-    let declared = outcome.before.declared.len();
+    let declared = outcome.models.before.declared.len();
     let mut out = String::from("## Parameters of the declared equations\n\n");
-    for (parameter, before) in outcome.parameters[..declared]
+    for (parameter, before) in outcome.models.parameters[..declared]
         .iter()
-        .zip(&outcome.before.declared)
+        .zip(&outcome.models.before.declared)
     {
         let _ = writeln!(
             out,
@@ -261,14 +264,14 @@ fn parameters(outcome: &Outcome) -> String {
             value(parameter)
         );
     }
-    let verdict = &outcome.identifiability;
+    let verdict = &outcome.models.identifiability;
     let _ = writeln!(
         out,
         "\nThe logs determine {} of {} free parameters.",
         verdict.determined, verdict.free
     );
     for &k in &verdict.hold {
-        let name = &outcome.before.dynamics.parameters[k].name;
+        let name = &outcome.models.before.dynamics.parameters[k].name;
         let _ = writeln!(
             out,
             "- `{name}` is held: the logs determine it only in combination with others. \
@@ -280,7 +283,7 @@ fn parameters(outcome: &Outcome) -> String {
 
 /// Why the numbers in the file do not predict these logs, parameter by parameter.
 fn contradicted(outcome: &Outcome) -> String {
-    if outcome.contradicted.is_empty() {
+    if outcome.models.contradicted.is_empty() {
         return String::new();
     }
     let errors = &outcome.errors;
@@ -294,7 +297,7 @@ fn contradicted(outcome: &Outcome) -> String {
         small(fitted),
         fitted / written.max(f64::MIN_POSITIVE)
     );
-    for one in &outcome.contradicted {
+    for one in &outcome.models.contradicted {
         let _ = writeln!(
             out,
             "- {}: declared {}, fitted {}: {}",
@@ -309,11 +312,11 @@ fn contradicted(outcome: &Outcome) -> String {
 }
 
 fn alternatives(outcome: &Outcome) -> String {
-    if outcome.alternatives.is_empty() {
+    if outcome.effects.alternatives.is_empty() {
         return String::new();
     }
     let mut out = String::from("## Other explanations that these logs do not rule out\n\n");
-    for alternative in &outcome.alternatives {
+    for alternative in &outcome.effects.alternatives {
         let _ = writeln!(
             out,
             "- **{}** on joint {}: {}. To tell: {}.",
@@ -327,7 +330,10 @@ fn alternatives(outcome: &Outcome) -> String {
 }
 
 fn confirmed(outcome: &Outcome) -> String {
-    let mut out = match (outcome.findings.is_empty(), outcome.confirmed_on) {
+    let mut out = match (
+        outcome.effects.findings.is_empty(),
+        outcome.effects.confirmed_on,
+    ) {
         (true, _) => String::new(),
         (false, 0) => {
             "The logs leave nothing to confirm the effects on beyond what they were chosen by.\n"
@@ -337,7 +343,7 @@ fn confirmed(outcome: &Outcome) -> String {
             "Each effect lowers the loss on {stretches} stretches of training data that it was not chosen by.\n"
         ),
     };
-    for taken_back in &outcome.taken_back {
+    for taken_back in &outcome.effects.taken_back {
         let (label, reason) = (taken_back.effect.label(), &taken_back.reason);
         let _ = writeln!(out, "- **{label}** was chosen and taken back: {reason}.");
     }
@@ -345,7 +351,7 @@ fn confirmed(outcome: &Outcome) -> String {
 }
 
 fn left(outcome: &Outcome) -> String {
-    let left = &outcome.unexplained;
+    let left = &outcome.remainder.unexplained;
     let p = probability(left.p_value);
     let share = 100.0 * left.omnibus.most().1;
     let structure = match left.place.as_str() {
@@ -370,13 +376,25 @@ fn left(outcome: &Outcome) -> String {
     };
     format!(
         "## What is left\n\n{:.1} % of the residual variance above the sensor's noise is left. {structure}\n{network}\
-         Residual generalised force: {:.4} before, {:.4} after (root mean square over stretches of 0.15 s, N m or N).\n\n\
+         Residual generalised force: {} before, {} after (root mean square over stretches of 0.15 s, N m or N).\n\n\
          ![residual](residual.svg)\n\n{}",
         100.0 * left.fraction,
-        norm(&outcome.residual_before),
-        norm(&outcome.residual_after),
-        outcome.proposal.as_ref().map(proposed).unwrap_or_default()
+        force(&outcome.remainder.before),
+        force(&outcome.remainder.after),
+        outcome
+            .remainder
+            .proposal
+            .as_ref()
+            .map(proposed)
+            .unwrap_or_default()
     )
+}
+
+fn force(force: &Result<ResidualForce, FitError>) -> String {
+    match force {
+        Ok(force) => format!("{:.4}", force.norm()),
+        Err(error) => format!("not computed ({error})"),
+    }
 }
 
 fn proposed(proposal: &Proposal) -> String {
@@ -402,7 +420,7 @@ fn tried(outcome: &Outcome) -> String {
     let mut out = String::from(
         "## What was tried\n\nGain: fall of the loss on stretches left out of the fit.\n\n",
     );
-    for (number, round) in outcome.rounds.iter().enumerate() {
+    for (number, round) in outcome.effects.rounds.iter().enumerate() {
         let _ = writeln!(
             out,
             "Round {} ({} candidates; the most promising ones were fitted):\n\n| effect | joint | gain | p | |\n|---|---|---|---|---|",
@@ -422,8 +440,12 @@ fn tried(outcome: &Outcome) -> String {
         }
         out.push('\n');
     }
-    if outcome.rounds.len() == MOST_EFFECTS
-        && outcome.rounds.last().is_some_and(|r| r.chosen.is_some())
+    if outcome.effects.rounds.len() == MOST_EFFECTS
+        && outcome
+            .effects
+            .rounds
+            .last()
+            .is_some_and(|r| r.chosen.is_some())
     {
         let _ = writeln!(
             out,
@@ -434,10 +456,12 @@ fn tried(outcome: &Outcome) -> String {
 }
 
 fn logs(outcome: &Outcome) -> String {
-    let how = match &outcome.how_split {
-        How::Given => "as given".to_owned(),
-        How::LastLogs { count } => format!("the last {count} of the logs were kept for the test"),
-        How::EndOfEachLog { share, gap_s } => {
+    let how = match &outcome.given.split {
+        SplitMethod::Given => "as given".to_owned(),
+        SplitMethod::LastLogs { count } => {
+            format!("the last {count} of the logs were kept for the test")
+        }
+        SplitMethod::EndOfEachLog { share, gap_s } => {
             format!(
                 "the last {:.0} % of each log, after a gap of {gap_s} s, were kept for the test",
                 100.0 * share
@@ -446,12 +470,13 @@ fn logs(outcome: &Outcome) -> String {
     };
     let mut out = format!("## Logs\n\nSplit: {how}.\n\n");
     let roles = outcome
+        .given
         .train
         .iter()
         .map(|_| "fitted")
-        .chain(outcome.test.iter().map(|_| "test"));
-    let all = outcome.train.iter().chain(&outcome.test);
-    for ((log, audit), role) in all.zip(&outcome.audits).zip(roles) {
+        .chain(outcome.given.test.iter().map(|_| "test"));
+    let all = outcome.given.train.iter().chain(&outcome.given.test);
+    for ((log, audit), role) in all.zip(&outcome.given.audits).zip(roles) {
         let _ = writeln!(
             out,
             "- **{}** ({role}): {} rows, {:.2} s",
@@ -475,6 +500,7 @@ fn logs(outcome: &Outcome) -> String {
 
 fn footer(outcome: &Outcome, seed: u64) -> String {
     let widths: Vec<String> = outcome
+        .models
         .sign_widths
         .iter()
         .map(|w| format!("{w:.3}"))

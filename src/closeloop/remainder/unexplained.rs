@@ -2,11 +2,12 @@ use rand::Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::candidate::acting;
-use super::evidence::{gain, p_value};
-use super::folds::{folds, left_out_losses};
 use super::omnibus::{Omnibus, omnibus};
-use super::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::select::acting;
+use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::select::{gain, p_value};
+use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 

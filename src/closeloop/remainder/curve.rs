@@ -2,7 +2,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::residual::ForceSample;
+use super::force::ForceSample;
 use crate::data::Joint;
 use crate::identify::{BLOCK_S, stretches};
 
@@ -72,7 +72,7 @@ const HUBER: f64 = 3.0;
 
 /// One curve for each joint and each variable that takes more than one value; none for logs too short to give
 /// a band. The curves of a joint are fitted together, so that none borrows the shape of another.
-pub fn curves(samples: &[ForceSample], prismatic: &[bool]) -> Vec<Curve> {
+pub(super) fn curves(samples: &[ForceSample], prismatic: &[bool]) -> Vec<Curve> {
     let blocks = stretches(samples.iter().map(|s| (s.log, s.time_s)), BLOCK_S);
     if blocks.last().is_none_or(|last| last + 1 < FEWEST_STRETCHES) {
         return Vec::new();

@@ -1,7 +1,8 @@
 use rand::{Rng, RngExt};
 
+use crate::closeloop::fitted::Fitted;
 use crate::closeloop::per_log::values_on;
-use crate::closeloop::study::{Fitted, Study};
+use crate::closeloop::study::Study;
 use crate::data::{Log, half_width_s};
 use crate::identify::{FitError, Window, blocks, fit};
 use crate::model::FittedEffect;
@@ -11,7 +12,7 @@ use crate::model::FittedEffect;
 /// A rig that balances upright cannot be simulated open loop over a whole log. Each window is simulated
 /// from its fitted start state instead, under the logged torques, and the windows stand apart in time:
 /// whatever cuts such logs into windows finds these again, and no motion leaps within one.
-pub(super) struct Null<'a> {
+pub(super) struct SimulatedLogs<'a> {
     study: &'a Study<'a>,
     accepted: &'a Fitted,
     /// The windows of each training log, a pause before each.
@@ -24,7 +25,7 @@ pub(super) struct Null<'a> {
     members: Vec<usize>,
 }
 
-impl<'a> Null<'a> {
+impl<'a> SimulatedLogs<'a> {
     /// # Errors
     /// A model that diverges on the logs, or logs without a window.
     pub fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {

@@ -1,7 +1,8 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::folds::left_out_losses;
-use super::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
 use crate::identify::uncertainty;
 use crate::model::FittedEffect;
 
@@ -22,10 +23,10 @@ pub struct Evidence {
 
 /// An effect must lower the loss on left-out stretches by this share, the error itself thus by a twentieth: less
 /// is of no use to anyone, and on real rigs it is what a wrong effect saves by standing in for others.
-pub(super) const WORTHWHILE: f64 = 0.1;
+pub const WORTHWHILE: f64 = 0.1;
 /// An effect plainly helps that takes away half of the loss on stretches that it was not fitted to: chance does
 /// not do that.
-pub(super) const PLAIN: f64 = 0.5;
+pub const PLAIN: f64 = 0.5;
 /// Candidates within this many standard errors of the best explain the logs as well as it does.
 const AS_GOOD: f64 = 2.0;
 /// And they save this share of what it saves,
@@ -80,7 +81,7 @@ impl Evidence {
 }
 
 /// Fall of the loss as a share of what it was.
-pub(super) fn gain(before: &[f64], after: &[f64]) -> f64 {
+pub fn gain(before: &[f64], after: &[f64]) -> f64 {
     1.0 - after.iter().sum::<f64>() / before.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 

@@ -1,5 +1,6 @@
 use super::motion::Motion;
-use crate::closeloop::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
 use crate::data::Joint;
 
 /// What drives the rig.
@@ -30,7 +31,7 @@ enum Start {
 
 /// One experiment that the rig of the logs might do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Entry {
+struct MenuItem {
     /// What to do; `{joint}`, `{torque}` (N m or N) and `{speed}` (rad/s or m/s) stand for what the logs say.
     text: &'static str,
     drive: Drive,
@@ -41,7 +42,7 @@ struct Entry {
     turns: bool,
 }
 
-const AS_LOGGED: Entry = Entry {
+const AS_LOGGED: MenuItem = MenuItem {
     text: "longer logs of the same motion",
     drive: Drive::Logged {
         factor: 1.0,
@@ -52,8 +53,8 @@ const AS_LOGGED: Entry = Entry {
     turns: false,
 };
 
-const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> Entry {
-    Entry {
+const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> MenuItem {
+    MenuItem {
         text,
         drive: Drive::Logged { factor, pace },
         start: Start::Logged(speed),
@@ -61,8 +62,8 @@ const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> Entry
     }
 }
 
-const fn coasting(text: &'static str, speed: f64) -> Entry {
-    Entry {
+const fn coasting(text: &'static str, speed: f64) -> MenuItem {
+    MenuItem {
         text,
         drive: Drive::Nothing,
         start: Start::TopSpeed(speed),
@@ -70,8 +71,8 @@ const fn coasting(text: &'static str, speed: f64) -> Entry {
     }
 }
 
-const fn turning(text: &'static str, torque: f64) -> Entry {
-    Entry {
+const fn turning(text: &'static str, torque: f64) -> MenuItem {
+    MenuItem {
         text,
         drive: Drive::Added(torque),
         turns: true,
@@ -80,9 +81,9 @@ const fn turning(text: &'static str, torque: f64) -> Entry {
 }
 
 /// Smallest changes of what the user does already first.
-const MENU: [Entry; 12] = [
+const MENU: [MenuItem; 12] = [
     AS_LOGGED,
-    Entry {
+    MenuItem {
         text: "the same motion sampled four times as often",
         finer: 4,
         ..AS_LOGGED
@@ -97,7 +98,7 @@ const MENU: [Entry; 12] = [
     ),
     logged("the same torque run twice as fast", 1.0, 2.0, 1.0),
     logged("the torque's sign reversed", -1.0, 1.0, -1.0),
-    Entry {
+    MenuItem {
         text: "slow torque ramps on joint {joint} from standstill to {torque}, up and down",
         drive: Drive::Ramps(0.5),
         start: Start::Rest,
@@ -131,7 +132,7 @@ const RAMPS_S: f64 = 8.0;
 const MOTIONS: usize = 10;
 
 /// An experiment ready to be simulated.
-pub(super) struct Proposal {
+pub(super) struct Experiment {
     pub text: String,
     pub motions: Vec<Motion>,
     /// A joint that must go round.
@@ -140,22 +141,22 @@ pub(super) struct Proposal {
 
 /// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
 /// states are where motions begin.
-pub(super) fn proposals(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -> Vec<Proposal> {
-    let of_one_joint = |entry: &Entry| entry.text.contains("{joint}");
+pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -> Vec<Experiment> {
+    let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
     let mut all = Vec::new();
-    for entry in &MENU {
-        let joints = if of_one_joint(entry) {
+    for item in &MENU {
+        let joints = if of_one_joint(item) {
             joints
         } else {
             &[Joint::at(0)]
         };
         let able = joints
             .iter()
-            .filter(|joint| entry.is_possible(study, **joint));
-        all.extend(able.map(|&joint| Proposal {
-            text: entry.words(study, joint),
-            motions: entry.motions(study, model, joint),
-            turns: entry.turns.then_some(joint),
+            .filter(|joint| item.is_possible(study, **joint));
+        all.extend(able.map(|&joint| Experiment {
+            text: item.words(study, joint),
+            motions: item.motions(study, model, joint),
+            turns: item.turns.then_some(joint),
         }));
     }
     all
@@ -166,7 +167,7 @@ pub(super) fn as_logged(study: &Study<'_>, model: &Fitted) -> Vec<Motion> {
     AS_LOGGED.motions(study, model, Joint::at(0))
 }
 
-impl Entry {
+impl MenuItem {
     fn is_possible(&self, study: &Study<'_>, joint: Joint) -> bool {
         let undriven = [AS_LOGGED.drive, Drive::Nothing].contains(&self.drive);
         let driven = match self.drive {

@@ -3,11 +3,12 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::candidate::best_start;
-use super::evidence::gain;
-use super::folds::{folds, left_out_losses};
-use super::study::{Fitted, Study};
 use super::unexplained::{NOTEWORTHY, Unexplained};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::select::best_start;
+use crate::closeloop::select::gain;
+use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 

@@ -12,7 +12,10 @@ pub struct Contradicted {
 
 /// The declared values that lie outside of the intervals of the fitted ones. Both are in the same order; parameters
 /// without an interval were not fitted and contradict nothing.
-pub(super) fn contradicted(declared: &[f64], fitted: &[Parameter]) -> Vec<Contradicted> {
+pub(in crate::closeloop) fn contradicted(
+    declared: &[f64],
+    fitted: &[Parameter],
+) -> Vec<Contradicted> {
     let outside = |(&declared, fitted): (&f64, &Parameter)| {
         let [low, high] = fitted.ci95?;
         (!(low..=high).contains(&declared)).then(|| Contradicted {

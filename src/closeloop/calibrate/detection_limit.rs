@@ -1,25 +1,43 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::Limit;
-use crate::closeloop::candidate::{candidates, starts};
-use crate::closeloop::evidence::{PLAIN, WORTHWHILE};
-use crate::closeloop::folds::{folds, left_out_losses};
+use crate::closeloop::fitted::Fitted;
 use crate::closeloop::per_log::values_on;
-use crate::closeloop::search::{FALSE_ALARM, SIGNIFICANT_ALONE};
+use crate::closeloop::select::{FALSE_ALARM, SIGNIFICANT_ALONE};
+use crate::closeloop::select::{PLAIN, WORTHWHILE};
+use crate::closeloop::select::{candidates, starts};
+use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::split::set_aside;
-use crate::closeloop::study::{Fitted, Study};
+use crate::closeloop::study::Study;
 use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty};
 use crate::model::{Effect, FittedEffect};
 
+/// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectionLimit {
+    /// The effect, absent.
+    pub effect: FittedEffect,
+    pub smallest: Smallest,
+    /// What was named with the effect at [`HIDDEN`](super::HIDDEN) times that size; `None` where it was not tried.
+    pub named: Option<Vec<FittedEffect>>,
+}
+
+impl DetectionLimit {
+    /// Whether the hidden effect was named; `None` where it was not tried.
+    pub fn verified(&self) -> Option<bool> {
+        let is_this = |named: &FittedEffect| named.label() == self.effect.label();
+        self.named.as_ref().map(|named| named.iter().any(is_this))
+    }
+}
+
 /// The smallest size of one effect that the search would name.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Size {
+pub enum Smallest {
     /// One switch alone, the one that shows at the smallest multiple of its typical value; the values of all
     /// parameters, inner ones at the searched values that show the effect best, other switches at zero.
-    Named { switch: usize, values: Vec<f64> },
+    Detectable { switch: usize, values: Vec<f64> },
     /// No size: the motion does not tell it from what the model has.
-    NeverTold,
+    Indistinguishable,
     /// No parameter at zero switches the effect off, so that its size has no scale to start from.
     NotComputed,
 }
@@ -34,11 +52,11 @@ const OWN: f64 = 1e-6;
 ///
 /// # Errors
 /// A model that diverges on the logs.
-pub(super) fn limits(
+pub(super) fn detection_limits(
     study: &Study<'_>,
     accepted: &Fitted,
     library: &[Effect],
-) -> Result<Vec<Limit>, FitError> {
+) -> Result<Vec<DetectionLimit>, FitError> {
     // The search chooses on this part alone.
     let (chosen_by, _) = set_aside(study.logs);
     let mut part = study.on(&chosen_by);
@@ -52,7 +70,7 @@ pub(super) fn limits(
         .into_iter()
         .map(|candidate| {
             let smallest = look.size(&candidate, level);
-            Limit {
+            DetectionLimit {
                 effect: candidate,
                 smallest,
                 named: None,
@@ -102,13 +120,13 @@ impl<'a> Look<'a> {
         })
     }
 
-    fn size(&self, candidate: &FittedEffect, level: f64) -> Size {
+    fn size(&self, candidate: &FittedEffect, level: f64) -> Smallest {
         let parameters = &candidate.effect.parameters;
         let switches: Vec<usize> = (0..parameters.len())
             .filter(|&i| parameters[i].is_switch())
             .collect();
         if switches.is_empty() {
-            return Size::NotComputed;
+            return Smallest::NotComputed;
         }
         // Of a value that each log has of its own, the same in all: there are as many to be tested.
         let tested = if parameters.iter().any(|p| p.per_log) {
@@ -134,9 +152,8 @@ impl<'a> Look<'a> {
             |(switch, values): &(usize, Vec<f64>)| values[*switch] / parameters[*switch].typical;
         sizes
             .min_by(|a, b| multiple(a).total_cmp(&multiple(b)))
-            .map_or(Size::NeverTold, |(switch, values)| Size::Named {
-                switch,
-                values,
+            .map_or(Smallest::Indistinguishable, |(switch, values)| {
+                Smallest::Detectable { switch, values }
             })
     }
 

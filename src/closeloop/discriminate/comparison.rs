@@ -1,11 +1,12 @@
 use rayon::prelude::*;
 
-use super::menu::{Proposal, as_logged, proposals, spread};
+use super::menu::{Experiment, as_logged, experiments, spread};
 use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
+use crate::closeloop::fitted::Fitted;
 use crate::closeloop::per_log::values_on;
-use crate::closeloop::search::Rival;
-use crate::closeloop::study::{Fitted, Study, WINDOW_S};
+use crate::closeloop::select::Rival;
+use crate::closeloop::study::{Study, WINDOW_S};
 use crate::data::{Joint, Log};
 use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect};
@@ -23,13 +24,13 @@ const FINEST: f64 = 1e-6;
 const SCALE: f64 = 100.0;
 
 /// One of two explanations.
-pub(super) struct Contender {
+pub(super) struct Hypothesis {
     dynamics: Dynamics,
     /// What differs by log, by the logs of the study.
     values: Values,
 }
 
-impl Contender {
+impl Hypothesis {
     pub fn new(study: &Study<'_>, effects: &[FittedEffect], declared: &[f64]) -> Self {
         Self {
             dynamics: study.dynamics(effects.to_vec()),
@@ -86,11 +87,11 @@ impl Contender {
 }
 
 /// One of two explanations taken for the truth, the other for what is to be told from it.
-pub(super) struct Contest<'a> {
+pub(super) struct Comparison<'a> {
     study: &'a Study<'a>,
-    truth: Contender,
+    truth: Hypothesis,
     /// Fitted to the present logs as the truth has them.
-    other: Contender,
+    other: Hypothesis,
     noise: Vec<f64>,
     /// The motion of the present logs as the truth has it.
     present: Record,
@@ -104,7 +105,7 @@ pub(super) struct Contest<'a> {
 }
 
 /// What came of simulating one experiment.
-pub(super) struct Test {
+pub(super) struct Trial {
     /// What to do.
     pub text: String,
     /// The joint on which the difference is largest beside the noise.
@@ -118,13 +119,13 @@ pub(super) struct Test {
     pub seconds: f64,
 }
 
-impl<'a> Contest<'a> {
+impl<'a> Comparison<'a> {
     /// `model` is fitted to the study's logs: its start states are theirs. `None` where the truth cannot follow them.
     pub fn new(
         study: &'a Study<'a>,
         model: &Fitted,
-        truth: Contender,
-        other: Contender,
+        truth: Hypothesis,
+        other: Hypothesis,
     ) -> Option<Self> {
         let noise = &study.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
@@ -145,7 +146,7 @@ impl<'a> Contest<'a> {
         let differences = differences(&shooting, &other, &found, 0);
         Some(Self {
             inflation: inflation(study, model).max(too_sure),
-            other: Contender {
+            other: Hypothesis {
                 values: at_origins(found.found(), &present.origins),
                 ..other
             },
@@ -160,8 +161,8 @@ impl<'a> Contest<'a> {
     }
 
     /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
-    pub fn tests(&self, model: &Fitted, joints: &[Joint]) -> Vec<Test> {
-        let changes = proposals(self.study, model, joints);
+    pub fn trials(&self, model: &Fitted, joints: &[Joint]) -> Vec<Trial> {
+        let changes = experiments(self.study, model, joints);
         let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
         let payloads = self.payloads();
         let loaded = (payloads.par_iter())
@@ -182,12 +183,12 @@ impl<'a> Contest<'a> {
         )
     }
 
-    fn loaded(&self, model: &Fitted, payload: &Payload) -> Proposal {
+    fn loaded(&self, model: &Fitted, payload: &Payload) -> Experiment {
         let mut motions = as_logged(self.study, model);
         for time in motions.iter_mut().flat_map(|motion| &mut motion.time) {
             *time += payload.delay_s;
         }
-        Proposal {
+        Experiment {
             text: payload.text(&self.truth.dynamics),
             motions,
             turns: None,
@@ -195,11 +196,11 @@ impl<'a> Contest<'a> {
     }
 
     /// Simulate an experiment; `None` where the rig cannot do it.
-    fn test(&self, proposal: &Proposal, payload: Option<&Payload>) -> Option<Test> {
+    fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
-            .simulate(&proposal.motions)
-            .filter(|record| self.is_possible(record, proposal.turns))?;
+            .simulate(&experiment.motions)
+            .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
         let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
         let present = self.locals.len();
@@ -210,8 +211,8 @@ impl<'a> Contest<'a> {
         let differences = differences(&shooting, &other, &found, present);
         let share = |joint: &Joint| differences[*joint] / self.noise[*joint];
         let joint = Joint::all(differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
-        Some(Test {
-            text: proposal.text.clone(),
+        Some(Trial {
+            text: experiment.text.clone(),
             joint,
             difference: differences[joint],
             present: self.differences[joint],
@@ -262,7 +263,7 @@ fn loss_of(fit: &Fit) -> f64 {
 }
 
 /// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.
-fn differences(shooting: &Shooting<'_>, model: &Contender, fit: &Fit, first: usize) -> Vec<f64> {
+fn differences(shooting: &Shooting<'_>, model: &Hypothesis, fit: &Fit, first: usize) -> Vec<f64> {
     let n = model.dynamics.joints;
     let residuals = shooting.residuals(&model.dynamics, &fit.found(), &fit.locals);
     let residuals: Vec<f64> = residuals[first..].concat();

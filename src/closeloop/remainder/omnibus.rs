@@ -6,8 +6,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::study::{Fitted, Study};
-use crate::data::{Joint, audit};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
+use crate::data::{Audit, Joint};
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +57,7 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
         })
         .collect();
     let joints = study.system.joints;
-    let nulls: Vec<Null> = (0..joints).map(|j| Null::of(&simulated, j)).collect();
+    let nulls: Vec<NoiseShare> = (0..joints).map(|j| NoiseShare::of(&simulated, j)).collect();
     let excess = |energies: &Energies| {
         let each = (0..joints).map(|j| nulls[j].excess(energies.shares[j]));
         each.fold(f64::NEG_INFINITY, f64::max)
@@ -140,8 +141,8 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
 
 /// Noise before rounding, and step of the rounding, of each joint in each log.
 fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
-    let of_log = |log| {
-        let joints = audit(log).joints;
+    let of_log = |audit: &Audit| {
+        let joints = &audit.joints;
         let sensor = |j: usize| {
             let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
             let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
@@ -157,7 +158,7 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
         };
         (0..joints.len()).map(sensor).collect()
     };
-    study.logs.iter().map(of_log).collect()
+    study.audits().iter().map(of_log).collect()
 }
 
 /// The slowest waves of the discrete cosine transform of so many rows, at most half of all.
@@ -235,14 +236,14 @@ impl Energies {
 }
 
 /// The smooth share of a joint's residuals under noise alone.
-struct Null {
+struct NoiseShare {
     mean: f64,
     deviation: f64,
     /// Of the energy summed over windows.
     pooled: f64,
 }
 
-impl Null {
+impl NoiseShare {
     fn of(simulated: &[Energies], joint: usize) -> Self {
         #[allow(clippy::cast_precision_loss)] // a thousand
         let count = simulated.len() as f64;

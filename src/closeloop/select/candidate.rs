@@ -1,7 +1,8 @@
 use rayon::prelude::*;
 
-use super::per_log::values_on;
-use super::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::per_log::values_on;
+use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::identify::{Shooting, predicted_cost};
 use crate::model::{Effect, FittedEffect};
@@ -20,7 +21,7 @@ pub fn candidates(
 }
 
 /// Every one of these effects on every joint where it can act and be seen.
-pub(super) fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
+pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in effects {
         for joint in Joint::all(study.system.joints) {
@@ -44,7 +45,7 @@ fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: Joint) -> bool {
 }
 
 /// The candidate at each of its starting points, every combination of searched values.
-pub(super) fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
+pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     let mut points = vec![Vec::new()];
     for parameter in &candidate.effect.parameters {
         let grown = points.iter().flat_map(|point| {
@@ -102,11 +103,7 @@ fn promised(
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
 /// them. `None` if the model has an effect that contains the candidate.
-pub(super) fn beside(
-    study: &Study<'_>,
-    model: &Fitted,
-    candidate: &FittedEffect,
-) -> Option<Fitted> {
+pub fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
     let contains = |a: &FittedEffect, b: &FittedEffect| {
         a.joint == b.joint && a.effect.contains.contains(&b.effect.name)
     };

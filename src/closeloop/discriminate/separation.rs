@@ -1,15 +1,9 @@
-//! The experiment that tells two explanations apart which the logs do not.
-
-mod contest;
-mod menu;
-mod motion;
-mod payload;
-
 use serde::Serialize;
 
-use self::contest::{Contender, Contest, Test};
-use super::search::Rival;
-use super::study::{Fitted, Study};
+use super::comparison::{Comparison, Hypothesis, Trial};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::select::Rival;
+use crate::closeloop::study::Study;
 use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
@@ -45,27 +39,27 @@ const VISIBLE: f64 = 0.1;
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
 pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
-    let chosen = Contender::new(study, &model.effects, &model.declared);
-    let other = Contender::of_rival(study, model, rival);
-    let contest = if rival.contains_chosen() {
-        Contest::new(study, model, other, chosen)
+    let chosen = Hypothesis::new(study, &model.effects, &model.declared);
+    let other = Hypothesis::of_rival(study, model, rival);
+    let comparison = if rival.contains_chosen() {
+        Comparison::new(study, model, other, chosen)
     } else {
-        Contest::new(study, model, chosen, other)
+        Comparison::new(study, model, chosen, other)
     }?;
     let mut joints = vec![rival.effect.joint, rival.instead_of.joint];
     joints.dedup();
-    let tests: Vec<Test> = contest.tests(model, &joints);
-    let telling = tests.iter().filter(|test| test.tells());
+    let trials: Vec<Trial> = comparison.trials(model, &joints);
+    let telling = trials.iter().filter(|trial| trial.tells());
     let best = telling.min_by(|a, b| a.worth().total_cmp(&b.worth()));
-    let widest = (tests.iter()).max_by(|a, b| a.deviation().total_cmp(&b.deviation()))?;
+    let widest = (trials.iter()).max_by(|a, b| a.deviation().total_cmp(&b.deviation()))?;
     let shown = best.unwrap_or(widest);
     Some(Separation {
-        experiment: best.map(|test| test.text.clone()),
+        experiment: best.map(|trial| trial.text.clone()),
         joint: shown.joint,
         difference_rad: shown.difference,
         present_difference_rad: shown.present,
         noise_rad: shown.noise,
-        seconds: best.map(|test| test.worth().ceil()),
+        seconds: best.map(|trial| trial.worth().ceil()),
         slides: study.system.prismatic[shown.joint],
     })
 }
@@ -96,7 +90,7 @@ impl Separation {
     }
 }
 
-impl Test {
+impl Trial {
     /// What the best experiment has least of: seconds, as far as they matter.
     fn worth(&self) -> f64 {
         self.seconds.max(SHORT_S)

@@ -6,7 +6,9 @@ use super::candidate::{beside, best_start, candidates, starts};
 use super::evidence::{Evidence, PLAIN, WORTHWHILE};
 use super::folds::{folds, left_out_losses};
 use super::simpler::simpler;
-use super::study::{Fitted, Study};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::stage::{Progress, Stage};
+use crate::closeloop::study::Study;
 use crate::model::{Effect, EffectParameter, FittedEffect};
 
 /// One look at a model: what was tried beside the effects that it has, best first.
@@ -40,10 +42,10 @@ impl Rival {
 }
 
 /// Probability of a false alarm that a look admits, over all candidates and all their starting points.
-pub(super) const FALSE_ALARM: f64 = 0.05;
+pub const FALSE_ALARM: f64 = 0.05;
 /// Few stretches cannot prove so much. There an effect is admitted that plainly helps if it alone is this
 /// significant.
-pub(super) const SIGNIFICANT_ALONE: f64 = 0.01;
+pub const SIGNIFICANT_ALONE: f64 = 0.01;
 /// Candidates that are fitted after all have been screened.
 const FITTED: usize = 8;
 /// Effects that one search adds at most.
@@ -69,7 +71,7 @@ pub struct Search<'a, 'p> {
     passed: Vec<Key>,
     /// What was looked at to add one more effect, in this order.
     pub rounds: Vec<Round>,
-    progress: &'p mut dyn FnMut(&str),
+    progress: &'p mut dyn FnMut(Progress<'_>),
 }
 
 impl<'a, 'p> Search<'a, 'p> {
@@ -77,7 +79,7 @@ impl<'a, 'p> Search<'a, 'p> {
     pub fn new(
         study: &'a Study<'a>,
         library: &'a [Effect],
-        progress: &'p mut dyn FnMut(&str),
+        progress: &'p mut dyn FnMut(Progress<'_>),
     ) -> Self {
         Self {
             study,
@@ -111,6 +113,15 @@ impl<'a, 'p> Search<'a, 'p> {
         model
     }
 
+    /// Tell what is being done.
+    pub fn tell(&mut self, progress: Progress<'_>) {
+        (self.progress)(progress);
+    }
+
+    fn say(&mut self, text: &str) {
+        self.tell(Progress::within(Stage::Select, text));
+    }
+
     fn has_passed(&mut self, model: &Fitted) -> bool {
         let key = key(&model.effects);
         let known = self.passed.contains(&key);
@@ -132,7 +143,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let rest = screened.split_off(FITTED.min(screened.len()));
         screened.extend(rest.into_iter().filter(is_wanted));
         let losses = left_out_losses(&model.fit, &self.folds);
-        (self.progress)(&format!("fitting {} effects", screened.len()));
+        self.say(&format!("fitting {} effects", screened.len()));
         let (study, folds) = (self.study, self.folds.as_slice());
         let mut evidence: Vec<Evidence> = screened
             .into_par_iter()
@@ -151,7 +162,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Candidates at their most promising starting points, the most promising ones first.
     fn screened(&mut self, model: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
-        (self.progress)(&format!("screening {} effects", all.len()));
+        self.say(&format!("screening {} effects", all.len()));
         let study = self.study;
         let mut screened: Vec<(FittedEffect, f64)> = all
             .par_iter()
