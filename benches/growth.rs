@@ -180,8 +180,8 @@ fn identification(duration_s: f64) -> f64 {
     let active = [0, 1];
     best(|| {
         seconds(|| {
-            let (begin, states) = (dynamics.values(), shooting.initial_locals(0));
-            let fitted = fit(&shooting, &dynamics, &active, &begin, states, None);
+            let states = shooting.initial_locals(0);
+            let fitted = fit(&shooting, &dynamics, &active, states, None);
             drop(fitted.expect("a model that stays finite"));
         })
     })

@@ -30,8 +30,7 @@
 //! let log = rig.record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
 //!
 //! let declared = library.system(Path::new("pendulum"))?.dynamics();
-//! let values = declared.values();
-//! let errors = assess(&declared, |_| &values, &[log], &[0.5]);
+//! let errors = assess(&declared, &[log], &[0.5]);
 //! let summary = summarise(&errors.horizons, declared.joints);
 //! assert!(summary.position_rmse[0][0] > 0.01, "friction shows within half a second");
 //! # Ok(())

@@ -80,12 +80,11 @@ fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code(
         let (logs, _) = cell.record(&system).unwrap();
         let error = |effects: &[FittedEffect]| {
             let rig = system.with_effects(effects.to_vec());
-            let dynamics = rig.with_sign_widths(vec![1e-4; system.joints]).dynamics();
-            let mut values = dynamics.values();
-            for (value, parameter) in values.iter_mut().zip(&system.parameters) {
-                *value = true_value(&mechanics, &parameter.name).expect("the rig has it");
+            let mut rig = rig.with_sign_widths(vec![1e-4; system.joints]);
+            for parameter in &mut rig.parameters {
+                parameter.value = true_value(&mechanics, &parameter.name).expect("the rig has it");
             }
-            assess(&dynamics, |_| &values, &logs, &[0.5]).position_rms()
+            assess(&rig.dynamics(), &logs, &[0.5]).position_rms()
         };
         let effects: Option<Vec<FittedEffect>> = cell
             .effects

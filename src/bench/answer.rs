@@ -25,10 +25,7 @@ pub fn answer(outcome: &Outcome) -> Answer {
             .iter()
             .map(|alternative| set(&alternative.effects))
             .collect(),
-        declared: outcome
-            .models
-            .parameters
-            .iter()
+        declared: (outcome.models.after.absorbed().all_parameters().iter())
             .filter(is_declared)
             .map(|parameter| estimate(&parameter.name, parameter))
             .collect(),

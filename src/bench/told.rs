@@ -21,10 +21,10 @@ pub fn told(
         .map(|hidden| fitted(&study, library, hidden))
         .collect::<Option<_>>()?;
     let locals = declared.fit.locals.clone();
-    let model = study.refit(&truth, &declared.declared, locals, None).ok()?;
-    let tests = split.test.iter();
-    let values: Vec<Vec<f64>> = tests.map(|log| model.values_in(log)).collect();
-    let errors: Assessment = assess(&model.dynamics, |log| &values[log], &split.test, horizons_s);
+    let model = study
+        .refit(&declared.with_effects(truth), locals, None)
+        .ok()?;
+    let errors: Assessment = assess(&model.dynamics(), &split.test, horizons_s);
     Some(errors.position_rms())
 }
 

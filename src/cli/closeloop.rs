@@ -75,7 +75,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     })?;
     bar.finish_and_clear();
     let origin = origin(arguments, &system);
-    let mut report = report::write(&arguments.out, &system, &outcome, &origin)?;
+    let mut report = report::write(&arguments.out, &outcome, &origin)?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
         let bar = progress::bar(runs.get());
@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         )?;
         outcome.calibration = Some(calibration);
         bar.finish_and_clear();
-        report = report::write(&arguments.out, &system, &outcome, &origin)?;
+        report = report::write(&arguments.out, &outcome, &origin)?;
     }
     if arguments.common.json {
         inputs::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;

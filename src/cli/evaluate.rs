@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::data::{Joint, LeaveOut, Log};
-use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
+use crate::evaluate::{Summary, assess, calibrate, summarise};
 use crate::model::{Dynamics, System};
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -68,19 +68,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut logs = inputs::logs(&arguments.test, &system)?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     inputs::print_notes(&logs);
-    let values = dynamics.values();
     let offsets = arguments
         .calibrate
-        .map(|share| calibrate(&dynamics, &values, &mut logs, share))
+        .map(|share| calibrate(&dynamics, &mut logs, share))
         .transpose()?;
-    let known = logs.iter().map(|log| dynamics.in_log(log).values());
-    let known: Vec<Vec<f64>> = known.collect();
-    let assessment = match &offsets {
-        Some(Offsets {
-            dynamics, values, ..
-        }) => assess(dynamics, |log| &values[log], &logs, &arguments.horizon),
-        None => assess(&dynamics, |log| &known[log], &logs, &arguments.horizon),
-    };
+    let model = offsets.as_ref().map_or(&dynamics, |found| &found.dynamics);
+    let assessment = assess(model, &logs, &arguments.horizon);
     let summary = summarise(&assessment.horizons, system.joints);
     if let Some(h) = summary.windows.iter().position(|count| *count == 0) {
         bail!(

@@ -1,10 +1,9 @@
 use rayon::prelude::*;
 
 use super::fitted::Fitted;
-use super::per_log::values_on;
 use super::select::{PLAIN, gain, p_of_gains};
 use super::study::Study;
-use crate::identify::{blocks, fit};
+use crate::identify::{Values, blocks, fit};
 use crate::model::FittedEffect;
 
 /// An effect that was chosen and did not stand.
@@ -68,7 +67,9 @@ fn most_doubtful(
             let mut effects = model.effects.clone();
             let effect = effects.remove(k);
             let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-            let less = study.refit(&effects, &model.declared, locals, scale).ok()?;
+            let less = study
+                .refit(&model.with_effects(effects), locals, scale)
+                .ok()?;
             let without = losses(aside, &less, model.fit.scale, members)?;
             let (p, saved) = (p_of_gains(&without, &with), gain(&without, &with));
             (p > CONFIRMED && saved < PLAIN && saved.abs() > NOT_SHOWN).then(|| {
@@ -89,21 +90,14 @@ fn most_doubtful(
 /// has of its own where the fit has not seen the log.
 fn losses(aside: &Study<'_>, model: &Fitted, scale: f64, members: &[usize]) -> Option<Vec<f64>> {
     let locals = aside.shooting.initial_locals(0);
-    let values = values_on(aside.logs, &model.declared, &model.effects);
-    let is_known = |k: &usize| values.own.iter().any(|own| own.parameter == *k);
-    let parameters = &model.dynamics.parameters;
+    let dynamics = model.dynamics();
+    let known = Values::of(&dynamics, aside.logs).own;
+    let is_known = |k: &usize| known.iter().any(|own| own.parameter == *k);
+    let parameters = &dynamics.parameters;
     let unknown: Vec<usize> = (0..parameters.len())
         .filter(|k| parameters[*k].per_log && !parameters[*k].fixed && !is_known(k))
         .collect();
-    let found = fit(
-        &aside.shooting,
-        &model.dynamics,
-        &unknown,
-        values,
-        locals,
-        Some(scale),
-    )
-    .ok()?;
+    let (_, found) = fit(&aside.shooting, &dynamics, &unknown, locals, Some(scale)).ok()?;
     let mut losses = vec![0.0; members.last().map_or(0, |last| last + 1)];
     for (terms, &member) in found.reduced.iter().zip(members) {
         losses[member] += terms.terms.cost;

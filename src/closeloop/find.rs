@@ -103,7 +103,7 @@ fn on_all(study: &Study<'_>, before: &Fitted, chosen: &Fitted) -> Fitted {
     }
     let locals = before.fit.locals.clone();
     study
-        .refit(&chosen.effects, &chosen.declared, locals, None)
+        .refit(chosen, locals, None)
         .unwrap_or_else(|_| before.clone())
 }
 

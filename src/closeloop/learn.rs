@@ -8,14 +8,13 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::fitted::Fitted;
-use super::per_log::joined;
 use super::refine::Refined;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
     Dynamics, HybridError, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-    absorbed, as_modelled,
+    as_modelled,
 };
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
@@ -92,10 +91,7 @@ fn untrained(
     rng: &mut impl Rng,
 ) -> Result<HybridModel, LearnError> {
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
-    let (declared, effects) = absorbed(&model.declared, &model.effects);
-    let dynamics = study
-        .dynamics(effects.clone())
-        .with_values(joined(&declared, &effects));
+    let dynamics = model.absorbed().dynamics();
     let joints = study.system.joints;
     let settings = MlpSettings {
         hidden: study.system.hidden.clone(),
@@ -129,12 +125,12 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
         step_s: STEP_S,
         length_s: STRETCH_S,
     };
-    let of_log = |(k, log): (usize, &Log)| {
-        let values = model.fit.values_of_log(k);
-        trajectories(&as_modelled(&model.dynamics, &values, log), thinning)
+    let dynamics = model.dynamics();
+    let of_log = |log: &Log| {
+        let values = dynamics.in_log(log).values();
+        trajectories(&as_modelled(&dynamics, &values, log), thinning)
     };
-    let logs = study.logs.iter().enumerate();
-    let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
+    let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
     let stride = (rows / SEGMENTS).max(1);
     let mut sets = [

@@ -11,7 +11,7 @@ use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
 use crate::identify::{FitError, Identifiability};
-use crate::model::{Parameter, System};
+use crate::model::System;
 
 /// Everything that closing the loop found out.
 #[non_exhaustive]
@@ -47,12 +47,8 @@ pub struct Given {
 pub struct Models {
     /// The declared model, fitted.
     pub before: Fitted,
-    /// With the effects that were found.
+    /// With the effects that were found, and with 95 % intervals.
     pub after: Fitted,
-    /// All parameters of `after`, with their intervals.
-    pub parameters: Vec<Parameter>,
-    /// Widths of the smoothed sign of each joint in `after`, in rad/s (or m/s).
-    pub sign_widths: Vec<f64>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
     /// Values in the model file that the fit of `before` contradicts.

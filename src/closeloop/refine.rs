@@ -3,7 +3,7 @@
 use super::fitted::Fitted;
 use super::study::Study;
 use crate::identify::{Shooting, uncertainty};
-use crate::model::Parameter;
+use crate::model::System;
 
 /// The model that is reported is fitted once more in finer steps (s), with friction that reverses over half the
 /// speed: smoothing and steps shift dry friction by a few parts in a thousand, more than the noise of long logs does.
@@ -13,20 +13,16 @@ const FINE_STEP_S: f64 = 5e-4;
 pub(super) struct Refined<'a> {
     /// The training logs in fine steps.
     pub study: Study<'a>,
+    /// With 95 % intervals.
     pub model: Fitted,
-    /// All parameters of the model, with their 95 % intervals.
-    pub parameters: Vec<Parameter>,
 }
 
 /// Estimate the chosen model in fine steps.
 pub(super) fn refine<'a>(study: &Study<'a>, chosen: &Fitted) -> Refined<'a> {
     let fine = study.refined();
-    let model = fine.estimate(chosen);
-    Refined {
-        parameters: with_intervals(&fine, &model, &chosen.fit.values),
-        study: fine,
-        model,
-    }
+    let mut model = fine.estimate(chosen);
+    model.model = with_intervals(&fine, &model, chosen);
+    Refined { study: fine, model }
 }
 
 impl Study<'_> {
@@ -48,35 +44,26 @@ impl Study<'_> {
     /// A chosen model estimated anew; as it was where that fails.
     pub fn estimate(&self, chosen: &Fitted) -> Fitted {
         let locals = chosen.fit.locals.clone();
-        self.refit(&chosen.effects, &chosen.declared, locals, None)
+        self.refit(chosen, locals, None)
             .unwrap_or_else(|_| chosen.clone())
     }
 }
 
-/// Fitted values with their 95 % intervals; parameters that were not free have none. An interval reaches as much
-/// further as the value was off in coarser numbers: smoothing and steps err to first order, so that what halving
-/// them changes is what is left of their error (Richardson 1911).
-pub(super) fn with_intervals(study: &Study<'_>, model: &Fitted, coarse: &[f64]) -> Vec<Parameter> {
-    let uncertainty = uncertainty(&study.shooting, &model.fit);
-    let mut parameters = model.dynamics.parameters.clone();
-    for (parameter, value) in parameters.iter_mut().zip(&model.fit.values) {
-        parameter.value = *value;
-        parameter.ci95 = None;
-    }
-    for (i, column) in model.fit.columns.iter().enumerate() {
+/// A fitted model with its 95 % intervals; parameters that were not free have none. An interval reaches as much further
+/// as the value was off in `coarse` numbers: smoothing and steps err to first order, so that what halving them changes is
+/// what is left of their error (Richardson 1911).
+pub(super) fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &System) -> System {
+    let uncertainty = uncertainty(&study.shooting, &fitted.fit);
+    let (values, coarse) = (fitted.values(), coarse.values());
+    let mut model = fitted.model.clone();
+    for (i, column) in fitted.fit.columns.iter().enumerate() {
         let k = column.parameter;
-        if column.log.is_some() {
-            continue;
-        }
-        let value = model.fit.values[k];
-        let half = uncertainty.half_width(i) + (value - coarse[k]).abs();
-        let [low, high] = parameters[k].bounds;
-        parameters[k].ci95 = Some([(value - half).max(low), (value + half).min(high)]);
+        let log = column.log.map(|log| &study.logs[log]);
+        let off = match log {
+            Some(_) => 0.0,
+            None => (values[k] - coarse[k]).abs(),
+        };
+        model.set_half_width(k, log, uncertainty.half_width(i) + off);
     }
-    for (e, effect) in model.effects.iter().enumerate() {
-        if let Some(k) = effect.shifted() {
-            parameters[k] = parameters[k].shifted_by(&parameters[model.range_of(e).start]);
-        }
-    }
-    parameters
+    model
 }

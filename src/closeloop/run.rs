@@ -94,16 +94,11 @@ fn remainder(study: &Study<'_>, found: &Found, refined: &Refined<'_>) -> Remaind
 }
 
 fn models_of(study: &Study<'_>, before: Fitted, refined: Refined<'_>) -> Models {
-    let declared = study.system.dynamics().values();
+    let fitted = with_intervals(study, &before, &before);
     Models {
-        contradicted: contradicted(
-            &declared,
-            &with_intervals(study, &before, &before.fit.values),
-        ),
+        contradicted: contradicted(study.system, &fitted),
         before,
         after: refined.model,
-        parameters: refined.parameters,
-        sign_widths: refined.study.sign_widths,
         identifiability: study.identifiability.clone(),
     }
 }

@@ -1,10 +1,9 @@
 use std::sync::OnceLock;
 
 use super::fitted::Fitted;
-use super::per_log::values_on;
 use crate::data::{Audit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
-use crate::model::{Dynamics, FittedEffect, System};
+use crate::model::{Dynamics, System};
 
 /// Length in s of the windows over which models are fitted and compared: most effects show in them.
 pub(super) const WINDOW_S: f64 = 0.5;
@@ -132,51 +131,36 @@ impl<'a> Study<'a> {
         self.audits.get_or_init(of_logs)
     }
 
-    /// Fit a set of effects, starting from the values that they and the declared parameters carry.
+    /// Fit a model, starting from its values, with the study's smoothing of friction.
     ///
     /// # Errors
     /// As [`Study::fit_declared`].
     pub fn refit(
         &self,
-        effects: &[FittedEffect],
-        declared: &[f64],
+        model: &System,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
-        self.fit_on(&self.shooting, effects, declared, locals, scale)
+        self.fit_on(&self.shooting, model, locals, scale)
     }
 
     pub(super) fn fit_on(
         &self,
         shooting: &Shooting<'_>,
-        effects: &[FittedEffect],
-        declared: &[f64],
+        model: &System,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
-        let dynamics = self.dynamics(effects.to_vec());
-        let values = values_on(self.logs, declared, effects);
-        let fit = fit(
-            shooting,
-            &dynamics,
-            &self.active(&dynamics),
-            values,
-            locals,
-            scale,
-        )?;
-        Ok(Fitted::new(
-            dynamics,
-            effects,
-            fit,
-            declared.len(),
-            self.logs,
-        ))
+        let model = self.smoothed(model);
+        let dynamics = model.dynamics();
+        let active = self.active(&dynamics);
+        let found = fit(shooting, &dynamics, &active, locals, scale)?;
+        Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
-    /// The declared equations with these effects, compiled with the study's smoothing of friction.
-    pub fn dynamics(&self, effects: Vec<FittedEffect>) -> Dynamics {
-        let model = self.system.with_effects(effects);
-        model.with_sign_widths(self.sign_widths.clone()).dynamics()
+    /// A model with the study's smoothing of friction.
+    pub(super) fn smoothed(&self, model: &System) -> System {
+        model.with_sign_widths(self.sign_widths.clone())
     }
 
     /// Parameters that a fit may change.

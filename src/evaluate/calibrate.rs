@@ -3,14 +3,13 @@ use thiserror::Error;
 use crate::data::{Interval, Joint, Log};
 use crate::expr::Graph;
 use crate::identify::{FitError, Shooting, cut, fit};
-use crate::model::{Dynamics, Parameter};
+use crate::model::{Dynamics, OwnValue, Parameter};
 
 /// A model whose angles are read through sensors with a zero of their own in each log.
 #[derive(Debug, Clone)]
 pub struct Offsets {
+    /// Each log's offsets are values of its own.
     pub dynamics: Dynamics,
-    /// All parameters of that model, one list a log.
-    pub values: Vec<Vec<f64>>,
     /// The offsets alone in rad (or m), `[log][joint]`.
     pub offsets: Vec<Vec<f64>>,
 }
@@ -39,17 +38,14 @@ const WINDOW_S: f64 = 0.5;
 /// A fraction outside of 0 to 1, or a beginning that is too short.
 pub fn calibrate(
     dynamics: &Dynamics,
-    values: &[f64],
     logs: &mut [Log],
     fraction: f64,
 ) -> Result<Offsets, CalibrateError> {
     if !(fraction > 0.0 && fraction < 1.0) {
         return Err(CalibrateError::Fraction(fraction));
     }
-    let with_offsets = with_offsets(dynamics);
     let mut found = Offsets {
-        dynamics: with_offsets,
-        values: Vec::new(),
+        dynamics: with_offsets(dynamics),
         offsets: Vec::new(),
     };
     for log in logs {
@@ -61,14 +57,21 @@ pub fn calibrate(
         };
         let mut beginning = log.clone();
         beginning.leave_out.push(rest);
-        let all =
-            estimate(&found.dynamics, values, beginning).map_err(|source| CalibrateError::Fit {
+        let first = dynamics.parameters.len();
+        let offsets =
+            estimate(&found.dynamics, first, beginning).map_err(|source| CalibrateError::Fit {
                 log: log.name(),
                 seconds,
                 source,
             })?;
-        found.offsets.push(all[values.len()..].to_vec());
-        found.values.push(all);
+        let own = |(parameter, &value): (usize, &f64)| OwnValue {
+            log: log.path.display().to_string(),
+            parameter,
+            value,
+            ci95: None,
+        };
+        found.dynamics.own.extend((first..).zip(&offsets).map(own));
+        found.offsets.push(offsets);
         log.leave_out.push(Interval {
             start_s,
             end_s: start_s + seconds,
@@ -77,14 +80,15 @@ pub fn calibrate(
     Ok(found)
 }
 
-fn estimate(dynamics: &Dynamics, values: &[f64], log: Log) -> Result<Vec<f64>, FitError> {
+/// The offsets on a log, which are the parameters from `first` on.
+fn estimate(dynamics: &Dynamics, first: usize, log: Log) -> Result<Vec<f64>, FitError> {
     let logs = [log];
     let noise = vec![1e-3; dynamics.joints];
     let shooting = Shooting::new(&logs, cut(&logs, WINDOW_S), &noise);
-    let start = [values, &vec![0.0; dynamics.joints]].concat();
-    let active: Vec<usize> = (values.len()..start.len()).collect();
+    let active: Vec<usize> = (first..dynamics.parameters.len()).collect();
     let locals = shooting.initial_locals(0);
-    Ok(fit(&shooting, dynamics, &active, &start, locals, None)?.values)
+    let (found, _) = fit(&shooting, dynamics, &active, locals, None)?;
+    Ok(found.common[first..].to_vec())
 }
 
 /// The same equations in logged angles: the true angle is the logged one less the offset.
@@ -134,6 +138,6 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         program: graph.finish(&outputs),
         filters: dynamics.filters.clone(),
         reading,
-        own: dynamics.own.clone(),
+        own: Vec::new(),
     }
 }

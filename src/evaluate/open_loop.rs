@@ -70,17 +70,14 @@ const STEP_TOLERANCE: f64 = 1e-3;
 pub(super) const LONGEST_STEP_S: f64 = 1e-3;
 const SHORTEST_STEP_S: f64 = 1e-3 / 64.0;
 
-/// The open-loop error of `dynamics` with parameters `values` on `logs`. `values` may differ by log (own
-/// sensor offsets, say): it is asked for each.
+/// The open-loop error of `dynamics` on `logs`, with the values that each log has of its own.
 ///
 /// Windows start every half horizon and last one; their start states come from the log alone. The
 /// logged torque is held over each step.
-pub fn assess<'v>(
-    dynamics: &Dynamics,
-    values: impl Fn(usize) -> &'v [f64] + Sync,
-    logs: &[Log],
-    horizons_s: &[f64],
-) -> Assessment {
+pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessment {
+    let of_logs = logs.iter().map(|log| dynamics.in_log(log).values());
+    let of_logs: Vec<Vec<f64>> = of_logs.collect();
+    let values = |log: usize| of_logs[log].as_slice();
     let mut step_s = LONGEST_STEP_S;
     let mut coarse = run(dynamics, &values, logs, horizons_s, step_s);
     loop {

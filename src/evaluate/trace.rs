@@ -13,7 +13,8 @@ pub struct Trace {
 
 /// Predictions of `horizon_s` seconds one after the other along a log, each started from the log: what a
 /// picture of an open-loop error shows.
-pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) -> Vec<Trace> {
+pub fn traces(dynamics: &Dynamics, log: &Log, horizon_s: f64) -> Vec<Trace> {
+    let values = &dynamics.in_log(log).values();
     let commands = Commands::of_log(dynamics, values, log);
     let own = with_own_angles(dynamics, values, log);
     // Windows for the error overlap by half; a picture wants each second one.

@@ -302,7 +302,7 @@ impl Session {
 
     /// The plant's own equations, stepped as models are.
     fn perfect(&self) -> Predictor {
-        Predictor::of_equations(self.plant.true_dynamics(), self.task.integrator)
+        Predictor::of_equations(self.plant.dynamics(), self.task.integrator)
     }
 
     fn seeds(&self) -> Vec<u64> {

@@ -4,7 +4,7 @@ use super::levenberg_marquardt::{Search, Termination};
 use super::normal_equations::Reduced;
 use super::sensitivity::{Local, Tangent};
 use super::shooting::{Shooting, WindowTerms};
-use super::values::{Column, Own, Values, value_of};
+use super::values::{Column, Values};
 use crate::model::Dynamics;
 
 /// Why parameters could not be fitted.
@@ -20,14 +20,9 @@ pub enum FitError {
     Diverged { diverged: usize, windows: usize },
 }
 
-/// The outcome of a fit.
+/// What a fit says beside the values that it found.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// All parameters of the model, in its order; of a parameter with a value per log, what holds in a log
-    /// that has none of its own.
-    pub values: Vec<f64>,
-    /// The values that single logs have of their own.
-    pub own: Vec<Own>,
     /// Which parameters were free.
     pub active: Vec<usize>,
     /// The free values: one column for each free parameter, or one for each log where it differs by log.
@@ -47,24 +42,6 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// The values that it found, as another fit takes them.
-    pub fn found(&self) -> Values {
-        Values {
-            common: self.values.clone(),
-            own: self.own.clone(),
-        }
-    }
-
-    /// All parameters as they are in a log.
-    pub fn values_of_log(&self, log: usize) -> Vec<f64> {
-        self.found().of_log(log)
-    }
-
-    /// The value of the i-th column.
-    pub fn value(&self, i: usize) -> f64 {
-        value_of(&self.values, &self.own, self.columns[i])
-    }
-
     /// Zero normal equations in the free values.
     pub fn zero_equations(&self) -> WindowTerms {
         WindowTerms::zeros(self.columns.len())
@@ -74,9 +51,9 @@ impl Fit {
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
 const MOST_STEPS: usize = 40;
 
-/// Fit the parameters `active` of `dynamics` to the windows, starting from `values` and `locals`, with every window's
+/// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `locals`, with every window's
 /// start state (and forces) free. `scale` fixes the scale of the residuals; without it, it is estimated by their median
-/// absolute deviation as the fit proceeds.
+/// absolute deviation as the fit proceeds. Returns the values found and what the fit says of them.
 ///
 /// # Errors
 /// No window, or a model that diverges at the starting values. A fit that does not converge is no error: its
@@ -85,17 +62,16 @@ pub fn fit(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    values: impl Into<Values>,
     locals: Vec<Vec<f64>>,
     scale: Option<f64>,
-) -> Result<Fit, FitError> {
+) -> Result<(Values, Fit), FitError> {
     let local = if locals.first().is_some_and(|l| l.len() > dynamics.states()) {
         Local::StateAndForce
     } else {
         Local::State
     };
     let tangent = Tangent::new(dynamics, active, local);
-    let mut search = Search::new(shooting, dynamics, &tangent, values.into(), locals, scale)?;
+    let mut search = Search::new(shooting, dynamics, &tangent, locals, scale)?;
     let mut termination = search.run(MOST_STEPS);
     // The scale is to be that of the final residuals.
     if scale.is_none() {
@@ -113,28 +89,26 @@ pub fn as_it_stands(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    values: impl Into<Values>,
     locals: Vec<Vec<f64>>,
     scale: f64,
 ) -> Result<Fit, FitError> {
     let tangent = Tangent::new(dynamics, active, Local::State);
-    let values = values.into();
-    let search = Search::new(shooting, dynamics, &tangent, values, locals, Some(scale))?;
-    Ok(search.finish(Termination::AsGiven))
+    let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale))?;
+    let (_, fit) = search.finish(Termination::AsGiven);
+    Ok(fit)
 }
 
-/// The cost that one Gauss-Newton step from `values` is predicted to reach, within the parameters' bounds: the worth of
+/// The cost that one Gauss-Newton step from the model's values is predicted to reach, within the parameters' bounds: the worth of
 /// a candidate before it is fitted. `None` where the model diverges there or the step cannot be solved for.
 pub fn predicted_cost(
     shooting: &Shooting<'_>,
     dynamics: &Dynamics,
     active: &[usize],
-    values: impl Into<Values>,
     locals: &[Vec<f64>],
     scale: f64,
 ) -> Option<f64> {
     let tangent = Tangent::new(dynamics, active, Local::State);
-    let (values, locals) = (values.into(), locals.to_vec());
-    let search = Search::new(shooting, dynamics, &tangent, values, locals, Some(scale)).ok()?;
+    let locals = locals.to_vec();
+    let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale)).ok()?;
     search.predicted_cost()
 }

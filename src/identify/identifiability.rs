@@ -1,6 +1,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::fit::Fit;
+use super::values::Values;
 use crate::model::Dynamics;
 
 /// Which combinations of the free parameters the logs determine.
@@ -25,9 +26,10 @@ const ROUNDING: f64 = 1e-11;
 /// Parts of a combination smaller than this are not named.
 const NAMED: f64 = 0.1;
 
-/// The verdict on a fit's free parameters, from the eigenvalues of its information matrix in relative units.
-pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
-    let information = relative_information(dynamics, fit);
+/// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in relative
+/// units.
+pub fn identifiability(dynamics: &Dynamics, found: &Values, fit: &Fit) -> Identifiability {
+    let information = relative_information(dynamics, found, fit);
     let loose = loose_directions(&information);
     let name = |i: usize| dynamics.parameters[fit.columns[i].parameter].name.clone();
     let undetermined = loose
@@ -72,14 +74,14 @@ fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
     }
 }
 
-fn relative_information(dynamics: &Dynamics, fit: &Fit) -> DMatrix<f64> {
+fn relative_information(dynamics: &Dynamics, found: &Values, fit: &Fit) -> DMatrix<f64> {
     let mut all = fit.zero_equations();
     fit.reduced
         .iter()
         .for_each(|window| window.add_to(&mut all));
     let magnitude = |i: usize| {
         let scale = dynamics.parameters[fit.columns[i].parameter].scale;
-        fit.value(i).abs().max(1e-3 * scale)
+        found.get(fit.columns[i]).abs().max(1e-3 * scale)
     };
     let size = fit.columns.len();
     DMatrix::from_fn(size, size, |i, j| {

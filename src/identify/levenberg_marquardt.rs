@@ -89,13 +89,14 @@ struct Step {
 }
 
 impl<'a> Search<'a> {
+    /// A search that starts at the model's values.
+    ///
     /// # Errors
-    /// No window, or a model that diverges at these values.
+    /// No window, or a model that diverges there.
     pub fn new(
         shooting: &'a Shooting<'a>,
         dynamics: &'a Dynamics,
         tangent: &'a Tangent,
-        values: Values,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Self, FitError> {
@@ -107,7 +108,7 @@ impl<'a> Search<'a> {
             dynamics,
             tangent,
             layout: Layout::new(&dynamics.parameters, &tangent.active, &shooting.windows),
-            values,
+            values: Values::of(dynamics, shooting.logs),
             locals,
             scale: scale.unwrap_or(1.0),
             cost: f64::INFINITY,
@@ -281,15 +282,13 @@ impl<'a> Search<'a> {
     }
 
     /// What has been found.
-    pub fn finish(self, termination: Termination) -> Fit {
+    pub fn finish(self, termination: Termination) -> (Values, Fit) {
         let terms = self.linearised();
         let windows = terms.iter().zip(&self.shooting.windows);
         let reduced = windows
             .map(|(terms, window)| Reduced::of(terms, self.layout.places(window)))
             .collect();
-        Fit {
-            values: self.values.common,
-            own: self.values.own,
+        let fit = Fit {
             active: self.tangent.active.clone(),
             columns: self.layout.columns,
             locals: self.locals,
@@ -298,7 +297,8 @@ impl<'a> Search<'a> {
             reduced,
             steps: self.steps,
             termination,
-        }
+        };
+        (self.values, fit)
     }
 }
 

@@ -466,7 +466,7 @@ impl WithSimd for Add<'_> {
 mod tests {
     use std::path::Path;
 
-    use super::Shooting;
+    use super::{Shooting, Values};
     use crate::data::{Joint, Log};
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
@@ -501,14 +501,17 @@ mod tests {
             let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
                 let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
+                let point = |values: &[f64]| Values {
+                    common: values.to_vec(),
+                    own: Vec::new(),
+                };
                 let cost = |values: &[f64]| -> f64 {
                     shooting
-                        .costs(&model, &values.into(), &locals, 1.0)
+                        .costs(&model, &point(values), &locals, 1.0)
                         .iter()
                         .sum()
                 };
-                let terms =
-                    shooting.linearise(&model, &tangent, &values.as_slice().into(), &locals, 1.0);
+                let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
                 for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
                     let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
                     let mut moved = values;

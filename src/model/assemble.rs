@@ -33,6 +33,18 @@ impl System {
         }
     }
 
+    /// Every parameter of the model: the declared ones, then those of the effects, in their order.
+    pub fn all_parameters(&self) -> Vec<Parameter> {
+        let mut parameters = self.parameters.clone();
+        for effect in &self.effects {
+            let known = parameters.iter().map(|p| p.name.as_str());
+            let taken: Vec<&str> = self.own_names().chain(known).collect();
+            let of_effect = effect_parameters(effect, &taken, self.prismatic[effect.joint]);
+            parameters.extend(of_effect);
+        }
+        parameters
+    }
+
     fn filters(&self) -> Vec<Filter> {
         let filter = |(effect, place): (&FittedEffect, Range<usize>)| match effect.effect.entry {
             Entry::Command(kind) => Some(Filter {
@@ -45,8 +57,8 @@ impl System {
         self.placed().filter_map(filter).collect()
     }
 
-    /// The values that single logs have of their own, by the parameters of the whole model.
-    fn own_values(&self) -> Vec<OwnValue> {
+    /// The values that single logs have of their own, each of the parameter at that index among all.
+    pub fn own_values(&self) -> Vec<OwnValue> {
         let of_effect = |(effect, place): (&FittedEffect, Range<usize>)| {
             let own = effect.own.iter().map(move |own| OwnValue {
                 parameter: place.start + own.parameter,
@@ -172,15 +184,15 @@ impl<'a> Assembly<'a> {
             .iter()
             .map(|p| graph.input(&p.name))
             .collect();
-        let mut parameters = system.parameters.clone();
-        let mut with_nodes = Vec::new();
-        for effect in effects {
-            let of_effects = parameters.iter().map(|p| p.name.as_str());
-            let taken: Vec<&str> = system.own_names().chain(of_effects).collect();
-            let own = effect_parameters(effect, &taken, system.prismatic[effect.joint]);
-            with_nodes.push((effect, own.iter().map(|p| graph.input(&p.name)).collect()));
-            parameters.extend(own);
-        }
+        let parameters = system.all_parameters();
+        let of_effects = parameters[system.parameters.len()..].iter();
+        let mut nodes = of_effects
+            .map(|p| graph.input(&p.name))
+            .collect::<Vec<_>>()
+            .into_iter();
+        let with_nodes = (effects.iter())
+            .map(|effect| (effect, nodes.by_ref().take(effect.values.len()).collect()))
+            .collect();
         Self {
             system,
             effects: with_nodes,

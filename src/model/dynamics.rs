@@ -67,10 +67,21 @@ impl Dynamics {
     /// The same as it is in a log: with the values that the log has of its own.
     pub fn in_log(&self, log: &Log) -> Cow<'_, Self> {
         let mut in_log = Cow::Borrowed(self);
-        for own in self.own.iter().filter(|own| log.is_called(&own.log)) {
+        for own in self.own_in(log) {
             in_log.to_mut().parameters[own.parameter].value = own.value;
         }
         in_log
+    }
+
+    /// The values that a log has of its own: those known by its path or else by its name.
+    pub fn own_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = &'a OwnValue> {
+        let is_path = |own: &OwnValue| log.path.as_os_str() == own.log.as_str();
+        let by_path = move |parameter: usize| {
+            let mut own = self.own.iter();
+            own.any(|own| own.parameter == parameter && is_path(own))
+        };
+        let called = self.own.iter().filter(|own| log.is_called(&own.log));
+        called.filter(move |own| is_path(own) || !by_path(own.parameter))
     }
 
     /// Number of states, 2n.

@@ -22,6 +22,7 @@ mod shift;
 mod stack;
 mod system;
 mod typeset;
+mod written;
 
 pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};
@@ -40,6 +41,5 @@ pub use network::{
 pub use reader::FileError;
 pub use rollout::Rollout;
 pub use sensors::{Sensors, as_modelled, with_own_angles};
-pub use shift::absorbed;
 pub(crate) use stack::Stack;
 pub use system::{FittedEffect, OwnValue, System};

@@ -107,16 +107,20 @@ impl FittedEffect {
     }
 }
 
-/// Shifts put into the declared values: these, and the effects that are left.
-pub fn absorbed(declared: &[f64], effects: &[FittedEffect]) -> (Vec<f64>, Vec<FittedEffect>) {
-    let mut declared = declared.to_vec();
-    for effect in effects {
-        if let Some(k) = effect.shifted() {
-            declared[k] += effect.values[0].0;
+impl System {
+    /// The same with shifts taken into the declared values that they shift.
+    #[must_use]
+    pub fn absorbed(&self) -> Self {
+        let all = self.all_parameters();
+        let mut absorbed = self.clone();
+        absorbed.effects.retain(|effect| effect.shifted().is_none());
+        for (effect, place) in self.placed() {
+            if let Some(k) = effect.shifted() {
+                absorbed.parameters[k] = self.parameters[k].shifted_by(&all[place.start]);
+            }
         }
+        absorbed
     }
-    let left = effects.iter().filter(|effect| effect.shifted().is_none());
-    (declared, left.cloned().collect())
 }
 
 impl Parameter {

@@ -3,8 +3,8 @@ use std::path::Path;
 
 use super::effect::{Effect, Entry, Measure};
 use super::reader::{Document, FileError, Located, Section};
-use super::{Parameter, sections};
-use crate::data::{Columns, Joint};
+use super::{Dynamics, Parameter, sections};
+use crate::data::{Columns, Joint, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// Dry friction reverses over this speed (rad/s or m/s) where neither the file nor a fit to logs says otherwise.
@@ -252,35 +252,102 @@ impl System {
         }
     }
 
-    /// The same with other values of all parameters: the declared ones, then those of the effects, in their order.
+    /// Values of all parameters: the declared ones, then those of the effects, in their order.
+    pub fn values(&self) -> Vec<f64> {
+        let declared = self.parameters.iter().map(|p| p.value);
+        let of_effects = self.effects.iter().flat_map(|effect| &effect.values);
+        declared
+            .chain(of_effects.map(|(value, _)| *value))
+            .collect()
+    }
+
+    /// The value of a parameter, by its place among all: in a log, that which the log has of its own, if it has one.
+    pub fn value_of(&self, parameter: usize, log: Option<&Log>) -> f64 {
+        let in_log = |own: &OwnValue| log.is_some_and(|log| log.is_called(&own.log));
+        let own = self.own_values().into_iter();
+        let mut own = own.filter(|own| own.parameter == parameter);
+        own.find(in_log)
+            .map_or_else(|| self.values()[parameter], |own| own.value)
+    }
+
+    /// The same with the values of a compiled form of it, those of single logs included. Intervals, which belong to
+    /// other values, are dropped.
     ///
     /// # Panics
-    /// When there is not one value a parameter.
+    /// When `compiled` has not one value a parameter.
     #[must_use]
-    pub fn with_values(&self, values: &[f64]) -> Self {
+    pub fn at(&self, compiled: &Dynamics) -> Self {
         let mut model = self.clone();
-        let declared = model.parameters.iter_mut().map(|p| &mut p.value);
-        let of_effects = model
-            .effects
-            .iter_mut()
-            .flat_map(|effect| &mut effect.values);
-        let slots: Vec<&mut f64> = declared.chain(of_effects.map(|(value, _)| value)).collect();
-        assert_eq!(slots.len(), values.len(), "one value for each parameter");
-        slots
-            .into_iter()
-            .zip(values)
-            .for_each(|(slot, value)| *slot = *value);
+        let slots = model.slots();
+        assert_eq!(
+            slots.len(),
+            compiled.parameters.len(),
+            "one value for each parameter"
+        );
+        for ((value, interval), parameter) in slots.into_iter().zip(&compiled.parameters) {
+            (*value, *interval) = (parameter.value, None);
+        }
+        for k in 0..model.effects.len() {
+            let place = self.place_of(k);
+            let of_effect = |own: &&OwnValue| place.contains(&own.parameter);
+            let own = compiled.own.iter().filter(of_effect).map(|own| OwnValue {
+                parameter: own.parameter - place.start,
+                ..own.clone()
+            });
+            model.effects[k].own = own.collect();
+        }
         model
     }
 
+    /// Give the value of a parameter, or that of one log of its own, an interval of this half width within the
+    /// parameter's bounds.
+    pub fn set_half_width(&mut self, parameter: usize, log: Option<&Log>, half: f64) {
+        let [low, high] = self.all_parameters()[parameter].bounds;
+        let around = |value: f64| Some([(value - half).max(low), (value + half).min(high)]);
+        let Some(log) = log else {
+            let (value, interval) = self.slots().swap_remove(parameter);
+            *interval = around(*value);
+            return;
+        };
+        let Some(k) = (0..self.effects.len()).find(|k| self.place_of(*k).contains(&parameter))
+        else {
+            return;
+        };
+        let first = self.place_of(k).start;
+        let mut own = self.effects[k].own.iter_mut();
+        let is_it =
+            |own: &&mut OwnValue| own.parameter == parameter - first && log.is_called(&own.log);
+        if let Some(own) = own.find(is_it) {
+            own.ci95 = around(own.value);
+        }
+    }
+
+    /// Value and interval of every parameter.
+    fn slots(&mut self) -> Vec<(&mut f64, &mut Option<[f64; 2]>)> {
+        let declared = self
+            .parameters
+            .iter_mut()
+            .map(|p| (&mut p.value, &mut p.ci95));
+        let of_effects = self
+            .effects
+            .iter_mut()
+            .flat_map(|effect| &mut effect.values);
+        declared
+            .chain(of_effects.map(|(value, ci95)| (value, ci95)))
+            .collect()
+    }
+
+    /// Where the parameters of the k-th effect stand among all.
+    pub fn place_of(&self, k: usize) -> Range<usize> {
+        let before = self.effects[..k].iter().map(|effect| effect.values.len());
+        let first = self.parameters.len() + before.sum::<usize>();
+        first..first + self.effects[k].values.len()
+    }
+
     /// Each effect with the place of its parameters among all of the model.
-    pub fn placed(&self) -> impl Iterator<Item = (&FittedEffect, Range<usize>)> {
-        let mut first = self.parameters.len();
-        self.effects.iter().map(move |effect| {
-            let place = first..first + effect.values.len();
-            first = place.end;
-            (effect, place)
-        })
+    pub(super) fn placed(&self) -> impl Iterator<Item = (&FittedEffect, Range<usize>)> {
+        let places = (0..self.effects.len()).map(|k| self.place_of(k));
+        self.effects.iter().zip(places)
     }
 
     /// Whether an effect can act on a joint of this system.

@@ -2,10 +2,9 @@ use rand::Rng;
 use rand_distr::{Distribution, Normal};
 
 use super::file::{Plant, PlantError};
-use crate::closeloop::joined;
 use crate::data::Log;
 use crate::lanes::Row;
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
+use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, System};
 
 /// The rig moves in steps of this length (s), far below what any fit uses.
 const STEP_S: f64 = 1e-4;
@@ -13,16 +12,18 @@ const STEP_S: f64 = 1e-4;
 const SIGN_WIDTH: f64 = 1e-3;
 
 impl Plant {
-    /// The true equations of motion.
-    pub fn dynamics(&self) -> Dynamics {
-        let rig = self.system.with_effects(self.effects.clone());
-        rig.with_sign_widths(vec![SIGN_WIDTH; self.system.joints])
-            .dynamics()
+    /// The rig as a model: its true values and effects.
+    pub fn model(&self) -> System {
+        let mut model = self.system.with_effects(self.effects.clone());
+        for (parameter, value) in model.parameters.iter_mut().zip(&self.parameters) {
+            parameter.value = *value;
+        }
+        model.with_sign_widths(vec![SIGN_WIDTH; model.joints])
     }
 
-    /// The same with their true values.
-    pub fn true_dynamics(&self) -> Dynamics {
-        self.dynamics().with_values(self.values())
+    /// The true equations of motion, with their true values.
+    pub fn dynamics(&self) -> Dynamics {
+        self.model().dynamics()
     }
 
     /// Record one log. Velocities are backward differences of the measured angles, as on many rigs.
@@ -74,9 +75,9 @@ impl Plant {
         Ok(log)
     }
 
-    /// Values of the declared parameters, then of the effects: what [`Plant::dynamics`] takes.
+    /// True values of the declared parameters, then of the effects.
     pub fn values(&self) -> Vec<f64> {
-        joined(&self.parameters, &self.effects)
+        self.model().values()
     }
 
     /// A true state as the sensors read it, which is what the equations are about.

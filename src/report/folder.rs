@@ -62,12 +62,7 @@ fn readable_by_all() -> tempfile::Builder<'static, 'static> {
 ///
 /// # Errors
 /// An unwritable folder or a full disk.
-pub fn write(
-    folder: &Path,
-    system: &System,
-    outcome: &Outcome,
-    origin: &Origin,
-) -> Result<Report, WriteError> {
+pub fn write(folder: &Path, outcome: &Outcome, origin: &Origin) -> Result<Report, WriteError> {
     let failed = |path: &Path| {
         let path = path.to_owned();
         move |source| WriteError::File { path, source }
@@ -84,7 +79,7 @@ pub fn write(
     let json =
         serde_json::to_string_pretty(&report).expect("a report has only finite numbers and texts");
     put("report.json", &(json + "\n"))?;
-    put(MODEL, &model_file(system, outcome))?;
+    put(MODEL, &model_file(outcome))?;
     put(TEXT, &text(outcome, origin.seed))?;
     let pictures = [
         picture::predictions(outcome)?,
@@ -96,7 +91,7 @@ pub fn write(
     }
     if let Some(learned) = &outcome.learned {
         let origin = Origin {
-            model_toml: model_file(system, outcome),
+            model_toml: model_file(outcome),
             ..origin.clone()
         };
         crate::train::save(&staging.path().join(CHECKPOINT), &learned.training, &origin)?;

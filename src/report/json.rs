@@ -221,14 +221,13 @@ pub(super) const PLOTS: [&str; 3] = ["predictions.svg", "residual.svg", "errors.
 impl Report {
     /// The outcome of a run with this seed.
     pub fn new(outcome: &Outcome, seed: u64) -> Self {
-        let system = &outcome.models.after.dynamics;
-        let declared = outcome.models.before.declared.len();
+        let model = outcome.models.after.absorbed();
         Self {
             schema: 1,
             version: env!("CARGO_PKG_VERSION"),
             seed,
-            system: system.name.clone(),
-            joints: system.joints,
+            system: model.name.clone(),
+            joints: model.joints,
             verdict: outcome.verdict,
             reason: outcome.reason.clone(),
             effects: outcome.effects.findings.iter().map(effect).collect(),
@@ -241,10 +240,7 @@ impl Report {
             taken_back: outcome.effects.taken_back.iter().map(taken_back).collect(),
             confirmed_on: outcome.effects.confirmed_on,
             unexplained: left(outcome),
-            parameters: outcome.models.parameters[..declared]
-                .iter()
-                .map(parameter)
-                .collect(),
+            parameters: model.parameters.iter().map(parameter).collect(),
             contradicted: outcome
                 .models
                 .contradicted
@@ -385,7 +381,7 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
 
 fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
     let verdict = &outcome.models.identifiability;
-    let name = |k: &usize| outcome.models.before.dynamics.parameters[*k].name.clone();
+    let name = |k: &usize| outcome.models.before.parameters[*k].name.clone();
     IdentifiabilityEntry {
         free: verdict.free,
         determined: verdict.determined,
@@ -395,7 +391,7 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
 }
 
 fn errors(outcome: &Outcome) -> ErrorEntry {
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     let model = |assessment: &Assessment| model_error(summarise(&assessment.horizons, joints));
     let contender = |(name, assessment): &(String, Assessment)| ContenderEntry {
         name: name.clone(),

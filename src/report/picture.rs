@@ -22,42 +22,30 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let horizons = outcome.errors.before.horizons.iter().map(|h| h.horizon_s);
     // Differences between models grow with the horizon: the longest one shows them best.
     let horizon = horizons.fold(0.0, f64::max);
-    let mut models: Vec<(Role, &str, &Dynamics, Vec<f64>)> = vec![
-        (
-            Role::Before,
-            "declared model",
-            &outcome.models.before.dynamics,
-            outcome.models.before.values_in(log),
-        ),
-        (
-            Role::After,
-            "with effects",
-            &outcome.models.after.dynamics,
-            outcome.models.after.values_in(log),
-        ),
+    let models = &outcome.models;
+    let mut models: Vec<(Role, &str, Dynamics)> = vec![
+        (Role::Before, "declared model", models.before.dynamics()),
+        (Role::After, "with effects", models.after.dynamics()),
     ];
     if let Some(learned) = &outcome.learned {
         models.push((
             Role::Hybrid,
             "with effects and network",
-            &learned.hybrid,
-            learned.hybrid.values(),
+            learned.hybrid.clone(),
         ));
     }
     let panel = |joint: Joint| Panel {
         joint,
         kind: kind(outcome, joint),
         tracks: std::iter::once(measured(log, joint))
-            .chain(models.iter().map(|(role, label, dynamics, values)| Track {
+            .chain(models.iter().map(|(role, label, dynamics)| Track {
                 label: (*label).to_owned(),
                 role: *role,
-                segments: predicted(dynamics, values, log, joint, horizon),
+                segments: predicted(dynamics, log, joint, horizon),
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = Joint::all(outcome.models.after.dynamics.joints)
-        .map(panel)
-        .collect();
+    let panels: Vec<Panel> = Joint::all(outcome.models.after.joints).map(panel).collect();
     let title = format!(
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
@@ -86,14 +74,8 @@ fn measured(log: &Log, joint: Joint) -> Track {
     }
 }
 
-fn predicted(
-    dynamics: &Dynamics,
-    values: &[f64],
-    log: &Log,
-    joint: Joint,
-    horizon: f64,
-) -> Vec<Vec<(f64, f64)>> {
-    traces(dynamics, values, log, horizon)
+fn predicted(dynamics: &Dynamics, log: &Log, joint: Joint, horizon: f64) -> Vec<Vec<(f64, f64)>> {
+    traces(dynamics, log, horizon)
         .into_iter()
         .take_while(|trace| trace.time.last().is_some_and(|t| *t <= end(log)))
         .map(|trace| {
@@ -145,16 +127,14 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
         curves_before: curves(&outcome.remainder.before, joint),
         curves_after: curves(&outcome.remainder.after, joint),
     };
-    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.dynamics.joints)
-        .map(panel)
-        .collect();
+    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.joints).map(panel).collect();
     super::plot::residual_shape(&panels, "What the model lacks, before and after")
 }
 
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
 /// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     let errors = &outcome.errors;
     let named = |role: Role, label: &str, model: &Assessment| {
         let rmse = summarise(&model.horizons, joints).position_rmse;

@@ -35,7 +35,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 fn answer(outcome: &Outcome) -> String {
     format!(
         "# {}: {}\n\n{}.\n\n",
-        outcome.models.after.dynamics.name,
+        outcome.models.after.name,
         headline(outcome),
         capitalised(&outcome.reason)
     )
@@ -183,7 +183,7 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
     let hybrid = errors.hybrid.iter();
     models.extend(hybrid.map(|m| ("with effects and network", m)));
     models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     models
         .into_iter()
         .map(|(name, model)| (name, summarise(&model.horizons, joints)))
@@ -206,7 +206,7 @@ fn errors(outcome: &Outcome) -> String {
     );
     let (before, after) = (&models[1].1, &models[2].1);
     for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for joint in Joint::all(outcome.models.after.dynamics.joints) {
+        for joint in Joint::all(outcome.models.after.joints) {
             let rmse = |s: &Summary| s.position_rmse[h][joint];
             let cell = |(_, s): &(&str, Summary)| {
                 format!(
@@ -252,16 +252,18 @@ pub(super) fn small(x: f64) -> String {
 }
 
 fn parameters(outcome: &Outcome) -> String {
-    let declared = outcome.models.before.declared.len();
     let mut out = String::from("## Parameters of the declared equations\n\n");
-    for (parameter, before) in outcome.models.parameters[..declared]
+    let after = outcome.models.after.absorbed();
+    for (parameter, before) in after
+        .parameters
         .iter()
-        .zip(&outcome.models.before.declared)
+        .zip(&outcome.models.before.parameters)
     {
         let _ = writeln!(
             out,
-            "- {}; without the effects {before:.5}",
-            value(parameter)
+            "- {}; without the effects {:.5}",
+            value(parameter),
+            before.value
         );
     }
     let verdict = &outcome.models.identifiability;
@@ -271,7 +273,7 @@ fn parameters(outcome: &Outcome) -> String {
         verdict.determined, verdict.free
     );
     for &k in &verdict.hold {
-        let name = &outcome.models.before.dynamics.parameters[k].name;
+        let name = &outcome.models.before.parameters[k].name;
         let _ = writeln!(
             out,
             "- `{name}` is held: the logs determine it only in combination with others. \
@@ -501,7 +503,8 @@ fn logs(outcome: &Outcome) -> String {
 fn footer(outcome: &Outcome, seed: u64) -> String {
     let widths: Vec<String> = outcome
         .models
-        .sign_widths
+        .after
+        .sign_widths()
         .iter()
         .map(|w| format!("{w:.3}"))
         .collect();

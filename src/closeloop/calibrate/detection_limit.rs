@@ -2,7 +2,6 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::select::{FALSE_ALARM, SIGNIFICANT_ALONE};
 use crate::closeloop::select::{PLAIN, WORTHWHILE};
 use crate::closeloop::select::{candidates, starts};
@@ -90,27 +89,13 @@ struct Look<'a> {
 
 impl<'a> Look<'a> {
     fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let values = values_on(study.logs, &accepted.declared, &accepted.effects);
+        let dynamics = accepted.dynamics();
         let scale = accepted.fit.scale;
         let states = study.shooting.initial_locals(0);
-        let locals = fit(
-            &study.shooting,
-            &accepted.dynamics,
-            &[],
-            values.clone(),
-            states,
-            Some(scale),
-        )?
-        .locals;
+        let (_, free) = fit(&study.shooting, &dynamics, &[], states, Some(scale))?;
+        let locals = free.locals;
         let active = &accepted.fit.active;
-        let fit = as_it_stands(
-            &study.shooting,
-            &accepted.dynamics,
-            active,
-            values,
-            locals.clone(),
-            scale,
-        )?;
+        let fit = as_it_stands(&study.shooting, &dynamics, active, locals.clone(), scale)?;
         let loss = left_out_losses(&fit, &folds(&study.shooting)).iter().sum();
         Ok(Self {
             study,
@@ -184,14 +169,13 @@ impl<'a> Look<'a> {
         let accepted = self.accepted;
         let mut effects = accepted.effects.clone();
         effects.push(start.clone());
-        let dynamics = self.study.dynamics(effects.clone());
-        let values = values_on(self.study.logs, &accepted.declared, &effects);
-        let switch = values.common.len() - start.values.len() + switch;
+        let model = self.study.smoothed(&accepted.with_effects(effects));
+        let dynamics = model.dynamics();
+        let switch = dynamics.parameters.len() - start.values.len() + switch;
         as_it_stands(
             &self.study.shooting,
             &dynamics,
             &[accepted.fit.active.as_slice(), &[switch]].concat(),
-            values,
             self.locals.clone(),
             accepted.fit.scale,
         )

@@ -99,7 +99,8 @@ pub fn calibrate(
     let mut repeat = Repeat {
         study,
         library,
-        declared: declared(study.system, accepted),
+        // Whatever is named beyond the accepted model is a false alarm.
+        declared: accepted.model.clone(),
         done: 0,
         of: runs + tried.count(),
         progress,
@@ -132,16 +133,6 @@ pub fn calibrate(
         limits,
         top_torque: study.top_torque.clone(),
     })
-}
-
-/// The accepted model as a declared one: whatever is named beyond it is a false alarm.
-fn declared(system: &System, accepted: &Fitted) -> System {
-    let mut declared = system.clone();
-    for (parameter, value) in declared.parameters.iter_mut().zip(&accepted.declared) {
-        parameter.value = *value;
-    }
-    declared.effects.clone_from(&accepted.effects);
-    declared
 }
 
 /// The whole search, once again and again.

@@ -4,12 +4,11 @@ use super::menu::{Experiment, as_logged, experiments, spread};
 use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::select::Rival;
 use crate::closeloop::study::{Study, WINDOW_S};
 use crate::data::{Joint, Log};
-use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
-use crate::model::{Dynamics, FittedEffect};
+use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
+use crate::model::{Dynamics, FittedEffect, System};
 
 /// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
 /// probability of 95 %: the lead has the mean of half and the standard deviation of the root of this number.
@@ -26,15 +25,12 @@ const SCALE: f64 = 100.0;
 /// One of two explanations.
 pub(super) struct Hypothesis {
     dynamics: Dynamics,
-    /// What differs by log, by the logs of the study.
-    values: Values,
 }
 
 impl Hypothesis {
-    pub fn new(study: &Study<'_>, effects: &[FittedEffect], declared: &[f64]) -> Self {
+    pub fn new(study: &Study<'_>, model: &System) -> Self {
         Self {
-            dynamics: study.dynamics(effects.to_vec()),
-            values: values_on(study.logs, declared, effects),
+            dynamics: study.smoothed(model).dynamics(),
         }
     }
 
@@ -46,43 +42,28 @@ impl Hypothesis {
         };
         let effects: Vec<FittedEffect> =
             rival.model.effects.iter().filter(stands).cloned().collect();
-        Self::new(study, &effects, &rival.model.declared)
+        Self::new(study, &rival.model.with_effects(effects))
     }
 
     fn with(&self, payload: Option<&Payload>) -> Self {
         Self {
             dynamics: payload.map_or_else(|| self.dynamics.clone(), |p| p.on(&self.dynamics)),
-            values: self.values.clone(),
         }
     }
 
     /// What it says the rig does; `None` where it diverges.
-    fn simulate(&self, motions: &[Motion]) -> Option<Record> {
-        Record::of(motions, &self.dynamics, &self.values, WINDOW_S)
+    fn simulate(&self, study: &Study<'_>, motions: &[Motion]) -> Option<Record> {
+        Record::of(motions, study.logs, &self.dynamics, WINDOW_S)
     }
 
     /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
     /// present logs do not.
-    fn refit(
-        &self,
-        shooting: &Shooting<'_>,
-        origins: &[usize],
-        locals: Vec<Vec<f64>>,
-    ) -> Option<Fit> {
+    fn refit(&self, shooting: &Shooting<'_>, locals: Vec<Vec<f64>>) -> Option<(Values, Fit)> {
         let parameters = &self.dynamics.parameters;
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&k| !parameters[k].fixed)
             .collect();
-        let own = |(log, &origin): (usize, &usize)| {
-            let of_origin = self.values.own.iter().filter(move |own| own.log == origin);
-            of_origin.map(move |own| Own { log, ..*own })
-        };
-        let values = Values {
-            common: self.values.common.clone(),
-            own: origins.iter().enumerate().flat_map(own).collect(),
-        };
-        let scale = Some(SCALE);
-        fit(shooting, &self.dynamics, &active, values, locals, scale).ok()
+        fit(shooting, &self.dynamics, &active, locals, Some(SCALE)).ok()
     }
 }
 
@@ -135,20 +116,19 @@ impl<'a> Comparison<'a> {
             .into_iter()
             .map(|w| window_of(study, model, w))
             .collect();
-        let present = truth.simulate(&motions)?;
+        let present = truth.simulate(study, &motions)?;
         let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
-        let found = other.refit(&shooting, &present.origins, present.starts(0..))?;
+        let (values, found) = other.refit(&shooting, present.starts(0..))?;
         let loss = loss_of(&found);
         let windows = study.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
         // The logs did not tell, whatever the noise says: they hold no more than was needed.
         let too_sure = loss / present.duration_s(0..) * all_s / NEEDED;
-        let differences = differences(&shooting, &other, &found, 0);
+        let differences = differences(&shooting, &other, &values, &found.locals, 0);
         Some(Self {
             inflation: inflation(study, model).max(too_sure),
             other: Hypothesis {
-                values: at_origins(found.found(), &present.origins),
-                ..other
+                dynamics: values.put_into(&other.dynamics, &present.logs),
             },
             locals: found.locals,
             differences,
@@ -175,12 +155,7 @@ impl<'a> Comparison<'a> {
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
         let declared = self.study.system.parameters.len();
         let truth = &self.truth;
-        Payload::all(
-            &truth.dynamics,
-            &truth.values.common,
-            declared,
-            2.0 * latest_s + 10.0,
-        )
+        Payload::all(&truth.dynamics, declared, 2.0 * latest_s + 10.0)
     }
 
     fn loaded(&self, model: &Fitted, payload: &Payload) -> Experiment {
@@ -199,16 +174,16 @@ impl<'a> Comparison<'a> {
     fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
-            .simulate(&experiment.motions)
+            .simulate(self.study, &experiment.motions)
             .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
         let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
         let present = self.locals.len();
         let locals = [self.locals.clone(), both.starts(present..)].concat();
-        let found = other.refit(&shooting, &both.origins, locals)?;
+        let (values, found) = other.refit(&shooting, locals)?;
         let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
-        let differences = differences(&shooting, &other, &found, present);
+        let differences = differences(&shooting, &other, &values, &found.locals, present);
         let share = |joint: &Joint| differences[*joint] / self.noise[*joint];
         let joint = Joint::all(differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
         Some(Trial {
@@ -234,14 +209,6 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// Values of a fit to a record by the logs of the study.
-fn at_origins(mut values: Values, origins: &[usize]) -> Values {
-    for own in &mut values.own {
-        own.log = origins[own.log];
-    }
-    values
-}
-
 /// The motion of one window of the logs.
 fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
     let window = study.shooting.windows[w];
@@ -263,9 +230,15 @@ fn loss_of(fit: &Fit) -> f64 {
 }
 
 /// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.
-fn differences(shooting: &Shooting<'_>, model: &Hypothesis, fit: &Fit, first: usize) -> Vec<f64> {
+fn differences(
+    shooting: &Shooting<'_>,
+    model: &Hypothesis,
+    values: &Values,
+    locals: &[Vec<f64>],
+    first: usize,
+) -> Vec<f64> {
     let n = model.dynamics.joints;
-    let residuals = shooting.residuals(&model.dynamics, &fit.found(), &fit.locals);
+    let residuals = shooting.residuals(&model.dynamics, values, locals);
     let residuals: Vec<f64> = residuals[first..].concat();
     let square = |j: usize| {
         residuals

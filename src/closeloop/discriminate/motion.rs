@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use crate::data::Log;
-use crate::identify::{Values, Window};
+use crate::identify::Window;
 use crate::lanes::Row;
 use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
 
@@ -38,12 +38,12 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Motions as a model has them, cut into windows of `length_s`. `values` gives its parameters in each log of the
-    /// study. `None` where it diverges.
+    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`. What differs by log is as
+    /// it is there. `None` where the model diverges.
     pub fn of(
         motions: &[Motion],
+        logs: &[Log],
         dynamics: &Dynamics,
-        values: &Values,
         length_s: f64,
     ) -> Option<Self> {
         let mut record = Self {
@@ -53,9 +53,9 @@ impl Record {
             windows: Vec::new(),
         };
         for motion in motions {
-            let index = record.log_of(motion.log, dynamics.joints);
+            let index = record.log_of(motion.log, &logs[motion.log]);
             let first = append(&mut record.logs[index], motion);
-            let values = values.of_log(motion.log);
+            let values = dynamics.in_log(&logs[motion.log]).values();
             simulate(
                 &mut record.logs[index],
                 first,
@@ -74,13 +74,16 @@ impl Record {
         Some(record)
     }
 
-    /// Number of the record's log for motions that begin in a log of the study.
-    fn log_of(&mut self, origin: usize, joints: usize) -> usize {
+    /// Number of the record's log for motions that begin in a log of the study: it is called as that log is.
+    fn log_of(&mut self, origin: usize, log: &Log) -> usize {
         if let Some(known) = self.origins.iter().position(|known| *known == origin) {
             return known;
         }
         self.origins.push(origin);
-        self.logs.push(Log::empty(joints));
+        self.logs.push(Log {
+            path: log.path.clone(),
+            ..Log::empty(log.joints())
+        });
         self.logs.len() - 1
     }
 

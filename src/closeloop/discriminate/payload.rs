@@ -19,11 +19,11 @@ const SHARE: f64 = 0.5;
 
 impl Payload {
     /// A payload for each of the first `declared` parameters that one can add to.
-    pub fn all(dynamics: &Dynamics, values: &[f64], declared: usize, delay_s: f64) -> Vec<Self> {
+    pub fn all(dynamics: &Dynamics, declared: usize, delay_s: f64) -> Vec<Self> {
         let carries = |k: &usize| OF_MASS.contains(&dynamics.parameters[*k].unit.as_str());
         let of = |parameter: usize| Self {
             parameter,
-            extra: SHARE * values[parameter],
+            extra: SHARE * dynamics.parameters[parameter].value,
             delay_s,
         };
         (0..declared).filter(carries).map(of).collect()

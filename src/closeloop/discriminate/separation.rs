@@ -39,7 +39,7 @@ const VISIBLE: f64 = 0.1;
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
 pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
-    let chosen = Hypothesis::new(study, &model.effects, &model.declared);
+    let chosen = Hypothesis::new(study, model);
     let other = Hypothesis::of_rival(study, model, rival);
     let comparison = if rival.contains_chosen() {
         Comparison::new(study, model, other, chosen)

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::data::{Audit, Joint};
+use crate::identify::Values;
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,8 +103,9 @@ struct Window {
 fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
     let joints = study.system.joints;
     let shooting = &study.shooting;
-    let found = model.fit.found();
-    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&model.dynamics, &found, locals);
+    let dynamics = model.dynamics();
+    let values = Values::of(&dynamics, study.logs);
+    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
     let sensors = sensors(study);
     let at = residuals(&model.fit.locals);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)

@@ -129,9 +129,9 @@ fn longer(
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {
-            let effects = [model.effects.as_slice(), &[start]].concat();
+            let longer = model.with_effects([model.effects.as_slice(), &[start]].concat());
             let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-            let fitted = study.refit(&effects, &model.declared, locals, scale).ok()?;
+            let fitted = study.refit(&longer, locals, scale).ok()?;
             Some(Sum {
                 terms,
                 losses: left_out_losses(&fitted.fit, folds),

@@ -98,7 +98,11 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
     effects.push(probe);
     let scale = Some(model.fit.scale);
     let fitted = study
-        .refit(&effects, &model.declared, model.fit.locals.clone(), scale)
+        .refit(
+            &model.with_effects(effects),
+            model.fit.locals.clone(),
+            scale,
+        )
         .ok()?;
     let without = left_out_losses(&fitted.fit, &folds(&study.shooting));
     Some(Probed {

@@ -1,4 +1,4 @@
-use crate::model::Parameter;
+use crate::model::{Parameter, System};
 
 /// A value in the model file that the training logs contradict.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,18 +12,14 @@ pub struct Contradicted {
 
 /// The declared values that lie outside of the intervals of the fitted ones. Both are in the same order; parameters
 /// without an interval were not fitted and contradict nothing.
-pub(in crate::closeloop) fn contradicted(
-    declared: &[f64],
-    fitted: &[Parameter],
-) -> Vec<Contradicted> {
-    let outside = |(&declared, fitted): (&f64, &Parameter)| {
-        let [low, high] = fitted.ci95?;
-        (!(low..=high).contains(&declared)).then(|| Contradicted {
-            declared,
-            fitted: fitted.clone(),
-        })
-    };
-    declared.iter().zip(fitted).filter_map(outside).collect()
+pub(in crate::closeloop) fn contradicted(declared: &System, fitted: &System) -> Vec<Contradicted> {
+    let pairs = declared.values().into_iter().zip(fitted.all_parameters());
+    pairs.filter_map(outside).collect()
+}
+
+fn outside((declared, fitted): (f64, Parameter)) -> Option<Contradicted> {
+    let [low, high] = fitted.ci95?;
+    (!(low..=high).contains(&declared)).then_some(Contradicted { declared, fitted })
 }
 
 impl Contradicted {
@@ -67,7 +63,8 @@ mod tests {
             fitted(0.29, Some([0.1, 0.4])),
             fitted(0.29, None),
         ];
-        let found = contradicted(&[0.102, 0.102, 0.102], &parameters);
+        let pairs = parameters.map(|fitted| (0.102, fitted));
+        let found: Vec<Contradicted> = pairs.into_iter().filter_map(outside).collect();
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].comparison(), "2.84 times as large");
     }

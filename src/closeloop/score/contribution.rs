@@ -2,12 +2,10 @@ use rayon::prelude::*;
 
 use super::errors::Scorer;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::take_over_intervals;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
 use crate::evaluate::Assessment;
-use crate::identify::{Uncertainty, uncertainty};
 use crate::model::{FittedEffect, OwnValue, Parameter, System};
 
 /// One effect that was added.
@@ -54,44 +52,27 @@ pub(in crate::closeloop) fn findings(
     with: &Assessment,
 ) -> Vec<Finding> {
     let declared = study.system.effects.len();
-    let uncertainty = uncertainty(&study.shooting, &refined.model.fit);
     (declared..refined.model.effects.len())
         .into_par_iter()
-        .filter_map(|k| finding(study, refined, &uncertainty, scorer, with, k))
+        .filter_map(|k| finding(study, &refined.model, scorer, with, k))
         .collect()
 }
 
 fn finding(
     study: &Study<'_>,
-    refined: &Refined<'_>,
-    uncertainty: &Uncertainty,
+    model: &Fitted,
     scorer: &Scorer<'_>,
     with: &Assessment,
     k: usize,
 ) -> Option<Finding> {
-    let Refined {
-        model, parameters, ..
-    } = refined;
-    let own = parameters[model.range_of(k)].to_vec();
-    let mut effect = model.effects[k].clone();
-    let (expression, reported) = described(study.system, &effect, parameters, &own);
-    for (slot, parameter) in effect.values.iter_mut().zip(&own) {
-        *slot = (parameter.value, parameter.ci95);
-    }
-    take_over_intervals(
-        &mut effect,
-        model.range_of(k),
-        &model.fit,
-        uncertainty,
-        study.logs,
-    );
+    let (expression, parameters) = described(study.system, model, k);
     let without = without(study, model, k)?;
     let folds = folds(&study.shooting);
     let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
     Some(Finding {
         expression,
-        effect,
-        parameters: reported,
+        effect: model.effects[k].clone(),
+        parameters,
         p_value: p_value(study, model, k)
             .unwrap_or_else(|| p_of_gains(&losses(&without), &losses(model))),
         error_reduction: 1.0
@@ -103,36 +84,27 @@ fn finding(
     })
 }
 
-/// What an effect with its `own` parameters adds, and the parameters that it is reported with: of a shift, what is
-/// shifted.
-fn described(
-    system: &System,
-    effect: &FittedEffect,
-    parameters: &[Parameter],
-    own: &[Parameter],
-) -> (String, Vec<Parameter>) {
+/// What the k-th effect of a model adds, and the parameters that it is reported with: of a shift, what is shifted.
+fn described(declared: &System, model: &System, k: usize) -> (String, Vec<Parameter>) {
+    let effect = &model.effects[k];
     match effect.shifted() {
-        Some(k) => {
-            let expression = system.parameters[k].expression_of_shift(parameters[k].value);
-            (expression, vec![parameters[k].clone()])
+        Some(shifted) => {
+            let actual = model.absorbed().parameters.swap_remove(shifted);
+            let expression = declared.parameters[shifted].expression_of_shift(actual.value);
+            (expression, vec![actual])
         }
         None => {
+            let own = model.all_parameters()[model.place_of(k)].to_vec();
             let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
-            (effect.expression(&names), own.to_vec())
+            (effect.expression(&names), own)
         }
     }
 }
 
 /// The model refitted without its k-th effect, its residuals on the same scale.
 fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Option<Fitted> {
-    let mut effects = model.effects.clone();
-    effects.remove(k);
-    study
-        .refit(
-            &effects,
-            &model.declared,
-            model.fit.locals.clone(),
-            Some(model.fit.scale),
-        )
-        .ok()
+    let mut less = model.model.clone();
+    less.effects.remove(k);
+    let locals = model.fit.locals.clone();
+    study.refit(&less, locals, Some(model.fit.scale)).ok()
 }

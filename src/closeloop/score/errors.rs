@@ -53,7 +53,7 @@ impl Scorer<'_> {
 
     /// The error of a fitted model.
     pub fn fitted(&self, model: &Fitted) -> Assessment {
-        self.assess(&model.dynamics, |log| model.values_in(log))
+        self.dynamics(&model.dynamics())
     }
 
     fn as_it_is(&self, model: &System) -> Assessment {
@@ -61,11 +61,6 @@ impl Scorer<'_> {
     }
 
     fn dynamics(&self, model: &Dynamics) -> Assessment {
-        self.assess(model, |log| model.in_log(log).values())
-    }
-
-    fn assess(&self, dynamics: &Dynamics, values_in: impl Fn(&Log) -> Vec<f64>) -> Assessment {
-        let values: Vec<Vec<f64>> = self.test.iter().map(values_in).collect();
-        assess(dynamics, |log| &values[log], self.test, self.horizons_s)
+        assess(model, self.test, self.horizons_s)
     }
 }

@@ -1,7 +1,6 @@
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::identify::{Shooting, predicted_cost};
@@ -95,10 +94,9 @@ fn promised(
 ) -> Option<f64> {
     let mut effects = model.effects.clone();
     effects.push(start.clone());
-    let dynamics = study.dynamics(effects.clone());
-    let values = values_on(study.logs, &model.declared, &effects);
+    let dynamics = study.smoothed(&model.with_effects(effects)).dynamics();
     let (active, scale) = (study.active(&dynamics), model.fit.scale);
-    predicted_cost(shooting, &dynamics, &active, values, locals, scale)
+    predicted_cost(shooting, &dynamics, &active, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
@@ -115,8 +113,8 @@ pub fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Op
         return None;
     }
     let mut beside = model.clone();
-    let found = beside.effects.split_off(study.system.effects.len());
-    beside.effects.extend(
+    let found = beside.model.effects.split_off(study.system.effects.len());
+    beside.model.effects.extend(
         found
             .into_iter()
             .filter(|present| !contains(candidate, present)),

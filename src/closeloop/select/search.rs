@@ -185,7 +185,7 @@ impl<'a, 'p> Search<'a, 'p> {
     fn rescaled(&self, model: &Fitted) -> Fitted {
         let locals = model.fit.locals.clone();
         self.study
-            .refit(&model.effects, &model.declared, locals, None)
+            .refit(model, locals, None)
             .unwrap_or_else(|_| model.clone())
     }
 
@@ -264,7 +264,7 @@ fn weigh(
     start: FittedEffect,
     without: &[f64],
 ) -> Option<Evidence> {
-    let mut effects = beside(study, model, &start)?.effects;
+    let mut effects = beside(study, model, &start)?.model.effects;
     effects.push(start);
     let fitted = refit(study, model, &effects)?;
     Evidence::of(study, fitted, folds, without)
@@ -274,7 +274,11 @@ fn weigh(
 fn refit(study: &Study<'_>, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
     let locals = model.fit.locals.clone();
     study
-        .refit(effects, &model.declared, locals, Some(model.fit.scale))
+        .refit(
+            &model.with_effects(effects.to_vec()),
+            locals,
+            Some(model.fit.scale),
+        )
         .ok()
 }
 

@@ -82,13 +82,11 @@ impl Closed {
             joint: finding.effect.joint,
             parameters: finding.parameters.iter().map(parameter).collect(),
         };
-        let declared = outcome.models.after.declared.len();
         Self {
             episodes,
             verdict: outcome.verdict,
             effects: outcome.effects.findings.iter().map(named).collect(),
-            parameters: outcome.models.parameters[..declared]
-                .iter()
+            parameters: (outcome.models.after.absorbed().parameters.iter())
                 .map(parameter)
                 .collect(),
         }
@@ -119,7 +117,7 @@ impl Lab {
             })
         };
         let declared = self.predictor(self.declared());
-        let truth = self.predictor(self.plants[case].true_dynamics());
+        let truth = self.predictor(self.plants[case].dynamics());
         let mut scores = vec![score(Contestant::Declared, 0, &declared)?];
         let mut closed = Vec::new();
         let mut logs = Vec::new();
@@ -206,6 +204,5 @@ impl Lab {
 
 /// What closing the loop ended with.
 fn fitted(outcome: &Outcome) -> Dynamics {
-    let values = outcome.models.after.fit.values.iter().copied();
-    outcome.models.after.dynamics.clone().with_values(values)
+    outcome.models.after.dynamics()
 }
