@@ -1,6 +1,7 @@
 //! What closing the loop said, in the words of the bench.
 
-use super::judge::{Answer, Estimate, Label, Named, label, of_log};
+use super::hidden::{Label, label};
+use super::judge::{Answer, Estimate, Named, of_log};
 use crate::closeloop::{Finding, Outcome};
 use crate::model::{FittedEffect, Parameter};
 

@@ -128,8 +128,8 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
     let logs = (0..plant.recording.logs)
         .map(record)
         .collect::<Result<Vec<_>>>()?;
-    // What the plant knows stays with the plant: the loop gets the declared model and the logs.
-    Ok((library.system(Path::new("pendulum"))?, Split::of(logs)))
+    // What the plant hides stays with the plant: the loop gets the declared model and the logs.
+    Ok((plant.declared(), Split::of(logs)))
 }
 
 /// Models that predict the same joints, in the same units.

@@ -7,11 +7,11 @@ use serde_json::json;
 use super::{Answer, Common, inputs};
 use crate::formats::Imported;
 
-/// Make a checkpoint of a model that was exported as JSON and safetensors
+/// Make a checkpoint from a model that was exported as JSON and safetensors
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn import --file pendulum.json --out pendulum")]
 pub(super) struct Arguments {
-    /// The JSON file; the weights that it names lie beside it
+    /// The JSON file; the weights that it names are beside it
     #[arg(long, value_name = "JSON")]
     file: PathBuf,
     /// Folder of the checkpoint

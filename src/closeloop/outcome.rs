@@ -51,7 +51,7 @@ pub struct Models {
     pub after: Fitted,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
-    /// Values in the model file that the fit of `before` contradicts.
+    /// Values in the model file that the fit of `after` contradicts.
     pub contradicted: Vec<Contradicted>,
 }
 

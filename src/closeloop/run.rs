@@ -6,7 +6,7 @@ use super::find::{Found, find};
 use super::fitted::Fitted;
 use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
-use super::refine::{Refined, refine, with_intervals};
+use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
@@ -94,9 +94,9 @@ fn remainder(study: &Study<'_>, found: &Found, refined: &Refined<'_>) -> Remaind
 }
 
 fn models_of(study: &Study<'_>, before: Fitted, refined: Refined<'_>) -> Models {
-    let fitted = with_intervals(study, &before, &before);
+    let fitted = refined.model.absorbed().all_parameters();
     Models {
-        contradicted: contradicted(study.system, &fitted),
+        contradicted: contradicted(&study.system.all_parameters(), &fitted),
         before,
         after: refined.model,
         identifiability: study.identifiability.clone(),

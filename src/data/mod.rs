@@ -19,6 +19,7 @@ mod log;
 mod projection;
 mod read;
 mod signal;
+pub(crate) mod statistics;
 mod trajectory;
 
 pub use audit::{

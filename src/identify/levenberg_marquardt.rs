@@ -8,6 +8,7 @@ use super::normal_equations::{Normal, Reduced, solve_with_held};
 use super::sensitivity::Tangent;
 use super::shooting::{Shooting, WindowTerms};
 use super::values::{Layout, Values};
+use crate::data::statistics::{SIGMA_PER_MAD, upper_median};
 use crate::model::Dynamics;
 
 /// Why a fit ended.
@@ -304,8 +305,88 @@ impl<'a> Search<'a> {
 
 /// Standard deviation of a normal sample with the same median absolute value; never zero.
 fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    (1.4826 * *median).max(1e-6)
+    let sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    (SIGMA_PER_MAD * upper_median(&sizes)).max(1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{Search, Termination};
+    use crate::data::Log;
+    use crate::identify::sensitivity::{Local, Tangent};
+    use crate::identify::{FitError, Shooting, cut};
+    use crate::model::{Dynamics, System};
+
+    /// One joint that follows `formula`, where `k` starts at `value`.
+    fn joint(formula: &str, value: f64) -> Dynamics {
+        let text = format!(
+            "[system]\nname = \"joint\"\njoints = 1\n[parameters]\nk = {{ value = {value} }}\n\
+             [dynamics]\nqdd1 = \"{formula}\"\n"
+        );
+        let model = System::from_text(Path::new("joint.toml"), &text, &[]).unwrap();
+        model.with_sign_widths(vec![0.0]).dynamics()
+    }
+
+    /// 4 s at 100 Hz of an acceleration of 2.
+    fn log() -> Log {
+        let time: Vec<f64> = (0..400).map(|row| 0.01 * f64::from(row)).collect();
+        let mut log = Log::empty(1);
+        log.q = vec![time.iter().map(|t| t * t).collect()];
+        log.qd = vec![time.iter().map(|t| 2.0 * t).collect()];
+        log.tau = vec![vec![0.0; time.len()]];
+        log.time = time;
+        log
+    }
+
+    /// How a fit of `k` ends that may take so many steps, and the value that it finds.
+    fn end(formula: &str, value: f64, most: usize) -> Result<(Termination, f64), FitError> {
+        let (logs, dynamics) = ([log()], joint(formula, value));
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
+        let tangent = Tangent::new(&dynamics, &[0], Local::State);
+        let locals = shooting.initial_locals(0);
+        let mut search = Search::new(&shooting, &dynamics, &tangent, locals, Some(1.0))?;
+        let termination = search.run(most);
+        let (found, fit) = search.finish(termination);
+        assert_eq!(fit.termination, termination);
+        Ok((termination, found.common[0]))
+    }
+
+    #[test]
+    fn a_fit_says_that_it_has_converged() {
+        let (termination, k) = end("k", 1.0, 40).unwrap();
+        assert!(termination.has_converged(), "{termination:?}");
+        assert!((k - 2.0).abs() < 1e-6, "{k}");
+    }
+
+    #[test]
+    fn a_fit_that_starts_at_the_minimum_has_converged() {
+        let (termination, k) = end("k", 2.0, 40).unwrap();
+        assert!(termination.has_converged(), "{termination:?}");
+        assert!((k - 2.0).abs() < 1e-6, "{k}");
+    }
+
+    #[test]
+    fn a_fit_out_of_steps_says_so() {
+        let (termination, k) = end("exp(k)", -3.0, 1).unwrap();
+        assert_eq!(termination, Termination::StepLimit);
+        assert!(!termination.has_converged() && k.exp() < 1.9, "{k}");
+    }
+
+    /// The square root has no derivative at zero: no step can be solved for, and none is taken in silence.
+    #[test]
+    fn normal_equations_that_are_not_finite_are_singular() {
+        let (termination, k) = end("sqrt(k)", 0.0, 40).unwrap();
+        assert_eq!((termination, k), (Termination::Singular, 0.0));
+        assert!(!termination.has_converged());
+    }
+
+    /// The derivative at 1 points up to 2, but off 1 the model is far away on either side.
+    #[test]
+    fn a_fit_that_its_derivatives_mislead_has_not_converged() {
+        let (termination, k) = end("k + 100*abs(sign(k - 1))", 1.0, 40).unwrap();
+        assert_eq!((termination, k), (Termination::NoDescent, 1.0));
+        assert!(!termination.has_converged());
+    }
 }

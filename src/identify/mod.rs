@@ -1,8 +1,7 @@
 //! Physical parameters from logs: least squares on trajectories in f64.
 //!
-//! Nothing here differentiates measured data. Windows of a log are integrated open loop from free start
-//! states and compared with the logged positions; reported velocities, which are filtered or delayed on
-//! most rigs, are not used.
+//! Measured data are never differentiated. Windows of a log are integrated open loop from free start states and compared
+//! with the logged positions. Logged velocities are not used, since most rigs filter or delay them.
 
 mod fit;
 mod identifiability;

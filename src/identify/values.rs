@@ -16,8 +16,8 @@ pub struct Own {
 /// that one log has of its own, by its place in that list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Values {
-    /// One value a parameter, in the model's order; of a parameter with a value per log, what holds in a log
-    /// that has none of its own.
+    /// One value per parameter, in the model's order. For a parameter with a value per log, the one that holds in logs
+    /// without a value of their own.
     pub common: Vec<f64>,
     pub own: Vec<Own>,
 }
@@ -53,7 +53,7 @@ impl Values {
         found
     }
 
-    /// All parameters as they are in a log.
+    /// The values of all parameters in a log.
     pub fn of_log(&self, log: usize) -> Vec<f64> {
         let mut values = self.common.clone();
         for own in self.own.iter().filter(|own| own.log == log) {
@@ -96,7 +96,7 @@ pub struct Column {
     pub log: Option<usize>,
 }
 
-/// The free values of a fit, and where those of each window stand among them.
+/// The columns of a fit, and which of them enter each window.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
     pub columns: Vec<Column>,

@@ -14,7 +14,8 @@ impl System {
     /// Filters of the command act first, then other effects of the torque, in their order, then forces are added.
     /// `load` is the torque before the latter.
     pub fn dynamics(&self) -> Dynamics {
-        let mut assembly = Assembly::new(self, &self.effects, &self.sign());
+        let sign = self.sign();
+        let mut assembly = Assembly::new(self, &self.effects, &sign);
         let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();

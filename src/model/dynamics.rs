@@ -19,19 +19,31 @@ pub struct Parameter {
     pub bounds: [f64; 2],
     /// Held at `value` in every fit.
     pub fixed: bool,
-    /// Has a value of its own in each log.
+    /// Takes a value of its own in each log.
     pub per_log: bool,
     /// 95 % interval, once a fit has found one.
     pub ci95: Option<[f64; 2]>,
-    /// The magnitude in which steps are measured: the declared value's, or a typical one where that is zero.
+    /// Magnitude by which steps are scaled: that of the declared value, or 1 if it is zero; typical for effects.
     pub scale: f64,
 }
 
-/// A model ready to run: first-order differential equations as one program, and its parameters.
+impl Parameter {
+    /// The same parameter, declared with another value.
+    #[must_use]
+    pub fn with_value(&self, value: f64) -> Self {
+        Self {
+            value,
+            scale: if value == 0.0 { 1.0 } else { value.abs() },
+            ..self.clone()
+        }
+    }
+}
+
+/// A compiled model: first-order differential equations as one program, with the values of its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
 /// (N m or N), `t` (s), then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values),
-/// then `dqd/dt` (n values). The torques are those that act: what `filters` make of the commanded ones.
+/// then `dqd/dt` (n values). The torques are those that act, after `filters`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.
@@ -40,12 +52,12 @@ pub struct Dynamics {
     pub joints: usize,
     pub parameters: Vec<Parameter>,
     pub program: Program,
-    /// What the commanded torques go through first, see [`Commands`](super::Commands).
+    /// Filters of the commanded torques, see [`Commands`](super::Commands).
     pub filters: Vec<Filter>,
-    /// What the sensors show for the angles, from the same inputs, where that is not the rig's own: n outputs. The
-    /// torques are those that acted until then.
+    /// The measured angles, from the same inputs (n outputs), unless they equal the true ones. The torques are those that
+    /// acted until then.
     pub reading: Option<Program>,
-    /// The values that single logs have of their own, each of the parameter at that index of `parameters`.
+    /// Values of parameters in single logs; `parameter` is an index into `parameters`.
     pub own: Vec<OwnValue>,
 }
 
@@ -55,7 +67,7 @@ impl Dynamics {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// The same with other values of the parameters, in their order.
+    /// The same model with other values of its parameters, in their order.
     #[must_use]
     pub fn with_values(mut self, values: impl IntoIterator<Item = f64>) -> Self {
         for (parameter, value) in self.parameters.iter_mut().zip(values) {
@@ -64,7 +76,7 @@ impl Dynamics {
         self
     }
 
-    /// The same as it is in a log: with the values that the log has of its own.
+    /// The model in a log: with the values that its parameters have there.
     pub fn in_log(&self, log: &Log) -> Cow<'_, Self> {
         let mut in_log = Cow::Borrowed(self);
         for own in self.own_in(log) {
@@ -73,7 +85,7 @@ impl Dynamics {
         in_log
     }
 
-    /// The values that a log has of its own: those known by its path or else by its name.
+    /// The values of parameters in one log, which is found by its path or else by its file name.
     pub fn own_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = &'a OwnValue> {
         let is_path = |own: &OwnValue| log.path.as_os_str() == own.log.as_str();
         let by_path = move |parameter: usize| {

@@ -8,6 +8,7 @@ mod dynamics;
 mod effect;
 mod effects_in_file;
 mod equations;
+mod file;
 mod frame;
 mod hybrid;
 mod integrator;

@@ -108,7 +108,7 @@ impl FittedEffect {
 }
 
 impl System {
-    /// The same with shifts taken into the declared values that they shift.
+    /// The same model with each shift added to the declared value that it shifts.
     #[must_use]
     pub fn absorbed(&self) -> Self {
         let all = self.all_parameters();

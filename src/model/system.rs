@@ -2,12 +2,12 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::effect::{Effect, Entry, Measure};
-use super::reader::{Document, FileError, Located, Section};
-use super::{Dynamics, Parameter, sections};
+use super::reader::Located;
+use super::{Dynamics, Parameter};
 use crate::data::{Columns, Joint, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
-/// Dry friction reverses over this speed (rad/s or m/s) where neither the file nor a fit to logs says otherwise.
+/// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
 const DEFAULT_SIGN_WIDTH: f64 = 0.01;
 
 /// How a model file states the motion.
@@ -36,18 +36,18 @@ pub struct FittedEffect {
     pub joint: Joint,
     /// One for each of the effect's parameters: value and 95 % interval.
     pub values: Vec<(f64, Option<[f64; 2]>)>,
-    /// Values that single logs have of their own; where there is none, that of `values` holds.
+    /// Values in single logs; in all other logs those of `values` hold.
     pub own: Vec<OwnValue>,
-    /// Held at the values given.
+    /// Held at these values in every fit.
     pub fixed: bool,
 }
 
-/// The value that a parameter of an effect has in one log.
+/// The value of a parameter in one log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnValue {
     /// The log's path or name.
     pub log: String,
-    /// Index into the effect's parameters.
+    /// Index into the parameters of what carries it: an effect or a compiled model.
     pub parameter: usize,
     pub value: f64,
     pub ci95: Option<[f64; 2]>,
@@ -72,8 +72,8 @@ pub struct System {
     pub joints: usize,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
-    /// For each joint the speed (rad/s or m/s) over which dry friction reverses, 0 for at once; where the file gives
-    /// none, fits choose it by the speeds in the logs.
+    /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump. `None` if the file sets none:
+    /// then fits choose it by the speeds in the logs.
     pub sign_width: Option<Vec<f64>>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
@@ -90,116 +90,10 @@ pub struct System {
 }
 
 impl System {
-    /// Read a model file. `library` is where its `[[effect]]` entries are looked up.
-    ///
-    /// # Errors
-    /// Unreadable file, unknown or missing key, formula error, unknown effect: with line, column and remedy.
-    pub fn read(path: &Path, library: &[Effect]) -> Result<Self, FileError> {
-        Self::from_document(&Document::open(path)?, library)
-    }
-
-    /// The model in `text`; `path` is for messages.
-    ///
-    /// # Errors
-    /// As [`System::read`].
-    pub fn from_text(path: &Path, text: &str, library: &[Effect]) -> Result<Self, FileError> {
-        let document = Document {
-            path: path.to_owned(),
-            text: text.to_owned(),
-        };
-        Self::from_document(&document, library)
-    }
-
-    fn from_document(document: &Document, library: &[Effect]) -> Result<Self, FileError> {
-        let top = document.parse()?;
-        top.only(&[
-            "system",
-            "columns",
-            "parameters",
-            "dynamics",
-            "energy",
-            "residual",
-            "effect",
-        ])?;
-        let section = top.required_section("system")?;
-        section.only(sections::SYSTEM_KEYS)?;
-        let joints = sections::joints(&section)?;
-        let dynamics = top.required_section("dynamics")?;
-        let system = Self {
-            name: section.required_text("name")?.value,
-            about: section.text_or_empty("about")?,
-            joints,
-            prismatic: sections::prismatic(&section, joints)?,
-            sign_width: sections::sign_width(&section, joints)?,
-            columns: sections::columns(top.section("columns")?, joints)?,
-            parameters: sections::parameters(top.section("parameters")?)?,
-            effects: super::effects_in_file::read(&top, joints, library)?,
-            hidden: sections::hidden(top.section("residual")?, joints)?,
-            text: document.text.clone(),
-            declaration: sections::declaration(&document.text),
-            lets: sections::lets(document, &dynamics)?,
-            motion: sections::motion(document, &dynamics, joints)?,
-            energy: sections::energy(top.section("energy")?)?,
-        };
-        system.check_names(&top)?;
-        system.check_formulas(document)?;
-        for (k, section) in top.sections("effect")?.iter().enumerate() {
-            let (present, rest) = system.effects.split_at(k);
-            let check = system.check_effect(&rest[0], present);
-            check.map_err(|message| section.error(message))?;
-        }
-        Ok(system)
-    }
-
-    /// Parameters and intermediates must not take the names of states, torques or each other.
-    fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
-        let mut taken: Vec<String> = self.input_names();
-        taken.truncate(3 * self.joints + 1);
-        let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
-        let lets = self.lets.iter().map(|(name, _)| ("dynamics", name));
-        for (section, name) in parameters.chain(lets) {
-            if taken.contains(name) {
-                let section = top.required_section(section)?;
-                return Err(
-                    section.error_at(name, format!("the name `{name}` is taken; choose another"))
-                );
-            }
-            taken.push(name.clone());
-        }
-        Ok(())
-    }
-
     /// Names that effects must not take: of parameters and of intermediates.
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
         let lets = self.lets.iter().map(|(name, _)| name.as_str());
         self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
-    }
-
-    /// Lower every formula once, so that a wrong name is met here, with its place.
-    fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
-        let mut graph = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        for name in self.input_names() {
-            let node = graph.input(&name);
-            scope.bind(&name, node);
-        }
-        let mut lower = |scope: &Scope, formula: &Located<Formula>| {
-            scope
-                .lower(&mut graph, &formula.value)
-                .map_err(|error| document.formula_error(formula.at, &error))
-        };
-        for (name, formula) in &self.lets {
-            let node = lower(&scope, formula)?;
-            scope.bind(name, node);
-        }
-        let energy = self
-            .energy
-            .iter()
-            .flat_map(|energy| [&energy.total, &energy.power]);
-        for formula in self.motion.formulas().chain(energy) {
-            lower(&scope, formula)?;
-        }
-        Ok(())
     }
 
     /// The names that formulas may use before any `let`: states, torques, time, parameters.
@@ -215,7 +109,7 @@ impl System {
         names
     }
 
-    /// For each joint the speed (rad/s or m/s) over which dry friction reverses; 0 where it does so at once.
+    /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump.
     pub fn sign_widths(&self) -> Vec<f64> {
         let default = || vec![DEFAULT_SIGN_WIDTH; self.joints];
         self.sign_width.clone().unwrap_or_else(default)
@@ -230,7 +124,7 @@ impl System {
         self.sign_widths().into_iter().map(form).collect()
     }
 
-    /// The same with these effects.
+    /// The same model with these effects in place of its own.
     #[must_use]
     pub fn with_effects(&self, effects: Vec<FittedEffect>) -> Self {
         Self {
@@ -239,7 +133,7 @@ impl System {
         }
     }
 
-    /// The same with dry friction that reverses over these speeds (rad/s or m/s), one a joint; 0 for at once.
+    /// The same model with dry friction that reverses over these speeds (rad/s or m/s), one per joint; 0 for a jump.
     ///
     /// # Panics
     /// When there is not one width a joint.
@@ -261,7 +155,7 @@ impl System {
             .collect()
     }
 
-    /// The value of a parameter, by its place among all: in a log, that which the log has of its own, if it has one.
+    /// The value of a parameter, by its index among all; in a log, the one that it has there.
     pub fn value_of(&self, parameter: usize, log: Option<&Log>) -> f64 {
         let in_log = |own: &OwnValue| log.is_some_and(|log| log.is_called(&own.log));
         let own = self.own_values().into_iter();
@@ -270,11 +164,11 @@ impl System {
             .map_or_else(|| self.values()[parameter], |own| own.value)
     }
 
-    /// The same with the values of a compiled form of it, those of single logs included. Intervals, which belong to
-    /// other values, are dropped.
+    /// The same model with the values of a compiled form of it, those in single logs included. Intervals are dropped,
+    /// since they belong to other values.
     ///
     /// # Panics
-    /// When `compiled` has not one value a parameter.
+    /// If `compiled` has another number of parameters.
     #[must_use]
     pub fn at(&self, compiled: &Dynamics) -> Self {
         let mut model = self.clone();
@@ -299,8 +193,8 @@ impl System {
         model
     }
 
-    /// Give the value of a parameter, or that of one log of its own, an interval of this half width within the
-    /// parameter's bounds.
+    /// Set the interval of a parameter's value, or of its value in one log, by its half width; the parameter's bounds cut
+    /// it.
     pub fn set_half_width(&mut self, parameter: usize, log: Option<&Log>, half: f64) {
         let [low, high] = self.all_parameters()[parameter].bounds;
         let around = |value: f64| Some([(value - half).max(low), (value + half).min(high)]);
@@ -337,14 +231,14 @@ impl System {
             .collect()
     }
 
-    /// Where the parameters of the k-th effect stand among all.
+    /// Indices of the parameters of the k-th effect among all.
     pub fn place_of(&self, k: usize) -> Range<usize> {
         let before = self.effects[..k].iter().map(|effect| effect.values.len());
         let first = self.parameters.len() + before.sum::<usize>();
         first..first + self.effects[k].values.len()
     }
 
-    /// Each effect with the place of its parameters among all of the model.
+    /// Each effect with the indices of its parameters among all.
     pub(super) fn placed(&self) -> impl Iterator<Item = (&FittedEffect, Range<usize>)> {
         let places = (0..self.effects.len()).map(|k| self.place_of(k));
         self.effects.iter().zip(places)
@@ -436,7 +330,7 @@ impl System {
 }
 
 impl Motion {
-    fn formulas(&self) -> Box<dyn Iterator<Item = &Located<Formula>> + '_> {
+    pub(super) fn formulas(&self) -> Box<dyn Iterator<Item = &Located<Formula>> + '_> {
         match self {
             Self::Accelerations(formulas) => Box::new(formulas.iter()),
             Self::MassAndBias { mass, bias } => Box::new(mass.iter().flatten().chain(bias)),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::text::{listed, small};
+use super::wording::{listed, small, with_unit};
 use crate::closeloop::{Calibration, DetectionLimit, HIDDEN, Smallest};
 use crate::data::Joint;
 use crate::model::{EffectParameter, FittedEffect};
@@ -144,8 +144,10 @@ fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
 fn reason(size: &Smallest) -> Option<&'static str> {
     match size {
         Smallest::Detectable { .. } => None,
-        Smallest::Indistinguishable => Some("not told from the rest of the model at any size"),
-        Smallest::NotComputed => Some("not computed: no value of a parameter switches it off"),
+        Smallest::Indistinguishable => {
+            Some("indistinguishable from the rest of the model at any size")
+        }
+        Smallest::NotComputed => Some("not computed: no parameter value switches the effect off"),
     }
 }
 
@@ -158,11 +160,11 @@ fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &FittedEffect> {
 /// The section of `report.md`.
 pub(super) fn section(calibration: &Calibration) -> String {
     let mut out = format!(
-        "## What these logs could show\n\n{}, with the torques of the training logs and the residuals of its fit as noise, \
-         were searched like the logs themselves. {}.\n\n\
-         The smallest size of each effect that the search would name in four of five such logs; common effects were hidden in a \
-         simulation at {HIDDEN} times that size:\n\n\
-         | effect | joint | smallest size | of the top torque | hidden |\n|---|---|---|---|---|\n",
+        "## What these logs could show\n\n{} were searched like the logs themselves, driven by the torques of the training logs \
+         and with the residuals of the fit as noise. {}.\n\n\
+         The table gives the smallest size at which the search would name each effect in four of five such sets of logs. As a \
+         check, common effects were hidden in a simulation at {HIDDEN} times that size.\n\n\
+         | effect | joint | smallest size | share of the top torque | hidden in a simulation |\n|---|---|---|---|---|\n",
         simulations(calibration),
         alarms_in_words(calibration),
     );
@@ -211,7 +213,7 @@ fn simulations(calibration: &Calibration) -> String {
 fn alarms_in_words(calibration: &Calibration) -> String {
     let [low, high] = calibration.rate_ci95().map(|share| 100.0 * share);
     let mut out = format!(
-        "{} named an effect that is not there: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
+        "{} named an effect that is absent: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
         calibration.alarms(),
         100.0 * calibration.rate(),
     );
@@ -225,7 +227,7 @@ fn alarms_in_words(calibration: &Calibration) -> String {
     }
     let _ = write!(
         out,
-        "; {} left something unexplained",
+        "; {} left an unexplained remainder",
         calibration.unexplained
     );
     out
@@ -236,22 +238,12 @@ fn hidden(limit: &DetectionLimit) -> String {
     match (limit.verified(), others.is_empty()) {
         (None, _) => "not tried".to_owned(),
         (Some(true), true) => "named".to_owned(),
-        (Some(true), false) => format!("named beside {}", listed(&others)),
+        (Some(true), false) => format!("named, together with {}", listed(&others)),
         (Some(false), true) => "not named".to_owned(),
         (Some(false), false) => format!("{} named in its place", listed(&others)),
     }
 }
 
 fn quantity(name: &str, value: f64, unit: &str) -> String {
-    let unit = if unit == "1" {
-        String::new()
-    } else {
-        format!(" {unit}")
-    };
-    let number = if value == 0.0 {
-        "0".to_owned()
-    } else {
-        small(value)
-    };
-    format!("{name} = {number}{unit}")
+    format!("{name} = {}", with_unit(small(value), unit))
 }

@@ -7,7 +7,6 @@ use super::json::{CHECKPOINT, MODEL, PLOTS, Report, TEXT};
 use super::plot::PlotError;
 use super::{model_file, picture, text};
 use crate::closeloop::Outcome;
-use crate::model::System;
 use crate::train::{CheckpointError, Origin};
 
 /// Why results could not be written.

@@ -1,11 +1,13 @@
 //! The report's plots: what of an outcome goes into which chart.
 
 use super::plot::{
-    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapePanel, ShapeSample, Track,
+    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
+    ShapeSample, Track,
 };
-use crate::closeloop::{Outcome, ResidualForce};
+use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
+use crate::closeloop::{ForceSample, Outcome, ResidualForce};
 use crate::data::{Joint, Log};
-use crate::evaluate::{Assessment, summarise, traces};
+use crate::evaluate::{Assessment, Trace, summarise, traces};
 use crate::identify::FitError;
 use crate::model::Dynamics;
 
@@ -22,17 +24,13 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let horizons = outcome.errors.before.horizons.iter().map(|h| h.horizon_s);
     // Differences between models grow with the horizon: the longest one shows them best.
     let horizon = horizons.fold(0.0, f64::max);
-    let models = &outcome.models;
+    let fitted = &outcome.models;
     let mut models: Vec<(Role, &str, Dynamics)> = vec![
-        (Role::Before, "declared model", models.before.dynamics()),
-        (Role::After, "with effects", models.after.dynamics()),
+        (Role::Before, FITTED, fitted.before.dynamics()),
+        (Role::After, WITH_EFFECTS, fitted.after.dynamics()),
     ];
     if let Some(learned) = &outcome.learned {
-        models.push((
-            Role::Hybrid,
-            "with effects and network",
-            learned.hybrid.clone(),
-        ));
+        models.push((Role::Hybrid, WITH_NETWORK, learned.hybrid.clone()));
     }
     let panel = |joint: Joint| Panel {
         joint,
@@ -75,60 +73,60 @@ fn measured(log: &Log, joint: Joint) -> Track {
 }
 
 fn predicted(dynamics: &Dynamics, log: &Log, joint: Joint, horizon: f64) -> Vec<Vec<(f64, f64)>> {
-    traces(dynamics, log, horizon)
-        .into_iter()
-        .take_while(|trace| trace.time.last().is_some_and(|t| *t <= end(log)))
-        .map(|trace| {
-            trace
-                .time
-                .into_iter()
-                .zip(trace.q[joint].iter().copied())
-                .collect()
-        })
-        .collect()
+    let shown = |trace: Trace| -> Vec<(f64, f64)> {
+        let points = trace.time.into_iter().zip(trace.q[joint].iter().copied());
+        points.take_while(|(t, _)| *t <= end(log)).collect()
+    };
+    let pieces = traces(dynamics, log, horizon).into_iter().map(shown);
+    pieces.filter(|piece| piece.len() > 1).collect()
 }
 
-/// The residual generalised force over angle, speed, torque and time, before and after.
+/// The residual generalised force over angle, speed, torque and time, without and with the effects.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    type Force = Result<ResidualForce, FitError>;
-    let samples = |force: &Force, joint: Joint| {
-        (force.iter().flat_map(|force| &force.samples))
-            .map(|s| ShapeSample {
-                values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
-                residual: s.force[joint],
-            })
-            .collect()
-    };
-    let names = |joint: Joint| {
-        [
-            joint.name("q"),
-            joint.name("qd"),
-            joint.name("tau"),
-            "t".to_owned(),
-        ]
-    };
-    let curves = |force: &Force, joint: Joint| {
-        names(joint).map(|name| {
-            let found = (force.iter().flat_map(|force| &force.curves))
-                .find(|c| c.joint == joint && c.variable == name);
-            found.map(|c| ShapeCurve {
-                x: c.x.clone(),
-                force: c.force.clone(),
-                low: c.low.clone(),
-                high: c.high.clone(),
-            })
-        })
-    };
+    let (fitted, with_effects) = (&outcome.remainder.before, &outcome.remainder.after);
     let panel = |joint: Joint| ShapePanel {
         joint,
         kind: kind(outcome, joint),
-        before: samples(&outcome.remainder.before, joint),
-        after: samples(&outcome.remainder.after, joint),
-        curves_before: curves(&outcome.remainder.before, joint),
-        curves_after: curves(&outcome.remainder.after, joint),
+        models: vec![
+            shape(Role::Before, FITTED, joint, fitted),
+            shape(Role::After, WITH_EFFECTS, joint, with_effects),
+        ],
     };
     let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.joints).map(panel).collect();
-    super::plot::residual_shape(&panels, "What the model lacks, before and after")
+    super::plot::residual_shape(
+        &panels,
+        "Residual force: what each model leaves unexplained",
+    )
+}
+
+fn shape(
+    role: Role,
+    label: &str,
+    joint: Joint,
+    force: &Result<ResidualForce, FitError>,
+) -> ShapeModel {
+    let sample = |s: &ForceSample| ShapeSample {
+        values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
+        residual: s.force[joint],
+    };
+    let curve = |name: String| {
+        let curves = force.iter().flat_map(|force| &force.curves);
+        let mut of_joint = curves.filter(|c| c.joint == joint);
+        of_joint.find(|c| c.variable == name).map(|c| ShapeCurve {
+            x: c.x.clone(),
+            force: c.force.clone(),
+            low: c.low.clone(),
+            high: c.high.clone(),
+        })
+    };
+    let samples = force.iter().flat_map(|force| &force.samples);
+    let [q, qd, tau] = ["q", "qd", "tau"].map(|stem| curve(joint.name(stem)));
+    ShapeModel {
+        role,
+        label: label.to_owned(),
+        samples: samples.map(sample).collect(),
+        curves: [q, qd, tau, curve("t".to_owned())],
+    }
 }
 
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
@@ -141,11 +139,11 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
         (role, label.to_owned(), rmse)
     };
     let mut models = vec![
-        named(Role::Before, "before: declared model", &errors.before),
-        named(Role::After, "after: with the effects found", &errors.after),
+        named(Role::Before, FITTED, &errors.before),
+        named(Role::After, WITH_EFFECTS, &errors.after),
     ];
     let hybrid = errors.hybrid.iter();
-    models.extend(hybrid.map(|m| named(Role::Hybrid, "hybrid: with a network for the rest", m)));
+    models.extend(hybrid.map(|m| named(Role::Hybrid, WITH_NETWORK, m)));
     let others = errors.against.iter().enumerate();
     models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
     let row = |joint: Joint, h: usize| ErrorRow {

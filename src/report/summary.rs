@@ -1,7 +1,8 @@
 use std::fmt::Write;
 
 use super::calibration::line;
-use super::text::{headline, proposal_line, small, values};
+use super::text::{headline, proposal_line};
+use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
 use crate::data::Joint;
 use crate::evaluate::{Assessment, Summary, summarise};
@@ -29,7 +30,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         let name = &outcome.models.before.parameters[k].name;
         let _ = writeln!(
             out,
-            "  {name} is held, the logs do not determine it: the other values are relative to it"
+            "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
     let joints = outcome.models.after.joints;
@@ -38,6 +39,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         numbers(&outcome.errors.before),
         numbers(&outcome.errors.after),
     );
+    out += "  open-loop position error on the test logs, root mean square:\n";
     for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
         for joint in Joint::all(joints) {
             let unit = if outcome.given.prismatic[joint] {
@@ -49,11 +51,11 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {joint}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after"
+                "  joint {joint}, {seconds} s ahead: {before} {unit} {FITTED}; {after} {unit} {WITH_EFFECTS}"
             );
         }
     }
-    let declared = ("declared model as written", &outcome.errors.declared);
+    let declared = (AS_WRITTEN, &outcome.errors.declared);
     let against = outcome.errors.against.iter();
     let as_they_are = std::iter::once(declared).chain(against.map(|(name, m)| (name.as_str(), m)));
     for (name, model) in as_they_are {

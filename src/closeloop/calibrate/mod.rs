@@ -17,6 +17,7 @@ use super::find::{Found, find};
 use super::fitted::Fitted;
 use super::study::Study;
 use crate::data::Log;
+use crate::data::statistics::wilson;
 use crate::model::{FittedEffect, Library, System};
 
 /// What the search makes of logs simulated from the accepted model, with the torques and the noise of the user's.
@@ -167,19 +168,4 @@ impl Repeat<'_> {
     fn named(&self, found: &Found) -> Vec<FittedEffect> {
         found.after.effects[self.declared.effects.len()..].to_vec()
     }
-}
-
-/// 95 % interval of a probability of which `hits` of `trials` are seen (Wilson 1927).
-#[allow(clippy::cast_precision_loss)] // few trials
-fn wilson(hits: usize, trials: usize) -> [f64; 2] {
-    const QUANTILE: f64 = 1.959_964;
-    let (n, z) = (trials.max(1) as f64, QUANTILE);
-    let share = hits as f64 / n;
-    let middle = share + z * z / (2.0 * n);
-    let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
-    let norm = 1.0 + z * z / n;
-    [
-        ((middle - half) / norm).max(0.0),
-        ((middle + half) / norm).min(1.0),
-    ]
 }

@@ -137,12 +137,3 @@ fn friction_is_named_from_about_its_smallest_size_on() {
     assert!(named(0.5 * smallest) <= 1, "half of {smallest}");
     assert!(named(2.0 * smallest) >= 3, "twice {smallest}");
 }
-
-#[test]
-fn the_interval_of_a_share_is_wilsons() {
-    // 0 of 20: z^2 / (20 + z^2). 5 of 10: 0.2366 to 0.7634, as printed in textbooks.
-    let [low, high] = wilson(0, 20);
-    assert!(low == 0.0 && (high - 0.16113).abs() < 1e-5, "{high}");
-    let [low, high] = wilson(5, 10);
-    assert!((low - 0.2366).abs() < 1e-4 && (high - 0.7634).abs() < 1e-4);
-}

@@ -4,6 +4,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::force::ForceSample;
 use crate::data::Joint;
+use crate::data::statistics::{SIGMA_PER_MAD, quantile, upper_median};
 use crate::identify::{BLOCK_S, stretches};
 
 /// The residual force of a joint as a smooth curve over one variable, the others' shares taken off.
@@ -132,15 +133,7 @@ struct Basis {
 impl Basis {
     /// `None` where the values do not differ.
     fn over(values: Vec<f64>) -> Option<Self> {
-        let mut sorted = values.clone();
-        sorted.sort_by(f64::total_cmp);
-        #[allow(
-            clippy::cast_precision_loss,
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss
-        )] // a place among the samples
-        let quantile = |share: f64| sorted[(share * (sorted.len() - 1) as f64).round() as usize];
-        let [low, high] = QUANTILES.map(quantile);
+        let [low, high] = QUANTILES.map(|share| quantile(&values, share));
         if !(high - low > 1e-9 * (1.0 + high.abs().max(low.abs()))) {
             return None;
         }
@@ -392,9 +385,8 @@ fn solve(sums: &Sums, penalty: &DMatrix<f64>) -> Option<Cholesky<f64, nalgebra::
 }
 
 fn weights(residuals: &DVector<f64>) -> DVector<f64> {
-    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let limit = HUBER * 1.4826 * sizes[sizes.len() / 2];
+    let sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+    let limit = HUBER * SIGMA_PER_MAD * upper_median(&sizes);
     residuals.map(|r| (limit / r.abs().max(f64::MIN_POSITIVE)).min(1.0))
 }
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
+use crate::data::statistics::{deviation, mean};
 use crate::data::{Audit, Joint};
 use crate::identify::Values;
 
@@ -247,18 +248,15 @@ struct NoiseShare {
 
 impl NoiseShare {
     fn of(simulated: &[Energies], joint: usize) -> Self {
-        #[allow(clippy::cast_precision_loss)] // a thousand
-        let count = simulated.len() as f64;
         let shares = simulated.iter().map(|energies| energies.shares[joint]);
-        let mean = shares.clone().sum::<f64>() / count;
-        let variance = shares.map(|share| (share - mean).powi(2)).sum::<f64>() / count;
+        let shares: Vec<f64> = shares.collect();
         let sum = |part: fn(&Energies) -> &[f64]| -> f64 {
             simulated.iter().map(|energies| part(energies)[joint]).sum()
         };
         let all = sum(|energies| &energies.all);
         Self {
-            mean,
-            deviation: variance.sqrt(),
+            mean: mean(&shares),
+            deviation: deviation(&shares),
             pooled: sum(|energies| &energies.smooth) / all.max(f64::MIN_POSITIVE),
         }
     }

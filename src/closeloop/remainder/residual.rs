@@ -2,6 +2,7 @@ use super::curve::{Curve, curves};
 use super::force::{ForceSample, residual_force};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
+use crate::data::statistics::upper_median;
 use crate::identify::FitError;
 
 /// The residual generalised force of a model along the training logs.
@@ -28,9 +29,8 @@ impl ResidualForce {
     #[allow(clippy::cast_precision_loss)] // few stretches
     pub fn norm(&self) -> f64 {
         let forces = self.samples.iter().flat_map(|sample| &sample.force);
-        let mut squares: Vec<f64> = forces.map(|force| force * force).collect();
-        squares.sort_by(f64::total_cmp);
-        let limit = 9.0 * squares[squares.len() / 2];
+        let squares: Vec<f64> = forces.map(|force| force * force).collect();
+        let limit = 9.0 * upper_median(&squares);
         let sum: f64 = squares.iter().map(|square| square.min(limit)).sum();
         (sum / squares.len() as f64).sqrt()
     }

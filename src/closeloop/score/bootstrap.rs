@@ -1,9 +1,9 @@
-use rand::{Rng, RngExt};
+use rand::Rng;
 
+use crate::data::statistics::bootstrap;
 use crate::evaluate::OpenLoop;
 use crate::identify::{BLOCK_S, stretches};
 
-const RESAMPLES: usize = 2000;
 /// With this many logs whole trajectories are resampled.
 const ENOUGH_LOGS: usize = 5;
 
@@ -19,18 +19,12 @@ pub fn reduction_interval(
     if blocks.len() < 3 {
         return None;
     }
-    let mut reductions: Vec<f64> = (0..RESAMPLES)
-        .map(|_| {
-            let drawn = (0..blocks.len()).map(|_| blocks[rng.random_range(0..blocks.len())]);
-            let (b, a) = drawn.fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
-            1.0 - (a / b.max(f64::MIN_POSITIVE)).sqrt()
-        })
-        .collect();
-    reductions.sort_by(f64::total_cmp);
-    Some([
-        reductions[RESAMPLES / 40],
-        reductions[RESAMPLES - 1 - RESAMPLES / 40],
-    ])
+    let reduction = |drawn: &[usize]| {
+        let drawn = drawn.iter().map(|&k| blocks[k]);
+        let (b, a) = drawn.fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+        1.0 - (a / b.max(f64::MIN_POSITIVE)).sqrt()
+    };
+    Some(bootstrap(blocks.len(), rng, reduction))
 }
 
 /// Squared errors before and after, summed over each block.

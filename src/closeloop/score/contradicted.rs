@@ -1,25 +1,30 @@
-use crate::model::{Parameter, System};
+use crate::model::Parameter;
 
 /// A value in the model file that the training logs contradict.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contradicted {
     /// The value in the file, in the parameter's unit.
     pub declared: f64,
-    /// The parameter as fitted to the declared equations without further effects; its 95 % interval does not hold
-    /// the declared value.
+    /// The parameter as fitted with the effects that were found; its 95 % interval does not hold the declared value.
+    /// Without those effects the fit would bend the declared parameters to make up for what is missing.
     pub fitted: Parameter,
 }
 
-/// The declared values that lie outside of the intervals of the fitted ones. Both are in the same order; parameters
-/// without an interval were not fitted and contradict nothing.
-pub(in crate::closeloop) fn contradicted(declared: &System, fitted: &System) -> Vec<Contradicted> {
-    let pairs = declared.values().into_iter().zip(fitted.all_parameters());
-    pairs.filter_map(outside).collect()
-}
-
-fn outside((declared, fitted): (f64, Parameter)) -> Option<Contradicted> {
-    let [low, high] = fitted.ci95?;
-    (!(low..=high).contains(&declared)).then_some(Contradicted { declared, fitted })
+/// The declared values that lie outside of the intervals of the fitted ones. Both are in the same order, and further
+/// fitted ones may follow. A parameter without an interval was not fitted and contradicts nothing; one that is declared
+/// fixed has another value only as a finding, `parameter_shift`.
+pub(in crate::closeloop) fn contradicted(
+    declared: &[Parameter],
+    fitted: &[Parameter],
+) -> Vec<Contradicted> {
+    let outside = |(declared, fitted): (&Parameter, &Parameter)| {
+        let [low, high] = fitted.ci95.filter(|_| !declared.fixed)?;
+        (!(low..=high).contains(&declared.value)).then(|| Contradicted {
+            declared: declared.value,
+            fitted: fitted.clone(),
+        })
+    };
+    declared.iter().zip(fitted).filter_map(outside).collect()
 }
 
 impl Contradicted {
@@ -63,8 +68,8 @@ mod tests {
             fitted(0.29, Some([0.1, 0.4])),
             fitted(0.29, None),
         ];
-        let pairs = parameters.map(|fitted| (0.102, fitted));
-        let found: Vec<Contradicted> = pairs.into_iter().filter_map(outside).collect();
+        let declared = vec![fitted(0.102, None); 3];
+        let found = contradicted(&declared, &parameters);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].comparison(), "2.84 times as large");
     }

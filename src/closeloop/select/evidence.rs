@@ -3,6 +3,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 use super::folds::left_out_losses;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
+use crate::data::statistics::{mean, standard_error};
 use crate::identify::uncertainty;
 use crate::model::FittedEffect;
 
@@ -74,8 +75,8 @@ impl Evidence {
 
     /// Whether the losses on left-out stretches do not tell this candidate from a better one.
     pub fn is_as_good_as(&self, best: &Self) -> bool {
-        let (mean, error) = mean_and_error(&differences(&self.losses, &best.losses));
-        mean <= AS_GOOD * error
+        let differences = differences(&self.losses, &best.losses);
+        mean(&differences) <= AS_GOOD * standard_error(&differences)
             && self.gain > AS_MUCH * best.gain
             && 1.0 - self.gain <= AS_LITTLE * (1.0 - best.gain)
     }
@@ -150,12 +151,4 @@ pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
 
 fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-#[allow(clippy::cast_precision_loss)] // few stretches
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    (mean, (variance / count).sqrt())
 }

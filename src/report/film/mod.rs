@@ -1,4 +1,11 @@
-use super::plot::{Animation, Chain, PlotError, Quantity, Strip, StripLine, animation};
+//! An episode to watch: a simulated mechanism in motion, with its torques and rewards over time.
+
+mod animation;
+mod strips;
+
+use self::animation::{Animation, Chain, animation};
+use self::strips::{Strip, StripLine};
+use super::plot::{PlotError, Quantity};
 use crate::control::{Episode, Meter, Task};
 use crate::data::Joint;
 use crate::expr::FormulaError;
