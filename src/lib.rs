@@ -56,4 +56,5 @@ pub mod plant;
 pub mod recipe;
 pub mod report;
 pub mod rounds;
+pub mod sim;
 pub mod train;

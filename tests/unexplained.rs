@@ -43,7 +43,9 @@ fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
     let library = library(&[effect("hidden", force)]);
     let text = format!("{RIG}sensor = {{ rate_hz = 100, {sensor} }}\n");
     let mut plant = Plant::from_text(Path::new("rig.toml"), &text, &library).unwrap();
-    plant.add_effect(&library, "hidden", 1, &[]).unwrap();
+    plant
+        .add_effect(&library, "hidden", Joint::at(0), &[])
+        .unwrap();
     let mut rng = rng(seed);
     (0..plant.recording.logs)
         .map(|_| plant.record(&mut rng).unwrap())

@@ -235,6 +235,7 @@ impl Coverage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Joint;
 
     fn named(label: &str, values: &[(&str, f64, [f64; 2])], error_reduction: f64) -> Named {
         let estimate = |(name, value, interval): &(&str, f64, [f64; 2])| Estimate {

@@ -13,9 +13,9 @@ use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridError, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-    as_modelled,
+    Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn,
 };
+use crate::sim::{Integrator, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
 /// Rows nearer than this (s) are put together: the network is to learn a force, not the encoder's noise.
@@ -112,7 +112,7 @@ fn fit_settings() -> FitSettings {
             ..LearningRates::default()
         },
         penalty: Penalty::Fixed { alpha: ALPHA },
-        integrator: Integrator::Rk4,
+        integrator: Integrator::RK4,
         record_every: NonZeroUsize::new(10).expect("not zero"),
         ..FitSettings::default()
     }
@@ -127,8 +127,8 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     };
     let dynamics = model.dynamics();
     let of_log = |log: &Log| {
-        let values = dynamics.in_log(log).values();
-        trajectories(&as_modelled(&dynamics, &values, log), thinning)
+        let in_log = dynamics.in_log(log);
+        trajectories(&as_modelled(&*in_log, log), thinning)
     };
     let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();

@@ -8,9 +8,9 @@ use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use crate::data::Joint;
 use crate::expr::Op;
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
-    nothing_but,
+    CommandFilter, Dynamics, HybridError, MlpWeights, ModelWeights, Parameter, System, nothing_but,
 };
+use crate::sim::Integrator;
 
 /// A model as every format reads it: equations with their values, the networks whose outputs are added to their
 /// derivative, and the step.

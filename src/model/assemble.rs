@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-use super::command::{CommandFilter, Filter};
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
+use super::filter::{CommandFilter, Filter};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, OwnValue, System};
 use super::{Dynamics, Parameter};

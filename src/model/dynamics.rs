@@ -2,7 +2,7 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::command::Filter;
+use super::filter::Filter;
 use super::system::OwnValue;
 use crate::data::Log;
 use crate::expr::Program;
@@ -52,7 +52,7 @@ pub struct Dynamics {
     pub joints: usize,
     pub parameters: Vec<Parameter>,
     pub program: Program,
-    /// Filters of the commanded torques, see [`Commands`](super::Commands).
+    /// Filters of the commanded torques, see [`Commands`](crate::sim::Commands).
     pub filters: Vec<Filter>,
     /// The measured angles, from the same inputs (n outputs), unless they equal the true ones. The torques are those that
     /// acted until then.

@@ -1,66 +1,9 @@
-use std::fmt::{self, Display, Formatter};
-use std::num::NonZeroU32;
-use std::str::FromStr;
+//! A step of a batch on tensors.
 
 use burn::tensor::Tensor;
-use serde::{Deserialize, Serialize};
 
 use super::hybrid::{Flow, Prepared};
-
-/// How ds/dt becomes the next state. The input is held over the step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Integrator {
-    /// Velocity first, then position with the new velocity: v' = v + h f_v, q' = q + h (f_q + h f_v).
-    /// Where f_q = v this is q' = q + h v'; whatever else f_q holds is taken at the step's start. Order 1.
-    #[default]
-    SemiImplicitEuler,
-    /// The classical Runge-Kutta method of order 4.
-    Rk4,
-    /// Equal substeps of [`Integrator::Rk4`], which reach a given error in far fewer evaluations than
-    /// substeps of order 1.
-    Fine { steps: NonZeroU32 },
-}
-
-impl Integrator {
-    /// How it is written on a command line.
-    const USAGE: &str = "semi_implicit_euler, rk4, or fine:N for N substeps of rk4";
-
-    /// The equal parts of a step that are integrated one after the other.
-    pub fn parts(self) -> usize {
-        match self {
-            Self::SemiImplicitEuler | Self::Rk4 => 1,
-            Self::Fine { steps } => steps.get() as usize,
-        }
-    }
-}
-
-impl FromStr for Integrator {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let unknown = || format!("unknown integrator {text:?}; there are {}", Self::USAGE);
-        match (text, text.split_once(':')) {
-            ("semi_implicit_euler", _) => Ok(Self::SemiImplicitEuler),
-            ("rk4", _) => Ok(Self::Rk4),
-            (_, Some(("fine", steps))) => {
-                let steps = steps.parse().map_err(|_| unknown())?;
-                Ok(Self::Fine { steps })
-            }
-            _ => Err(unknown()),
-        }
-    }
-}
-
-impl Display for Integrator {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::SemiImplicitEuler => f.write_str("semi_implicit_euler"),
-            Self::Rk4 => f.write_str("rk4"),
-            Self::Fine { steps } => write!(f, "fine:{steps}"),
-        }
-    }
-}
+use crate::sim::{Integrator, Scheme};
 
 /// One step of a batch.
 #[derive(Debug, Clone)]
@@ -84,22 +27,48 @@ impl Integrator {
     ) -> Step {
         let first = model.flow(state, input, time);
         let residual = first.residual.clone();
-        let state = match self {
-            Self::SemiImplicitEuler => semi_implicit(state, &first, dt),
-            Self::Rk4 => rk4(model, state, input, time, dt, first),
-            Self::Fine { steps } => {
-                let h = dt.clone() / f64::from(steps.get());
-                let mut now = rk4(model, state, input, time, &h, first);
-                for k in 1..steps.get() {
-                    let time = time.clone() + h.clone() * f64::from(k);
-                    let start = model.flow(&now, input, &time);
-                    now = rk4(model, &now, input, &time, &h, start);
-                }
-                now
-            }
+        let h = match self.substeps() {
+            1 => dt.clone(),
+            substeps => dt.clone() / substeps as f64,
         };
+        let mut state = substep(self.scheme(), model, state, input, time, &h, first);
+        for k in 1..self.substeps() {
+            let time = time.clone() + h.clone() * k as f64;
+            let start = model.flow(&state, input, &time);
+            state = substep(self.scheme(), model, &state, input, &time, &h, start);
+        }
         Step { state, residual }
     }
+}
+
+/// A substep of length `h`; `first` is the flow at its start.
+fn substep(
+    scheme: &Scheme,
+    model: &Prepared,
+    state: &[Tensor<1>],
+    input: &[Tensor<1>],
+    time: &Tensor<1>,
+    h: &Tensor<1>,
+    first: Flow,
+) -> Vec<Tensor<1>> {
+    if scheme.semi_implicit {
+        return semi_implicit(state, &first, h);
+    }
+    let mut rates = first.rates;
+    let mut mean: Vec<Tensor<1>> = Vec::new();
+    for (k, stage) in scheme.stages.iter().enumerate() {
+        if k > 0 {
+            let after = h.clone() * stage.time;
+            let inner = along(state, &rates, &after);
+            rates = model.flow(&inner, input, &(time.clone() + after)).rates;
+        }
+        let weighted = rates.iter().map(|rate| rate.clone() * stage.weight);
+        mean = match k {
+            0 => weighted.collect(),
+            _ => mean.into_iter().zip(weighted).map(|(a, b)| a + b).collect(),
+        };
+    }
+    along(state, &mean, h)
 }
 
 fn semi_implicit(state: &[Tensor<1>], flow: &Flow, h: &Tensor<1>) -> Vec<Tensor<1>> {
@@ -114,28 +83,6 @@ fn semi_implicit(state: &[Tensor<1>], flow: &Flow, h: &Tensor<1>) -> Vec<Tensor<
         .zip(&gains)
         .map(|(v, gain)| v.clone() + gain.clone());
     positions.chain(velocities).collect()
-}
-
-/// `first` is the flow at the start of the step.
-fn rk4(
-    model: &Prepared,
-    state: &[Tensor<1>],
-    input: &[Tensor<1>],
-    time: &Tensor<1>,
-    h: &Tensor<1>,
-    first: Flow,
-) -> Vec<Tensor<1>> {
-    let half = h.clone() * 0.5;
-    let (middle, end) = (time.clone() + half.clone(), time.clone() + h.clone());
-    let k1 = first.rates;
-    let k2 = model.flow(&along(state, &k1, &half), input, &middle).rates;
-    let k3 = model.flow(&along(state, &k2, &half), input, &middle).rates;
-    let k4 = model.flow(&along(state, &k3, h), input, &end).rates;
-    let sixth = h.clone() / 6.0;
-    let mean: Vec<Tensor<1>> = (k1.into_iter().zip(k2).zip(k3).zip(k4))
-        .map(|(((a, b), c), d)| a + (b + c) * 2.0 + d)
-        .collect();
-    along(state, &mean, &sixth)
 }
 
 /// state + h * rates

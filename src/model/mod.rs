@@ -3,12 +3,12 @@
 
 mod assemble;
 pub mod chain;
-mod command;
 mod dynamics;
 mod effect;
 mod effects_in_file;
 mod equations;
 mod file;
+mod filter;
 mod frame;
 mod hybrid;
 mod integrator;
@@ -16,23 +16,21 @@ mod library;
 pub(crate) mod mlp;
 mod network;
 mod reader;
-mod rollout;
 mod sections;
-mod sensors;
 mod shift;
 mod stack;
 mod system;
 mod typeset;
 mod written;
 
-pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+pub use filter::{CommandFilter, Filter};
 pub(crate) use frame::Frame;
 pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};
 #[cfg(test)]
 pub(crate) use hybrid::{PRIOR_ID, RESIDUAL_ID};
-pub use integrator::{Integrator, Step};
+pub use integrator::Step;
 pub use library::Library;
 pub(crate) use network::nothing_but;
 pub use network::{
@@ -40,7 +38,5 @@ pub use network::{
     with_residual,
 };
 pub use reader::FileError;
-pub use rollout::Rollout;
-pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub(crate) use stack::Stack;
 pub use system::{FittedEffect, OwnValue, System};

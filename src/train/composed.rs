@@ -4,7 +4,8 @@ use burn::tensor::Tensor;
 
 use super::Columns;
 use super::loss::NORM_FLOOR;
-use crate::model::{HybridModel, Integrator, Prepared};
+use crate::model::{HybridModel, Prepared};
+use crate::sim::Integrator;
 
 /// E and ||F_r||, `[2]`.
 pub(super) fn loss(

@@ -3,7 +3,8 @@ use std::sync::Arc;
 use burn::tensor::{Tensor, TensorData};
 
 use super::{Batch, Columns, TrainError, composed, fused};
-use crate::model::{HybridModel, Integrator, Prepared};
+use crate::model::{HybridModel, Prepared};
+use crate::sim::Integrator;
 
 /// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
 /// where every residual starts.

@@ -10,7 +10,8 @@ use super::description::SavedFilter;
 use crate::expr::{Graph, Node, Program};
 use crate::formats::verify::ReferenceModel;
 use crate::formats::{ClientError, Predictions, Samples};
-use crate::model::{Dynamics, Filter, Integrator, ModelWeights};
+use crate::model::{Dynamics, Filter, ModelWeights};
+use crate::sim::Integrator;
 use crate::train::Shape;
 use crate::train::weights::from_bytes;
 

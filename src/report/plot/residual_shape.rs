@@ -212,6 +212,7 @@ fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG 
 #[cfg(test)]
 mod tests {
     use super::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
+    use crate::data::Joint;
     use crate::report::plot::{JointKind, PlotError, Role};
 
     fn panel(samples: Vec<ShapeSample>) -> ShapePanel {

@@ -14,10 +14,10 @@ use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 
 use super::plan::{KEPT, Plan};
-use super::scheme::Scheme;
 use super::work::Work;
 use super::{Blocks, Crew};
-use crate::model::{HybridModel, Integrator};
+use crate::model::HybridModel;
+use crate::sim::Integrator;
 
 /// E and ||F_r||, `[2]`.
 pub(in crate::train) fn loss(
@@ -32,7 +32,7 @@ pub(in crate::train) fn loss(
     let plan = Plan {
         frame: model.frame().clone(),
         blocks: blocks.clone(),
-        scheme: Scheme::of(integrator),
+        integrator,
         precision: precision.clone(),
         kept: KEPT,
     };
