@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
-use residyn::expr::SignForm;
 use residyn::formats::{ExportModel, FORMATS, find};
 use residyn::model::chain::model_text;
 use residyn::model::{Library, System};
 use residyn::sim::Integrator;
 use serde_json::json;
 
-use crate::common::{assert_near, dynamics, points, rng};
+use crate::common::{assert_near, points, rng};
 use crate::export::{client_agrees, predictions};
 use crate::mechanism::{fixture, read};
 use crate::models;
