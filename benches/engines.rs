@@ -51,7 +51,7 @@ const TASKS: [Task; 2] = [
 impl Task {
     fn equations(&self) -> Dynamics {
         let system = Library::built_in()
-            .system(Path::new(self.name))
+            .model(Path::new(self.name))
             .expect("a built-in system");
         let mut dynamics = system.dynamics();
         for (name, value) in self.parameters {
@@ -237,7 +237,7 @@ fn identify(c: &mut Criterion) {
     let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));
     let split = Split::of(logs.collect());
     let system = library
-        .system(Path::new("pendulum"))
+        .model(Path::new("pendulum"))
         .expect("a built-in system");
     let mut group = c.benchmark_group("identify");
     group.sample_size(10).bench_function("demo", |b| {

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use residyn::batch::Rollouts;
 use residyn::identify::{Shooting, cut, fit};
 use residyn::model::{
-    Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, System,
+    Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model,
 };
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
@@ -159,7 +159,7 @@ fn chain(joints: usize) -> Dynamics {
         "[system]\nname = \"chain\"\njoints = {joints}\n[parameters]\nm = {{ value = 1.0, unit = \"kg\" }}\n\
          g = {{ value = 9.8, unit = \"m/s^2\" }}\n[dynamics]\nmass = [{mass}]\nbias = [{bias}]\n"
     );
-    let system = System::from_text(Path::new("chain.toml"), &text, &[]).expect("a model file");
+    let system = Model::from_text(Path::new("chain.toml"), &text, &[]).expect("a model file");
     system.dynamics()
 }
 
@@ -172,7 +172,7 @@ fn identification(duration_s: f64) -> f64 {
         .record(&mut ChaCha8Rng::seed_from_u64(5))
         .expect("a log");
     let dynamics = library
-        .system(Path::new("pendulum"))
+        .model(Path::new("pendulum"))
         .expect("a built-in system");
     let dynamics = dynamics.dynamics();
     let logs = [log];

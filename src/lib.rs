@@ -29,7 +29,7 @@
 //! rig.add_effect(&library, "coulomb_friction", Joint::at(0), &[("F_c".to_owned(), 0.2)])?;
 //! let log = rig.record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
 //!
-//! let declared = library.system(Path::new("pendulum"))?.dynamics();
+//! let declared = library.model(Path::new("pendulum"))?.dynamics();
 //! let errors = assess(&declared, &[log], &[0.5]);
 //! let summary = summarise(&errors.horizons, declared.joints);
 //! assert!(summary.position_rmse[0][0] > 0.01, "friction shows within half a second");

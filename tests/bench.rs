@@ -76,7 +76,7 @@ fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code(
         condition.rate_hz = 500.0;
         condition.logs = 2;
         condition.seconds = 6.0;
-        let system = library.system(&cell.model).unwrap();
+        let system = library.model(&cell.model).unwrap();
         let (logs, _) = cell.record(&system).unwrap();
         let error = |effects: &[FittedEffect]| {
             let rig = system.with_effects(effects.to_vec());
@@ -165,7 +165,7 @@ fn logs_of_another_program_are_cells_too() {
     let rig = folder.path().join("rig-01");
     std::fs::create_dir(&rig).unwrap();
     let cell = &read(&path("smoke.toml")).unwrap()[0];
-    let system = Library::built_in().system(&cell.model).unwrap();
+    let system = Library::built_in().model(&cell.model).unwrap();
     let (logs, truth) = cell.record(&system).unwrap();
     for log in &logs {
         log.write(rig.join(&log.path)).unwrap();

@@ -10,18 +10,18 @@ use rand_distr::{Distribution, Normal};
 use residyn::data::{Joint, Log};
 use residyn::expr::{Graph, Program, SignForm};
 use residyn::lanes::Row;
-use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, System};
+use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, Model};
 use residyn::sim::{Commands, Hold, RK4, Simulator};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-pub fn system(name: &str) -> System {
-    Library::built_in().system(Path::new(name)).unwrap()
+pub fn system(name: &str) -> Model {
+    Library::built_in().model(Path::new(name)).unwrap()
 }
 
-pub fn all_systems() -> Vec<System> {
+pub fn all_systems() -> Vec<Model> {
     Library::system_names().iter().map(|n| system(n)).collect()
 }
 
@@ -38,7 +38,7 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
 }
 
 /// The same form of the sign on every joint.
-pub fn dynamics(system: &System, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
+pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
     let width = match sign {
         SignForm::Exact => 0.0,
         SignForm::Smooth { width } => width,
@@ -50,7 +50,7 @@ pub fn dynamics(system: &System, effects: &[FittedEffect], sign: SignForm) -> Dy
 }
 
 /// Whether the effect can act on that joint.
-pub fn can_act(system: &System, effect: &Effect, joint: usize) -> bool {
+pub fn can_act(system: &Model, effect: &Effect, joint: usize) -> bool {
     let inertia = matches!(effect.entry, Entry::Inertia(_));
     !(inertia && !system.has_mass_matrix() || effect.first_joint_only && joint > 0)
 }

@@ -167,7 +167,7 @@ fn error_of(checkpoint: &Checkpoint, recipe: &str) -> f64 {
 fn job_dynamics(job: &Job) -> residyn::model::Dynamics {
     let name = job.model.system().to_owned();
     Library::built_in()
-        .system(Path::new(&name))
+        .model(Path::new(&name))
         .unwrap()
         .dynamics()
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use residyn::formats::{ExportModel, FORMATS, find};
 use residyn::model::chain::model_text;
-use residyn::model::{Library, System};
+use residyn::model::{Library, Model};
 use residyn::sim::Integrator;
 use serde_json::json;
 
@@ -26,7 +26,7 @@ fn portable(name: &str, integrator: Integrator, effects: &[String]) -> ExportMod
 
 fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     let library = Library::built_in();
-    let system = System::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
+    let system = Model::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
     ExportModel::of_system(&system, integrator, 0.01, json!({}))
 }
 
@@ -195,7 +195,7 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
             let own = own.iter().find(|p| p.unit == "m/s^2");
             chain.gravity = own.map_or(chain.gravity, |g| down * g.value);
             let text = model_text(&chain);
-            let back = System::from_text(Path::new(name), &text, library.effects()).unwrap();
+            let back = Model::from_text(Path::new(name), &text, library.effects()).unwrap();
             let n = model.joints();
             let back = back.dynamics();
             for point in points(&back, 50, 1) {

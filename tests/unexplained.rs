@@ -4,7 +4,7 @@ use std::path::Path;
 
 use residyn::closeloop::{Proposal, Study, Unexplained, proposal, unexplained};
 use residyn::data::{Joint, Log};
-use residyn::model::{FittedEffect, Library, System};
+use residyn::model::{FittedEffect, Library, Model};
 use residyn::plant::Plant;
 
 use crate::common::rng;
@@ -53,9 +53,9 @@ fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
 }
 
 /// The pendulum with these effects declared, their sizes unknown.
-fn declared(effects: &[&str]) -> System {
+fn declared(effects: &[&str]) -> Model {
     let library = Library::built_in();
-    let mut system = library.system(Path::new("pendulum")).unwrap();
+    let mut system = library.model(Path::new("pendulum")).unwrap();
     system.parameters[0].value = -17.0;
     system.parameters[1].value = 4.0;
     let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0));

@@ -17,7 +17,7 @@ const STEP_S: f64 = 0.02;
 const STEPS: usize = 12;
 
 fn equations(name: &str) -> Dynamics {
-    let system = Library::built_in().system(Path::new(name)).unwrap();
+    let system = Library::built_in().model(Path::new(name)).unwrap();
     system.dynamics()
 }
 
@@ -156,7 +156,7 @@ type Filter = (&'static str, usize, f64);
 /// A system with these filters.
 fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
     let library = Library::built_in();
-    let system = library.system(Path::new(name)).unwrap();
+    let system = library.model(Path::new(name)).unwrap();
     let effects: Vec<_> = filters
         .iter()
         .map(|(name, joint, value)| {

@@ -12,7 +12,7 @@ use super::mechanics::Pair;
 use super::told::told;
 use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
 use crate::data::{Log, LogError};
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 
 /// Errors are compared at the middle one \[s\].
 const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
@@ -50,7 +50,7 @@ impl Cell {
     ///
     /// # Panics
     /// Never: the effects were checked when the grid was read.
-    pub fn record(&self, system: &System) -> Result<(Vec<Log>, Truth), LogError> {
+    pub fn record(&self, system: &Model) -> Result<(Vec<Log>, Truth), LogError> {
         match &self.source {
             Source::Files { logs, declared } => {
                 let read = |path| Log::read(path, system.joints, &system.columns);
@@ -92,7 +92,7 @@ impl Cell {
     /// # Errors
     /// A model file or log that cannot be read, or logs from which the loop cannot be closed.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
-        let system = library.system(&self.model)?;
+        let system = library.model(&self.model)?;
         let (logs, truth) = self.record(&system)?;
         let mut split = Split::given(logs, Vec::new());
         split.test.extend(split.train.pop());
@@ -113,7 +113,7 @@ impl Cell {
 
 /// The thing that is measured.
 fn close(
-    system: &System,
+    system: &Model,
     library: &Library,
     split: Split,
     seed: u64,

@@ -3,12 +3,12 @@
 use super::hidden::Hidden;
 use crate::closeloop::{Split, Study};
 use crate::evaluate::{Assessment, assess};
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 
 /// Error of the model with the true effects, fitted from their true values to the logs that the search had:
 /// position, all joints together, at the middle horizon \[rad\]. None where the library lacks one of them.
 pub fn told(
-    system: &System,
+    system: &Model,
     library: &Library,
     split: &Split,
     effects: &[Hidden],
@@ -50,7 +50,7 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     Some(fitted)
 }
 
-fn shift(system: &System, hidden: &Hidden) -> Option<FittedEffect> {
+fn shift(system: &Model, hidden: &Hidden) -> Option<FittedEffect> {
     let (name, value) = hidden.values.first_key_value()?;
     let declared = system.parameters.iter().find(|p| p.name == *name)?;
     let mut shifts = system.shifts().into_iter();

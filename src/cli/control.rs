@@ -26,7 +26,7 @@ use crate::report::{film, write_whole};
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
-    model: inputs::Model,
+    model: inputs::ModelArguments,
     /// Plant file, model file, or the name of a built-in plant or system
     #[arg(long, value_name = "NAME")]
     plant: PathBuf,
@@ -187,7 +187,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
             Ok(Predictor::of_model(&model, integrator))
         }
         Source::File(file) => {
-            let system = library.system(file)?;
+            let system = library.model(file)?;
             let dynamics = system.dynamics();
             Ok(Predictor::of_equations(dynamics, task.integrator))
         }

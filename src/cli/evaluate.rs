@@ -9,7 +9,7 @@ use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::data::{Joint, LeaveOut, Log};
 use crate::evaluate::{Summary, assess, calibrate, summarise};
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, Model};
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]
@@ -18,7 +18,7 @@ use crate::model::{Dynamics, System};
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
-    model: inputs::Model,
+    model: inputs::ModelArguments,
     /// Logs to predict
     #[arg(long, num_args = 1.., required = true, value_name = "LOG")]
     test: Vec<PathBuf>,
@@ -105,11 +105,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 }
 
 /// The system, for its columns, and the dynamics to integrate.
-fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
+fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
     let library = arguments.effects.library()?;
     match arguments.model.source() {
         Source::File(file) => {
-            let system = library.system(file)?;
+            let system = library.model(file)?;
             let dynamics = system.dynamics();
             Ok((system, dynamics))
         }

@@ -8,7 +8,7 @@ use serde_json::json;
 use super::{Answer, Common, inputs};
 use crate::control::Task;
 use crate::formats::FORMATS;
-use crate::model::{Effect, Library, System};
+use crate::model::{Effect, Library, Model};
 use crate::plant::Plant;
 
 /// List systems, effects, plants, tasks or formats
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 fn systems(library: &Library) -> Result<(String, serde_json::Value)> {
     let (mut text, mut values) = (String::new(), Vec::new());
     for name in Library::system_names() {
-        let system: System = library.system(Path::new(&name))?;
+        let system: Model = library.model(Path::new(&name))?;
         let parameters: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
         let _ = writeln!(
             text,

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::{Answer, Common, inputs};
 use crate::formats::{FORMATS, Format, RobotReader};
 use crate::model::chain::model_text;
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::report::write_whole;
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let chain = (reader.read)(file)?;
     let text = model_text(&chain);
     let name = Path::new(&chain.name);
-    let system = System::from_text(name, &text, Library::built_in().effects())?;
+    let system = Model::from_text(name, &text, Library::built_in().effects())?;
     for note in &chain.notes {
         eprintln!("note: {note}");
     }

@@ -4,7 +4,7 @@ use super::error::StudyError;
 use super::fitted::Fitted;
 use super::study::Study;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, identifiability};
-use crate::model::System;
+use crate::model::Model;
 
 /// Length in s of the windows of the first fit: even a poor start does not diverge in them.
 const SHORT_S: f64 = 0.15;
@@ -29,7 +29,7 @@ impl Study<'_> {
     fn fit_and_hold(
         &self,
         shooting: &Shooting<'_>,
-        model: &System,
+        model: &Model,
     ) -> Result<(Fitted, Identifiability), FitError> {
         let model = self.smoothed(model);
         let dynamics = model.dynamics();

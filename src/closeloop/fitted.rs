@@ -3,21 +3,21 @@ use std::ops::Deref;
 use crate::data::Log;
 use crate::evaluate::{Trace, traces};
 use crate::identify::{Fit, Values};
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, Model};
 
 /// A model as a fit to a study's logs left it. It is used as the model that it is.
 #[derive(Debug, Clone)]
 pub struct Fitted {
     /// With the values found.
-    pub model: System,
+    pub model: Model,
     /// What the fit says of them.
     pub fit: Fit,
 }
 
 impl Deref for Fitted {
-    type Target = System;
+    type Target = Model;
 
-    fn deref(&self) -> &System {
+    fn deref(&self) -> &Model {
         &self.model
     }
 }
@@ -25,7 +25,7 @@ impl Deref for Fitted {
 impl Fitted {
     /// `model`, compiled as `dynamics`, with what a fit of it to `logs` found.
     pub(super) fn new(
-        model: &System,
+        model: &Model,
         dynamics: &Dynamics,
         (found, fit): (Values, Fit),
         logs: &[Log],

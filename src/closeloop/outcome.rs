@@ -11,7 +11,7 @@ use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
 use crate::identify::{FitError, Identifiability};
-use crate::model::System;
+use crate::model::Model;
 
 /// Everything that closing the loop found out.
 #[non_exhaustive]
@@ -82,7 +82,7 @@ pub struct Remainder {
 
 impl Outcome {
     /// The training logs as they were studied; `system` is the one that was declared.
-    pub fn study<'a>(&'a self, system: &'a System) -> Study<'a> {
+    pub fn study<'a>(&'a self, system: &'a Model) -> Study<'a> {
         let train = &self.given.train;
         Study {
             identifiability: self.models.identifiability.clone(),

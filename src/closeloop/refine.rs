@@ -3,7 +3,7 @@
 use super::fitted::Fitted;
 use super::study::Study;
 use crate::identify::{Shooting, uncertainty};
-use crate::model::System;
+use crate::model::Model;
 
 /// The model that is reported is fitted once more in finer steps (s), with friction that reverses over half the
 /// speed: smoothing and steps shift dry friction by a few parts in a thousand, more than the noise of long logs does.
@@ -52,7 +52,7 @@ impl Study<'_> {
 /// A fitted model with its 95 % intervals; parameters that were not free have none. An interval reaches as much further
 /// as the value was off in `coarse` numbers: smoothing and steps err to first order, so that what halving them changes is
 /// what is left of their error (Richardson 1911).
-pub(super) fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &System) -> System {
+pub(super) fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &Model) -> Model {
     let uncertainty = uncertainty(&study.shooting, &fitted.fit);
     let (values, coarse) = (fitted.values(), coarse.values());
     let mut model = fitted.model.clone();

@@ -3,7 +3,7 @@ use std::sync::OnceLock;
 use super::fitted::Fitted;
 use crate::data::{Audit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, Model};
 
 /// Length in s of the windows over which models are fitted and compared: most effects show in them.
 pub(super) const WINDOW_S: f64 = 0.5;
@@ -15,7 +15,7 @@ const SIGN_WIDTH: f64 = 5e-4;
 
 /// A declared system, logs to learn from, and what both imply.
 pub struct Study<'a> {
-    pub system: &'a System,
+    pub system: &'a Model,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
     pub(super) audits: OnceLock<Vec<Audit>>,
@@ -59,12 +59,12 @@ impl<'a> Sample<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn new(system: &'a System, logs: &'a [Log]) -> Self {
+    pub fn new(system: &'a Model, logs: &'a [Log]) -> Self {
         Self::audited(system, logs, logs.iter().map(audit).collect())
     }
 
     /// A study of logs with their audits.
-    pub(super) fn audited(system: &'a System, logs: &'a [Log], audits: Vec<Audit>) -> Self {
+    pub(super) fn audited(system: &'a Model, logs: &'a [Log], audits: Vec<Audit>) -> Self {
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
             (0..system.joints)
                 .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
@@ -137,7 +137,7 @@ impl<'a> Study<'a> {
     /// As [`Study::fit_declared`].
     pub fn refit(
         &self,
-        model: &System,
+        model: &Model,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
@@ -147,7 +147,7 @@ impl<'a> Study<'a> {
     pub(super) fn fit_on(
         &self,
         shooting: &Shooting<'_>,
-        model: &System,
+        model: &Model,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
@@ -159,7 +159,7 @@ impl<'a> Study<'a> {
     }
 
     /// A model with the study's smoothing of friction.
-    pub(super) fn smoothed(&self, model: &System) -> System {
+    pub(super) fn smoothed(&self, model: &Model) -> Model {
         model.with_sign_widths(self.sign_widths.clone())
     }
 

@@ -6,7 +6,7 @@ use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
-use crate::model::{Dynamics, HybridModel, Library, System};
+use crate::model::{Dynamics, HybridModel, Library, Model};
 use crate::sim::Integrator;
 use crate::train::{Backend, Checkpoint, Origin};
 
@@ -40,14 +40,14 @@ impl Method {
     pub(super) fn read(
         method: &MethodConfig,
         config: &Config,
-        plant: &System,
+        plant: &Model,
         library: &Library,
         backend: Backend,
     ) -> Result<Self, ExperimentError> {
         let mut model_toml = plant.declaration.clone();
         let mut dynamics = equations(plant);
         let prior = if let Some(file) = &method.model {
-            let system = library.system(&config.beside_or_named(file))?;
+            let system = library.model(&config.beside_or_named(file))?;
             dynamics = equations(&system);
             model_toml.clone_from(&system.declaration);
             Prior::Equations(Box::new(dynamics.clone()))

@@ -8,7 +8,7 @@ use super::results::{Course, PERFECT, PRIOR, Results};
 use super::{Config, ExperimentError, offline_prior, physics_prior, receding_horizon};
 use crate::control::{Predictor, Task};
 use crate::mbrl::{Judge, Judged, Prior, Run, Schedule};
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 use crate::plant::Plant;
 use crate::recipe::first_difference;
 use crate::report::write_whole;
@@ -353,6 +353,6 @@ fn claim(dir: &Path, resolved: &Value) -> Result<(), ExperimentError> {
 }
 
 /// The equations of a system with their declared values.
-pub(super) fn equations(system: &System) -> crate::model::Dynamics {
+pub(super) fn equations(system: &Model) -> crate::model::Dynamics {
     system.dynamics()
 }

@@ -8,7 +8,7 @@ use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use crate::data::Joint;
 use crate::expr::Op;
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, MlpWeights, ModelWeights, Parameter, System, nothing_but,
+    CommandFilter, Dynamics, HybridError, MlpWeights, Model, ModelWeights, Parameter, nothing_but,
 };
 use crate::sim::Integrator;
 
@@ -17,7 +17,7 @@ use crate::sim::Integrator;
 #[derive(Debug, Clone)]
 pub struct ExportModel {
     /// What the model file says.
-    pub system: System,
+    pub system: Model,
     /// The equations without the networks, parameters at the values to export.
     pub equations: Dynamics,
     /// The network that replaces the equations, if any.
@@ -47,7 +47,7 @@ impl ExportModel {
     /// The model of `system` with these numbers: values of all parameters, those of effects included, or a network in
     /// place of the equations; and a residual. `step_s` in s.
     pub fn new(
-        system: &System,
+        system: &Model,
         numbers: ModelWeights,
         integrator: Integrator,
         step_s: f64,
@@ -77,7 +77,7 @@ impl ExportModel {
 
     /// The model of a file, with the file's own values.
     pub fn of_system(
-        system: &System,
+        system: &Model,
         integrator: Integrator,
         step_s: f64,
         origin: serde_json::Value,
@@ -253,7 +253,7 @@ fn keep_intervals(equations: &mut Dynamics) {
 }
 
 /// The effects of a model file; none where a network replaces the equations.
-fn exported_effects(system: &System, equations: &Dynamics) -> Vec<ExportedEffect> {
+fn exported_effects(system: &Model, equations: &Dynamics) -> Vec<ExportedEffect> {
     let mut first = system.parameters.len();
     if equations.parameters.len() < first {
         return Vec::new();

@@ -317,7 +317,7 @@ mod tests {
     use crate::data::Log;
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::identify::{FitError, Shooting, cut};
-    use crate::model::{Dynamics, System};
+    use crate::model::{Dynamics, Model};
 
     /// One joint that follows `formula`, where `k` starts at `value`.
     fn joint(formula: &str, value: f64) -> Dynamics {
@@ -325,7 +325,7 @@ mod tests {
             "[system]\nname = \"joint\"\njoints = 1\n[parameters]\nk = {{ value = {value} }}\n\
              [dynamics]\nqdd1 = \"{formula}\"\n"
         );
-        let model = System::from_text(Path::new("joint.toml"), &text, &[]).unwrap();
+        let model = Model::from_text(Path::new("joint.toml"), &text, &[]).unwrap();
         model.with_sign_widths(vec![0.0]).dynamics()
     }
 

@@ -389,7 +389,7 @@ mod tests {
 
     #[test]
     fn sensitivities_are_the_slopes_of_every_schemes_steps() {
-        let acrobot = Library::built_in().system(Path::new("acrobot")).unwrap();
+        let acrobot = Library::built_in().model(Path::new("acrobot")).unwrap();
         let model = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
         let active: Vec<usize> = (0..model.parameters.len()).collect();
         let tangent = Tangent::new(&model, &active, Local::State);

@@ -473,7 +473,7 @@ mod tests {
         let library = Library::built_in();
         let effects = ["actuator_delay", "actuator_lag", "backlash"]
             .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
-        let pendulum = library.system(Path::new("pendulum")).unwrap();
+        let pendulum = library.model(Path::new("pendulum")).unwrap();
         let model = pendulum.with_effects(effects.to_vec()).dynamics();
         let logs = [log()];
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);

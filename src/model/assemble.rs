@@ -3,12 +3,12 @@ use std::ops::Range;
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::filter::{CommandFilter, Filter};
 use super::reader::Located;
-use super::system::{FittedEffect, Motion, OwnValue, System};
+use super::system::{FittedEffect, Model, Motion, OwnValue};
 use super::{Dynamics, Parameter};
 use crate::data::Joint;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
-impl System {
+impl Model {
     /// The equations and effects compiled into one program, with the model's own values and smoothing.
     ///
     /// Filters of the command act first, then other effects of the torque, in their order, then forces are added.
@@ -156,7 +156,7 @@ impl FittedEffect {
 
 /// The graph while it grows.
 struct Assembly<'a> {
-    system: &'a System,
+    system: &'a Model,
     effects: Vec<(&'a FittedEffect, Vec<Node>)>,
     sign: &'a [SignForm],
     graph: Graph,
@@ -171,7 +171,7 @@ struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    fn new(system: &'a System, effects: &'a [FittedEffect], sign: &'a [SignForm]) -> Self {
+    fn new(system: &'a Model, effects: &'a [FittedEffect], sign: &'a [SignForm]) -> Self {
         let mut graph = Graph::new();
         let mut numbered = |stem: &str| -> Vec<Node> {
             Joint::all(system.joints)
@@ -266,7 +266,7 @@ impl<'a> Assembly<'a> {
 
     fn accelerations(&mut self) -> Vec<Node> {
         let scope = self.declared_scope();
-        match &self.system.motion {
+        match &self.system.equations.motion {
             Motion::Accelerations(formulas) => formulas
                 .iter()
                 .map(|formula| lower(&scope, &mut self.graph, formula))
@@ -338,7 +338,7 @@ impl<'a> Assembly<'a> {
             scope.bind(&parameter.name, *node);
         }
         self.bind_shifted(&mut scope);
-        for (name, formula) in &self.system.lets {
+        for (name, formula) in &self.system.equations.lets {
             let node = lower(&scope, &mut self.graph, formula);
             self.graph.label(node, name);
             scope.bind(name, node);

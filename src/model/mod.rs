@@ -39,4 +39,4 @@ pub use network::{
 };
 pub use reader::FileError;
 pub(crate) use stack::Stack;
-pub use system::{FittedEffect, OwnValue, System};
+pub use system::{FittedEffect, Model, OwnValue};

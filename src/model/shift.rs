@@ -2,7 +2,7 @@
 
 use super::Parameter;
 use super::effect::{Effect, EffectParameter, Entry, Measure};
-use super::system::{FittedEffect, Motion, System};
+use super::system::{FittedEffect, Model, Motion};
 use crate::data::Joint;
 use crate::expr::{Formula, parse};
 
@@ -13,7 +13,7 @@ const UNIT_OF_GRAVITY: &str = "m/s^2";
 /// What is positive keeps at least this share of its declared value.
 const LEAST: f64 = 1e-3;
 
-impl System {
+impl Model {
     /// For each parameter that the file declares fixed, the effect that it has another value: on the outermost
     /// joint whose equation it enters, still absent.
     pub fn shifts(&self) -> Vec<FittedEffect> {
@@ -36,12 +36,12 @@ impl System {
                 .iter()
                 .any(|name| carriers.contains(&&**name))
         };
-        for (name, formula) in &self.lets {
+        for (name, formula) in &self.equations.lets {
             if carries(&formula.value, &carriers) {
                 carriers.push(name);
             }
         }
-        let enters = |joint: &Joint| match &self.motion {
+        let enters = |joint: &Joint| match &self.equations.motion {
             Motion::Accelerations(formulas) => carries(&formulas[*joint].value, &carriers),
             Motion::MassAndBias { mass, bias } => {
                 let mut row = mass[*joint].iter().chain([&bias[*joint]]);
@@ -107,7 +107,7 @@ impl FittedEffect {
     }
 }
 
-impl System {
+impl Model {
     /// The same model with each shift added to the declared value that it shifts.
     #[must_use]
     pub fn absorbed(&self) -> Self {

@@ -1,5 +1,6 @@
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::effect::{Effect, Entry, Measure};
 use super::reader::Located;
@@ -64,9 +65,20 @@ impl OwnValue {
     }
 }
 
-/// A declared model: what a model file says, checked.
+/// The declared equations of motion, checked. Models that differ in values or effects share them.
+#[derive(Debug)]
+pub(super) struct Equations {
+    pub lets: Vec<(String, Located<Formula>)>,
+    pub motion: Motion,
+    pub energy: Option<Energy>,
+}
+
+/// A model: declared equations, effects on their joints, the values of all parameters and the smoothing of friction.
+///
+/// It is what a model file holds, what a fit returns and what is compiled for everything that runs it: see
+/// [`Model::dynamics`].
 #[derive(Debug, Clone)]
-pub struct System {
+pub struct Model {
     pub name: String,
     pub about: String,
     pub joints: usize,
@@ -84,15 +96,13 @@ pub struct System {
     pub text: String,
     /// The text of the declared part of the file: everything before the first effect.
     pub declaration: String,
-    pub(super) lets: Vec<(String, Located<Formula>)>,
-    pub(super) motion: Motion,
-    pub(super) energy: Option<Energy>,
+    pub(super) equations: Arc<Equations>,
 }
 
-impl System {
+impl Model {
     /// Names that effects must not take: of parameters and of intermediates.
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
-        let lets = self.lets.iter().map(|(name, _)| name.as_str());
+        let lets = self.equations.lets.iter().map(|(name, _)| name.as_str());
         self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
     }
 
@@ -267,7 +277,7 @@ impl System {
     /// Whether an effect with its values can join `present` ones.
     ///
     /// # Errors
-    /// Why not: see [`System::can_carry`], a value outside of its bounds, or the same effect twice.
+    /// Why not: see [`Model::can_carry`], a value outside of its bounds, or the same effect twice.
     pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
         let name = &new.effect.name;
         self.can_carry(&new.effect, new.joint)?;
@@ -296,13 +306,13 @@ impl System {
 
     /// Whether the file gives mass matrix and bias, which effects of the inertia need.
     pub fn has_mass_matrix(&self) -> bool {
-        matches!(self.motion, Motion::MassAndBias { .. })
+        matches!(self.equations.motion, Motion::MassAndBias { .. })
     }
 
-    /// Total energy and the power of the torques as a program of [`System::input_names`], where the file
+    /// Total energy and the power of the torques as a program of [`Model::input_names`], where the file
     /// states them: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
-        let energy = self.energy.as_ref()?;
+        let energy = self.equations.energy.as_ref()?;
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         let inputs: Vec<Node> = self
@@ -318,7 +328,7 @@ impl System {
                 .lower(&mut graph, &formula.value)
                 .expect("formulas were checked when the file was read")
         };
-        for (name, formula) in &self.lets {
+        for (name, formula) in &self.equations.lets {
             let node = lower(&scope, formula);
             scope.bind(name, node);
         }

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::system::{FittedEffect, OwnValue, System};
+use super::system::{FittedEffect, Model, OwnValue};
 
-impl System {
+impl Model {
     /// The model as a model file. What the user declared stays as it is, comments included; only numbers of
     /// `[parameters]` and the smoothing of friction change. The effects follow.
     pub fn file_text(&self) -> String {

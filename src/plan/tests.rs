@@ -459,7 +459,7 @@ fn coloured_numbers_have_their_spectrum() {
 }
 
 fn pendulum(effects: &[FittedEffect]) -> Dynamics {
-    let system = Library::built_in().system(Path::new("pendulum")).unwrap();
+    let system = Library::built_in().model(Path::new("pendulum")).unwrap();
     system.with_effects(effects.to_vec()).dynamics()
 }
 

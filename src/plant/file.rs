@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::Excitation;
 use crate::data::Joint;
 use crate::expr::suggestion;
-use crate::model::{FileError, FittedEffect, Library, System};
+use crate::model::{FileError, FittedEffect, Library, Model};
 
 /// Why a plant cannot be simulated.
 #[derive(Debug, Error)]
@@ -30,7 +30,7 @@ pub enum PlantError {
 /// A rig to simulate: a model, its true parameters and hidden effects, how it is driven and measured.
 #[derive(Debug, Clone)]
 pub struct Plant {
-    pub system: System,
+    pub system: Model,
     /// True values of the declared parameters, in their order.
     pub parameters: Vec<f64>,
     pub effects: Vec<FittedEffect>,
@@ -103,7 +103,7 @@ impl Plant {
     pub fn read(path: &Path, library: &Library) -> Result<Self, PlantError> {
         match std::fs::read_to_string(path) {
             Ok(text) if is_plant(&text) => return Self::from_text(path, &text, library),
-            Ok(_) => return Ok(Self::of_system(library.system(path)?)),
+            Ok(_) => return Ok(Self::of_system(library.model(path)?)),
             Err(_) => {}
         }
         let embedded = path
@@ -111,13 +111,13 @@ impl Plant {
             .and_then(|name| BUILT_IN.get_file(format!("{name}.toml")));
         match embedded.and_then(|file| file.contents_utf8()) {
             Some(text) => Self::from_text(path, text, library),
-            None => Ok(Self::of_system(library.system(path)?)),
+            None => Ok(Self::of_system(library.model(path)?)),
         }
     }
 
     /// The model that a drawing of this rig declares: its equations with the rig's own parameters, without the effects
     /// that the rig hides.
-    pub fn declared(&self) -> System {
+    pub fn declared(&self) -> Model {
         let mut system = self.system.clone();
         for (parameter, value) in system.parameters.iter_mut().zip(&self.parameters) {
             *parameter = parameter.with_value(*value);
@@ -147,7 +147,7 @@ impl Plant {
         } else {
             &file.model
         };
-        let mut plant = Self::of_system(library.system(model)?);
+        let mut plant = Self::of_system(library.model(model)?);
         plant.set_parameters(&file.parameters).map_err(wrong)?;
         plant.hide(library, &file.effect)?;
         plant.sensor = file.sensor;
@@ -157,7 +157,7 @@ impl Plant {
         Ok(plant)
     }
 
-    fn of_system(system: System) -> Self {
+    fn of_system(system: Model) -> Self {
         let joints = system.joints;
         Self {
             parameters: system.parameters.iter().map(|p| p.value).collect(),

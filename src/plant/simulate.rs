@@ -4,7 +4,7 @@ use rand_distr::{Distribution, Normal};
 use super::file::{Plant, PlantError};
 use crate::data::Log;
 use crate::lanes::Row;
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, Model};
 use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
 /// Dry friction reverses over this speed (rad/s): many times sharper than in any fit.
@@ -12,7 +12,7 @@ const SIGN_WIDTH: f64 = 1e-3;
 
 impl Plant {
     /// The rig as a model: its true values and effects.
-    pub fn model(&self) -> System {
+    pub fn model(&self) -> Model {
         let mut model = self.system.with_effects(self.effects.clone());
         for (parameter, value) in model.parameters.iter_mut().zip(&self.parameters) {
             parameter.value = *value;

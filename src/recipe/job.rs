@@ -5,7 +5,7 @@ use serde_json::json;
 use super::difference::first_difference;
 use super::material::{Purpose, stream};
 use super::{Kind, Material, Recipe, RecipeError};
-use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, System};
+use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, Model};
 use crate::train::{Backend, Checkpoint, Origin, Training};
 
 /// A recipe with all that it names read and drawn: the start of a run, or of its continuation.
@@ -22,7 +22,7 @@ pub struct Job {
 
 /// A model file, read, with its text.
 pub(super) struct Declared {
-    pub system: System,
+    pub system: Model,
     pub text: String,
 }
 
@@ -115,7 +115,7 @@ impl Job {
 
 pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, RecipeError> {
     let path = recipe.beside_or_named(&recipe.model);
-    let system = library.system(&path)?;
+    let system = library.model(&path)?;
     let embedded = || path.to_str().and_then(Library::system_text);
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
@@ -129,7 +129,7 @@ pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, R
 
 pub(super) fn new_network(
     recipe: &Recipe,
-    system: &System,
+    system: &Model,
     material: &Material,
     seed: u64,
     last: LastLayer,

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::data::{Data, Logged, Simulated};
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::plant::Plant;
 use crate::sim::as_modelled;
 use crate::train::{Segments, SegmentsError};
@@ -46,7 +46,7 @@ impl Material {
     /// Unreadable logs, another number of joints, a plant that diverges, logs that are too short.
     pub fn gather(
         recipe: &Recipe,
-        system: &System,
+        system: &Model,
         library: &Library,
         seed: u64,
     ) -> Result<Self, RecipeError> {
@@ -57,7 +57,7 @@ impl Material {
     }
 }
 
-fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Material, RecipeError> {
+fn from_logs(recipe: &Recipe, logged: &Logged, system: &Model) -> Result<Material, RecipeError> {
     let read = |path: &PathBuf| Log::read(recipe.beside(path), system.joints, &system.columns);
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
@@ -100,7 +100,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
 fn from_plant(
     recipe: &Recipe,
     simulated: &Simulated,
-    system: &System,
+    system: &Model,
     library: &Library,
     seed: u64,
 ) -> Result<Material, RecipeError> {

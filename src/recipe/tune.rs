@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::job::{declared, fingerprint, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
-use crate::model::{LastLayer, Library, System};
+use crate::model::{LastLayer, Library, Model};
 use crate::train::{Backend, Checkpoint, Origin};
 
 impl Job {
@@ -97,9 +97,9 @@ fn tuned(
     })
 }
 
-fn beside(checkpoint: &Checkpoint, library: &Library) -> Result<System, RecipeError> {
+fn beside(checkpoint: &Checkpoint, library: &Library) -> Result<Model, RecipeError> {
     let name = Path::new("the checkpoint's model.toml");
-    Ok(System::from_text(
+    Ok(Model::from_text(
         name,
         &checkpoint.model_toml,
         library.effects(),

@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn steps_are_those_of_training() {
-        let system = Library::built_in().system(Path::new("acrobot")).unwrap();
+        let system = Library::built_in().model(Path::new("acrobot")).unwrap();
         let dynamics = system.dynamics();
         let device = Backend::NdArray.device();
         let model = HybridModel::physics(&dynamics, &device).unwrap();

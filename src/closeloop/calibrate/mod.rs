@@ -18,7 +18,7 @@ use super::fitted::Fitted;
 use super::study::Study;
 use crate::data::Log;
 use crate::data::statistics::wilson;
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 
 /// What the search makes of logs simulated from the accepted model, with the torques and the noise of the user's.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,7 +140,7 @@ pub fn calibrate(
 struct Repeat<'a> {
     study: &'a Study<'a>,
     library: &'a Library,
-    declared: System,
+    declared: Model,
     done: usize,
     of: usize,
     progress: &'a mut dyn FnMut(Repetition<'_>),

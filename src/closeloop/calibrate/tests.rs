@@ -44,8 +44,8 @@ fn logs(more: &str, seed: u64) -> Vec<Log> {
         .collect()
 }
 
-fn pendulum() -> System {
-    Library::built_in().system(Path::new("pendulum")).unwrap()
+fn pendulum() -> Model {
+    Library::built_in().model(Path::new("pendulum")).unwrap()
 }
 
 #[test]

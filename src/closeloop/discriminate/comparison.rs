@@ -8,7 +8,7 @@ use crate::closeloop::select::Rival;
 use crate::closeloop::study::{Study, WINDOW_S};
 use crate::data::{Joint, Log};
 use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
-use crate::model::{Dynamics, FittedEffect, System};
+use crate::model::{Dynamics, FittedEffect, Model};
 
 /// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
 /// probability of 95 %: the lead has the mean of half and the standard deviation of the root of this number.
@@ -28,7 +28,7 @@ pub(super) struct Hypothesis {
 }
 
 impl Hypothesis {
-    pub fn new(study: &Study<'_>, model: &System) -> Self {
+    pub fn new(study: &Study<'_>, model: &Model) -> Self {
         Self {
             dynamics: study.smoothed(model).dynamics(),
         }

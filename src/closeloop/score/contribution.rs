@@ -6,7 +6,7 @@ use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
 use crate::evaluate::Assessment;
-use crate::model::{FittedEffect, OwnValue, Parameter, System};
+use crate::model::{FittedEffect, Model, OwnValue, Parameter};
 
 /// One effect that was added.
 #[derive(Debug, Clone)]
@@ -85,7 +85,7 @@ fn finding(
 }
 
 /// What the k-th effect of a model adds, and the parameters that it is reported with: of a shift, what is shifted.
-fn described(declared: &System, model: &System, k: usize) -> (String, Vec<Parameter>) {
+fn described(declared: &Model, model: &Model, k: usize) -> (String, Vec<Parameter>) {
     let effect = &model.effects[k];
     match effect.shifted() {
         Some(shifted) => {

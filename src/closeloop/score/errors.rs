@@ -5,7 +5,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::data::Log;
 use crate::evaluate::{Assessment, assess};
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, Model};
 
 /// Open-loop errors on the test logs.
 pub struct Errors {
@@ -33,7 +33,7 @@ impl Scorer<'_> {
     /// Score the declared model as it is, before and after the effects were added, and what else is to be compared.
     pub fn errors(
         &self,
-        declared: &System,
+        declared: &Model,
         [before, after]: [&Fitted; 2],
         hybrid: Option<&Dynamics>,
         against: &[Reference],
@@ -56,7 +56,7 @@ impl Scorer<'_> {
         self.dynamics(&model.dynamics())
     }
 
-    fn as_it_is(&self, model: &System) -> Assessment {
+    fn as_it_is(&self, model: &Model) -> Assessment {
         self.dynamics(&model.dynamics())
     }
 

@@ -6,7 +6,7 @@ use super::runs::Runs;
 use super::{Case, Experiment, Outcome, Trial};
 use crate::control::Task;
 use crate::experiment::ExperimentError;
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::plant::Plant;
 use crate::train::Backend;
 
@@ -14,7 +14,7 @@ use crate::train::Backend;
 pub struct Lab {
     pub experiment: Experiment,
     pub library: Library,
-    pub declared: System,
+    pub declared: Model,
     pub task: Task,
     /// One for each case.
     pub plants: Vec<Plant>,
@@ -33,7 +33,7 @@ impl Lab {
         backend: Backend,
     ) -> Result<Self, ExperimentError> {
         let model = experiment.beside_or_named(&experiment.model);
-        let declared = library.system(&model)?;
+        let declared = library.model(&model)?;
         let task = Task::read(&experiment.beside_or_named(&experiment.task))?;
         if task.system != declared.name {
             return Err(experiment.wrong(format!(

@@ -37,7 +37,7 @@ pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
 /// The library's equations, one of their parameters held.
 pub(super) fn equations(joints: usize) -> Dynamics {
     let name = ["pendulum", "acrobot"][joints - 1];
-    let system = Library::built_in().system(Path::new(name)).unwrap();
+    let system = Library::built_in().model(Path::new(name)).unwrap();
     let mut dynamics = system.dynamics();
     dynamics.parameters[1].fixed = true;
     dynamics

@@ -117,7 +117,7 @@ fn tensors_and_the_written_out_program_agree() {
 
 #[test]
 fn two_joints_agree_too() {
-    let acrobot = Library::built_in().system(Path::new("acrobot")).unwrap();
+    let acrobot = Library::built_in().model(Path::new("acrobot")).unwrap();
     let acrobot = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
     let mut rng = rng(12);
     // Positions, velocities, inputs of each row.
