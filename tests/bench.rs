@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
-use residyn::evaluate::assess;
 use residyn::model::{FittedEffect, Library};
+use residyn::sim::metric::assess;
 
 use crate::support::{refuses, succeeds, text};
 

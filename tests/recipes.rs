@@ -2,7 +2,7 @@
 
 use residyn::model::Library;
 use residyn::plant::Plant;
-use residyn::recipe::{Job, Recipe};
+use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 
 use crate::train::{configs, json, refused};

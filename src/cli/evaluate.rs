@@ -8,8 +8,9 @@ use serde::Serialize;
 use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::data::{Joint, LeaveOut, Log};
-use crate::evaluate::{Summary, assess, calibrate, summarise};
+use crate::identify::calibrate;
 use crate::model::{Dynamics, Model};
+use crate::sim::metric::{Summary, assess, summarise};
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]

@@ -1,9 +1,9 @@
 use std::ops::Deref;
 
 use crate::data::Log;
-use crate::evaluate::{Trace, traces};
 use crate::identify::{Fit, Values};
 use crate::model::{Dynamics, Model};
+use crate::sim::metric::{Trace, traces};
 
 /// A model as a fit to a study's logs left it. It is used as the model that it is.
 #[derive(Debug, Clone)]

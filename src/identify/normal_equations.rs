@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::shooting::WindowTerms;
 use super::values::Layout;
-use super::window::Window;
+use crate::sim::Window;
 
 /// The normal equations of one window in some of a fit's free values, its own values eliminated.
 #[derive(Debug, Clone)]

@@ -1,6 +1,6 @@
-use super::window::Window;
 use crate::data::Log;
 use crate::model::{Dynamics, OwnValue, Parameter};
+use crate::sim::Window;
 
 /// The value that a parameter has in one log alone.
 #[derive(Debug, Clone, Copy, PartialEq)]

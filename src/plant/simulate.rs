@@ -7,7 +7,7 @@ use crate::lanes::Row;
 use crate::model::{Dynamics, Model};
 use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
-/// Dry friction reverses over this speed (rad/s): many times sharper than in any fit.
+/// Velocity over which dry friction reverses (rad/s): much sharper than in any fit.
 const SIGN_WIDTH: f64 = 1e-3;
 
 impl Plant {

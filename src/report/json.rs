@@ -6,8 +6,8 @@ use crate::closeloop::{
     SplitMethod, TakenBack, Verdict,
 };
 use crate::data::{Finding as AuditFinding, Joint};
-use crate::evaluate::{Assessment, Summary, summarise};
 use crate::model::{FittedEffect, OwnValue, Parameter};
+use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// `report.json`: the outcome with fixed names, for other programs.
 #[derive(Debug, Serialize)]

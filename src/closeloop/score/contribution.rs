@@ -5,8 +5,8 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
-use crate::evaluate::Assessment;
 use crate::model::{FittedEffect, Model, OwnValue, Parameter};
+use crate::sim::metric::Assessment;
 
 /// One effect that was added.
 #[derive(Debug, Clone)]
