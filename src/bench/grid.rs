@@ -24,17 +24,17 @@ pub enum GridError {
     File { path: PathBuf, message: String },
 }
 
-/// What the cells of a series are to show.
+/// What a series of cells tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
-    /// One effect is missing: it is named.
+    /// One effect is missing and has to be named.
     Single,
-    /// Two are missing: both are named.
+    /// Two are missing and both have to be named.
     Pair,
-    /// Nothing is missing: nothing is named.
+    /// Nothing is missing and nothing may be named.
     None,
-    /// Something is missing that the library does not know: it is flagged.
+    /// Something is missing that the library does not know; it has to be flagged.
     Outside,
 }
 
@@ -70,7 +70,7 @@ struct File {
 /// One test: a rig with its effects, how its logs are taken, and a seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
-    /// Says all that tells this cell from the others of its grid.
+    /// Unique in its grid: plant, effects, condition and seed.
     pub id: String,
     pub group: Group,
     pub plant: String,
@@ -108,7 +108,7 @@ pub enum Source {
 /// All cells of a grid, in the order of its series.
 ///
 /// # Errors
-/// A file that cannot be read, or that asks for what there is not.
+/// A file that cannot be read or refers to something unknown.
 pub fn read(path: &Path) -> Result<Vec<Cell>, GridError> {
     let text = std::fs::read_to_string(path).map_err(|source| GridError::Open {
         path: path.to_owned(),
@@ -136,7 +136,7 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
     let mut ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|two| two[0] == two[1]) {
-        Some(two) => Err(wrong(format!("the cell {} stands there twice", two[0]))),
+        Some(two) => Err(wrong(format!("the cell {} occurs twice", two[0]))),
         None => Ok(all),
     }
 }
@@ -301,7 +301,7 @@ mod tests {
         );
         assert_eq!(
             wrong("seeds = [1, 2]", "seeds = [1, 1]"),
-            "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 stands there twice"
+            "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 occurs twice"
         );
         assert!(wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one a joint"));
         assert!(wrong("logs = 4", "logs = 1").contains("conditions.base: needs"));

@@ -1,6 +1,5 @@
 //! Stage 8: train a small network on what the refined model leaves.
 
-use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use rand::{Rng, SeedableRng};
@@ -9,6 +8,7 @@ use thiserror::Error;
 
 use super::fitted::Fitted;
 use super::refine::Refined;
+use super::settings::LearnSettings;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
@@ -17,19 +17,6 @@ use crate::model::{
 };
 use crate::sim::{Integrator, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
-
-/// Rows nearer than this (s) are put together: the network is to learn a force, not the encoder's noise.
-const STEP_S: f64 = 0.01;
-/// Steps that a segment unrolls.
-const STEPS: usize = 8;
-/// About as many segments are enough for a network of some hundred weights.
-const SEGMENTS: usize = 1200;
-/// One stretch of this length (s) in every [`EVERY`] is kept to choose the epoch.
-const STRETCH_S: f64 = 2.0;
-const EVERY: usize = 5;
-const EPOCHS: usize = 250;
-/// The penalty on the network's size: it takes over only what pays for it.
-const ALPHA: f64 = 1e-3;
 
 /// A run that trained the residual network, for its checkpoint, and the hybrid that came of it.
 pub struct Learned {
@@ -65,7 +52,11 @@ pub(super) fn learn(
     };
     let hybrid = untrained(study, model, &training, backend, rng)?;
     // Training takes numbers from a stream of its own, which its checkpoint carries on.
-    let mut run = Training::new(hybrid, fit_settings(), ChaCha8Rng::from_rng(rng))?;
+    let mut run = Training::new(
+        hybrid,
+        fit_settings(&study.settings.learn),
+        ChaCha8Rng::from_rng(rng),
+    )?;
     run.run(&training, Some(&validation), &mut |at| {
         let text = format!(
             "{}, epoch {} of {}",
@@ -103,17 +94,19 @@ fn untrained(
     Ok(HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?)
 }
 
-fn fit_settings() -> FitSettings {
+fn fit_settings(settings: &LearnSettings) -> FitSettings {
     FitSettings {
-        epochs: EPOCHS,
+        epochs: settings.epochs,
         learning_rates: LearningRates {
             physics: 0.0,
-            residual: 0.003,
+            residual: settings.learning_rate,
             ..LearningRates::default()
         },
-        penalty: Penalty::Fixed { alpha: ALPHA },
+        penalty: Penalty::Fixed {
+            alpha: settings.alpha,
+        },
         integrator: Integrator::RK4,
-        record_every: NonZeroUsize::new(10).expect("not zero"),
+        record_every: settings.record_every,
         ..FitSettings::default()
     }
 }
@@ -121,9 +114,10 @@ fn fit_settings() -> FitSettings {
 /// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees what
 /// the model does.
 fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
+    let settings = &study.settings.learn;
     let thinning = Thinning {
-        step_s: STEP_S,
-        length_s: STRETCH_S,
+        step_s: settings.step_s,
+        length_s: settings.stretch_s,
     };
     let dynamics = model.dynamics();
     let of_log = |log: &Log| {
@@ -132,13 +126,13 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     };
     let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
-    let stride = (rows / SEGMENTS).max(1);
+    let stride = (rows / settings.segments).max(1);
     let mut sets = [
-        Segments::new(study.system.joints, STEPS),
-        Segments::new(study.system.joints, STEPS),
+        Segments::new(study.system.joints, settings.steps),
+        Segments::new(study.system.joints, settings.steps),
     ];
     for (index, stretch) in stretches.iter().enumerate() {
-        let set = &mut sets[usize::from(index % EVERY == EVERY - 1)];
+        let set = &mut sets[usize::from(index % settings.every == settings.every - 1)];
         // A stretch that is too short holds no segment; that is no error here.
         let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
     }

@@ -38,8 +38,8 @@ impl fmt::Display for Interval {
 /// One trajectory of a rig with N joints.
 ///
 /// The channels are indexed `[joint][row]`; each of them has as many rows as `time`, which increases
-/// strictly. [`Log::read`] guarantees this, and that every number is finite; whoever builds a log by
-/// hand has to.
+/// strictly. [`Log::read`] guarantees this, and that every number is finite; code that
+/// builds a log itself has to as well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
     /// Where the log was read from, as the caller gave it.
@@ -59,7 +59,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// A log of so many joints without a row, for whoever records one.
+    /// A log with this number of joints and no row, for recording.
     pub fn empty(joints: usize) -> Self {
         Self {
             path: PathBuf::new(),

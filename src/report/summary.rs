@@ -51,7 +51,8 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {joint}, {seconds} s ahead: {before} {unit} {FITTED}; {after} {unit} {WITH_EFFECTS}"
+                "  joint {}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}",
+                j + 1
             );
         }
     }

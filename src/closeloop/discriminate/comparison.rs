@@ -5,32 +5,24 @@ use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::Rival;
-use crate::closeloop::study::{Study, WINDOW_S};
+use crate::closeloop::settings::DiscriminateSettings;
+use crate::closeloop::study::Study;
 use crate::data::{Joint, Log};
 use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect, Model};
 
-/// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
-/// probability of 95 %: the lead has the mean of half and the standard deviation of the root of this number.
-const NEEDED: f64 = 4.0 * (2.0 + 1.645) * (2.0 + 1.645);
-/// Motion faster than so many times the top speed of the logs is not what the rig was built for.
-const FASTEST: f64 = 5.0;
-/// Windows by which the present logs are represented.
-const PRESENT: usize = 40;
-/// Finer than this (rad or m) no position is measured.
-const FINEST: f64 = 1e-6;
-/// Scale of the residuals in refits: so large that the robust loss is plain least squares.
-const SCALE: f64 = 100.0;
-
 /// One of two explanations.
 pub(super) struct Hypothesis {
     dynamics: Dynamics,
+    /// Of the residuals in refits.
+    scale: f64,
 }
 
 impl Hypothesis {
     pub fn new(study: &Study<'_>, model: &Model) -> Self {
         Self {
             dynamics: study.smoothed(model).dynamics(),
+            scale: study.settings.discriminate.scale,
         }
     }
 
@@ -48,12 +40,14 @@ impl Hypothesis {
     fn with(&self, payload: Option<&Payload>) -> Self {
         Self {
             dynamics: payload.map_or_else(|| self.dynamics.clone(), |p| p.on(&self.dynamics)),
+            scale: self.scale,
         }
     }
 
     /// What it says the rig does; `None` where it diverges.
     fn simulate(&self, study: &Study<'_>, motions: &[Motion]) -> Option<Record> {
-        Record::of(motions, study.logs, &self.dynamics, WINDOW_S)
+        let window_s = study.settings.fit.window_s;
+        Record::of(motions, study.logs, &self.dynamics, window_s)
     }
 
     /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
@@ -63,7 +57,7 @@ impl Hypothesis {
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&k| !parameters[k].fixed)
             .collect();
-        fit(shooting, &self.dynamics, &active, locals, Some(SCALE)).ok()
+        fit(shooting, &self.dynamics, &active, locals, Some(self.scale)).ok()
     }
 }
 
@@ -108,11 +102,12 @@ impl<'a> Comparison<'a> {
         truth: Hypothesis,
         other: Hypothesis,
     ) -> Option<Self> {
+        let settings = &study.settings.discriminate;
         let noise = &study.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
-            .map(|noise| (noise * model.fit.scale).max(FINEST))
+            .map(|noise| (noise * model.fit.scale).max(settings.finest))
             .collect();
-        let motions: Vec<Motion> = spread(study.shooting.windows.len(), PRESENT)
+        let motions: Vec<Motion> = spread(study.shooting.windows.len(), settings.present_windows)
             .into_iter()
             .map(|w| window_of(study, model, w))
             .collect();
@@ -123,12 +118,13 @@ impl<'a> Comparison<'a> {
         let windows = study.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
         // The logs did not tell, whatever the noise says: they hold no more than was needed.
-        let too_sure = loss / present.duration_s(0..) * all_s / NEEDED;
+        let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
         let differences = differences(&shooting, &other, &values, &found.locals, 0);
         Some(Self {
             inflation: inflation(study, model).max(too_sure),
             other: Hypothesis {
                 dynamics: values.put_into(&other.dynamics, &present.logs),
+                ..other
             },
             locals: found.locals,
             differences,
@@ -150,12 +146,21 @@ impl<'a> Comparison<'a> {
         changes.chain(loaded).collect()
     }
 
+    fn settings(&self) -> &DiscriminateSettings {
+        &self.study.settings.discriminate
+    }
+
     fn payloads(&self) -> Vec<Payload> {
         let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
         let declared = self.study.system.parameters.len();
         let truth = &self.truth;
-        Payload::all(&truth.dynamics, declared, 2.0 * latest_s + 10.0)
+        Payload::all(
+            &truth.dynamics,
+            declared,
+            self.settings().payload,
+            2.0 * latest_s + 10.0,
+        )
     }
 
     fn loaded(&self, model: &Fitted, payload: &Payload) -> Experiment {
@@ -192,14 +197,15 @@ impl<'a> Comparison<'a> {
             difference: differences[joint],
             present: self.differences[joint],
             noise: self.noise[joint],
-            seconds: NEEDED * self.inflation / rate,
+            seconds: self.settings().lead * self.inflation / rate,
         })
     }
 
     fn is_possible(&self, record: &Record, turns: Option<Joint>) -> bool {
+        let fastest = self.settings().fastest;
         let slow = |log: &Log| {
             let mut joints = log.qd.iter().zip(&self.study.top_speed);
-            joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= FASTEST * top))
+            joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= fastest * top))
         };
         let turned = |joint: Joint| {
             let mut motions = record.motions.iter();
@@ -226,7 +232,7 @@ fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
 
 /// Twice the loss of a fit, in units of the noise.
 fn loss_of(fit: &Fit) -> f64 {
-    2.0 * SCALE * SCALE * fit.cost
+    2.0 * fit.scale * fit.scale * fit.cost
 }
 
 /// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.

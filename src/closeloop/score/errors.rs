@@ -3,6 +3,7 @@ use rand::Rng;
 use super::bootstrap::reduction_interval;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
+use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
 use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Assessment, assess};
@@ -26,7 +27,7 @@ pub struct Errors {
 /// Scores models on the test logs.
 pub(in crate::closeloop) struct Scorer<'a> {
     pub test: &'a [Log],
-    pub horizons_s: &'a [f64],
+    pub settings: &'a ScoreSettings,
 }
 
 impl Scorer<'_> {
@@ -45,7 +46,7 @@ impl Scorer<'_> {
             declared: self.as_it_is(declared),
             hybrid: hybrid.map(|model| self.dynamics(model)),
             against: against.iter().map(scored).collect(),
-            reduction_ci95: reduction_interval(before.middle(), after.middle(), rng),
+            reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
             before,
             after,
         }
@@ -61,6 +62,6 @@ impl Scorer<'_> {
     }
 
     fn dynamics(&self, model: &Dynamics) -> Assessment {
-        assess(model, self.test, self.horizons_s)
+        assess(model, self.test, &self.settings.horizons_s)
     }
 }
