@@ -120,9 +120,12 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
         values: vec![(size, None)],
         ..FittedEffect::absent(library.effect("constant_torque").unwrap(), Joint::at(0))
     };
-    let declared = [-17.4, 4.6];
+    let mut start = system.with_effects(vec![bias(-8.0)]);
+    for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
+        parameter.value = value;
+    }
     let locals = study.shooting.initial_locals(0);
-    let chosen = study.refit(&[bias(-8.0)], &declared, locals, None).unwrap();
+    let chosen = study.refit(&start, locals, None).unwrap();
     let refined = refine(&study, &chosen);
     let scorer = Scorer {
         test: &split.test,

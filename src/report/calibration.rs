@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::wording::{listed, small, with_unit};
 use crate::closeloop::{Calibration, DetectionLimit, Smallest};
+use crate::data::Joint;
 use crate::model::{EffectParameter, FittedEffect};
 
 #[derive(Debug, Serialize)]

@@ -51,8 +51,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}",
-                j + 1
+                "  joint {joint}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}"
             );
         }
     }

@@ -6,7 +6,7 @@ use super::wording::{
     reduction, small, value, values,
 };
 use crate::closeloop::{Finding, Outcome, Proposal, ResidualForce, SplitMethod, UNKNOWN, Verdict};
-use crate::data::Severity;
+use crate::data::{Joint, Severity};
 use crate::identify::FitError;
 use crate::sim::metric::{Summary, summarise};
 

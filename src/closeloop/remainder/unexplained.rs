@@ -107,7 +107,7 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
 }
 
 /// The variable and the joint of the probe that saves most; one test among all probes and the omnibus test.
-fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, usize) {
+fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, Joint) {
     let RemainderSettings {
         significance,
         noteworthy,
