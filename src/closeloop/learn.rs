@@ -7,16 +7,15 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::fitted::Fitted;
-use super::per_log::joined;
 use super::refine::Refined;
 use super::settings::LearnSettings;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
+    Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn,
 };
-use crate::sim::{Integrator, Point, as_modelled};
+use crate::sim::{Integrator, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
 
 /// A run that trained the residual network, for its checkpoint, and the hybrid that came of it.
@@ -83,9 +82,7 @@ fn untrained(
     rng: &mut impl Rng,
 ) -> Result<HybridModel, LearnError> {
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
-    let (declared, effects) = absorbed(&model.declared, &model.effects);
-    let dynamics = (study.system.dynamics_with(&effects, &study.sign))
-        .with_values(joined(&declared, &effects));
+    let dynamics = model.absorbed().dynamics();
     let joints = study.system.joints;
     let settings = MlpSettings {
         hidden: study.system.hidden.clone(),
@@ -122,12 +119,12 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
         step_s: settings.step_s,
         length_s: settings.stretch_s,
     };
-    let of_log = |(k, log): (usize, &Log)| {
-        let point = Point::new(&model.dynamics, model.fit.values_of_log(k));
-        trajectories(&as_modelled(&point, log), thinning)
+    let dynamics = model.dynamics();
+    let of_log = |log: &Log| {
+        let in_log = dynamics.in_log(log);
+        trajectories(&as_modelled(&*in_log, log), thinning)
     };
-    let logs = study.logs.iter().enumerate();
-    let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
+    let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
     let stride = (rows / settings.segments).max(1);
     let mut sets = [

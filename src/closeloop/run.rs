@@ -95,13 +95,11 @@ fn remainder(study: &Study<'_>, found: &Found, refined: &Refined<'_>) -> Remaind
 }
 
 fn models_of(study: &Study<'_>, before: Fitted, refined: Refined<'_>) -> Models {
-    let declared = study.system.dynamics(&study.system.sign()).parameters;
+    let fitted = refined.model.absorbed().all_parameters();
     Models {
-        contradicted: contradicted(&declared, &refined.parameters),
+        contradicted: contradicted(&study.system.all_parameters(), &fitted),
         before,
         after: refined.model,
-        parameters: refined.parameters,
-        sign_widths: refined.study.sign_widths,
         identifiability: study.identifiability.clone(),
     }
 }

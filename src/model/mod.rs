@@ -21,6 +21,7 @@ mod shift;
 mod stack;
 mod system;
 mod typeset;
+mod written;
 
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
@@ -37,6 +38,5 @@ pub use network::{
     with_residual,
 };
 pub use reader::FileError;
-pub use shift::absorbed;
 pub(crate) use stack::Stack;
-pub use system::{FittedEffect, OwnValue, System, put_own};
+pub use system::{FittedEffect, Model, OwnValue};

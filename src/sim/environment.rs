@@ -91,7 +91,7 @@ mod tests {
     use burn::tensor::{Tensor, TensorData};
 
     use super::Environment;
-    use crate::expr::SignForm;
+    use crate::data::Joint;
     use crate::model::{HybridModel, Library};
     use crate::plant::Plant;
     use crate::sim::Integrator;
@@ -99,8 +99,8 @@ mod tests {
 
     #[test]
     fn steps_are_those_of_training() {
-        let system = Library::built_in().system(Path::new("acrobot")).unwrap();
-        let dynamics = system.dynamics(&[SignForm::DEFAULT; 2]);
+        let system = Library::built_in().model(Path::new("acrobot")).unwrap();
+        let dynamics = system.dynamics();
         let device = Backend::NdArray.device();
         let model = HybridModel::physics(&dynamics, &device).unwrap();
         let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);
@@ -129,9 +129,9 @@ mod tests {
         let torques = [1.0, -2.0, 3.0, 0.5, -1.5, 2.0];
         let delay = ("d".to_owned(), 0.04);
         plant
-            .add_effect(&library, "actuator_delay", 1, &[delay])
+            .add_effect(&library, "actuator_delay", Joint::at(0), &[delay])
             .unwrap();
-        let late = plant.true_dynamics();
+        let late = plant.dynamics();
         let steps = 4.try_into().unwrap();
         for integrator in [Integrator::SEMI_IMPLICIT_EULER, Integrator::fine(steps)] {
             let mut delayed = Environment::new(&late, integrator, 0.02);

@@ -2,7 +2,6 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::select::{candidates, starts};
 use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::settings::Settings;
@@ -85,27 +84,13 @@ struct Baseline<'a> {
 
 impl<'a> Baseline<'a> {
     fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let values = values_on(study.logs, &accepted.declared, &accepted.effects);
+        let dynamics = accepted.dynamics();
         let scale = accepted.fit.scale;
         let states = study.shooting.initial_locals(0);
-        let locals = fit(
-            &study.shooting,
-            &accepted.dynamics,
-            &[],
-            values.clone(),
-            states,
-            Some(scale),
-        )?
-        .locals;
+        let (_, free) = fit(&study.shooting, &dynamics, &[], states, Some(scale))?;
+        let locals = free.locals;
         let active = &accepted.fit.active;
-        let fit = as_it_stands(
-            &study.shooting,
-            &accepted.dynamics,
-            active,
-            values,
-            locals.clone(),
-            scale,
-        )?;
+        let fit = as_it_stands(&study.shooting, &dynamics, active, locals.clone(), scale)?;
         let loss = left_out_losses(&fit, &folds(study)).iter().sum();
         Ok(Self {
             study,
@@ -195,14 +180,13 @@ impl<'a> Baseline<'a> {
         let accepted = self.accepted;
         let mut effects = accepted.effects.clone();
         effects.push(start.clone());
-        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
-        let values = values_on(self.study.logs, &accepted.declared, &effects);
-        let switch = values.common.len() - start.values.len() + switch;
+        let model = self.study.smoothed(&accepted.with_effects(effects));
+        let dynamics = model.dynamics();
+        let switch = dynamics.parameters.len() - start.values.len() + switch;
         as_it_stands(
             &self.study.shooting,
             &dynamics,
             &[accepted.fit.active.as_slice(), &[switch]].concat(),
-            values,
             self.locals.clone(),
             accepted.fit.scale,
         )
@@ -212,7 +196,7 @@ impl<'a> Baseline<'a> {
 /// Information on the last free value, the others free as well; `None` where it is no more than rounding.
 fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     let last = fit.columns.len() - 1;
-    let mut terms = fit.nothing();
+    let mut terms = fit.zero_equations();
     fit.reduced
         .iter()
         .for_each(|window| window.add_to(&mut terms));

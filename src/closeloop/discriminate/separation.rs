@@ -5,14 +5,15 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::Rival;
 use crate::closeloop::settings::DiscriminateSettings;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Separation {
     /// What to do; `None` where nothing that was simulated tells them apart.
     pub experiment: Option<String>,
-    /// Joint, counted from 1, on which the difference shows most.
-    pub joint: usize,
+    /// The joint on which the difference shows most.
+    pub joint: Joint,
     /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
     /// the other does, in rad (or m).
     pub difference_rad: f64,
@@ -33,7 +34,7 @@ pub struct Separation {
 /// `None` where not even the present motion can be simulated.
 pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
     let settings = &study.settings.discriminate;
-    let chosen = Hypothesis::new(study, &model.effects, &model.declared);
+    let chosen = Hypothesis::new(study, model);
     let other = Hypothesis::of_rival(study, model, rival);
     let comparison = if rival.contains_chosen() {
         Comparison::new(study, model, other, chosen)
@@ -49,7 +50,7 @@ pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Op
     let shown = best.unwrap_or(widest);
     Some(Separation {
         experiment: best.map(|trial| trial.text.clone()),
-        joint: shown.joint + 1,
+        joint: shown.joint,
         difference_rad: shown.difference,
         present_difference_rad: shown.present,
         noise_rad: shown.noise,

@@ -33,14 +33,7 @@ pub(super) fn residual_force(
     let windows = cut(study.logs, study.settings.remainder.stretch_s);
     let shooting = Shooting::new(study.logs, windows, &study.shooting.noise);
     let locals = shooting.initial_locals(joints);
-    let found = fit(
-        &shooting,
-        &model.dynamics,
-        &[],
-        model.fit.found(),
-        locals,
-        None,
-    )?;
+    let (_, found) = fit(&shooting, &model.dynamics(), &[], locals, None)?;
     let stretches = shooting.windows.iter().zip(&found.locals);
     let mut samples: Vec<ForceSample> = stretches
         .map(|(window, local)| {

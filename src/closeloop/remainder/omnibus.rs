@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
-use crate::data::Audit;
 use crate::data::statistics::{deviation, mean};
+use crate::data::{Audit, Joint};
+use crate::identify::Values;
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,12 +25,12 @@ pub struct Omnibus {
 }
 
 impl Omnibus {
-    /// The joint (counted from 0) with the largest share, and that share.
-    pub fn most(&self) -> (usize, f64) {
-        let shares = self.shares.iter().copied().enumerate();
+    /// The joint with the largest share, and that share.
+    pub fn most(&self) -> (Joint, f64) {
+        let shares = Joint::all(self.shares.len()).zip(self.shares.iter().copied());
         shares
             .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((0, 0.0))
+            .unwrap_or((Joint::at(0), 0.0))
     }
 }
 
@@ -102,8 +103,9 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
     } = study.settings.remainder;
     let joints = study.system.joints;
     let shooting = &study.shooting;
-    let found = model.fit.found();
-    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&model.dynamics, &found, locals);
+    let dynamics = model.dynamics();
+    let values = Values::of(&dynamics, study.logs);
+    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
     let sensors = sensors(study);
     let at = residuals(&model.fit.locals);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)

@@ -9,13 +9,14 @@ use crate::closeloop::select::best_start;
 use crate::closeloop::select::gain;
 use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// A formula for the remainder: a proposal, not a finding. Supported only by its fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     /// Force in N m (or N), such as `-0.0012 * qd1^3`.
     pub formula: String,
     /// Share of the loss above noise that it takes away, on stretches left out of its fit.
@@ -105,7 +106,7 @@ struct Sum {
 fn longer(
     study: &Study<'_>,
     model: &Fitted,
-    joint: usize,
+    joint: Joint,
     terms: &[Term],
     folds: &[usize],
 ) -> Option<Sum> {
@@ -124,9 +125,9 @@ fn longer(
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {
-            let effects = [model.effects.as_slice(), &[start]].concat();
+            let longer = model.with_effects([model.effects.as_slice(), &[start]].concat());
             let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-            let fitted = study.refit(&effects, &model.declared, locals, scale).ok()?;
+            let fitted = study.refit(&longer, locals, scale).ok()?;
             Some(Sum {
                 terms,
                 losses: left_out_losses(&fitted.fit, folds),

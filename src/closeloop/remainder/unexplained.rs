@@ -9,6 +9,7 @@ use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::select::{gain, p_value};
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// The unexplained remainder: what the residuals hold beyond noise when no effect helps any more.
@@ -23,7 +24,7 @@ pub struct Unexplained {
     /// `unknown` where it depends on none of them, `none` where it is not significant.
     pub place: String,
     /// The joint (counted from 0) with the largest remainder.
-    pub joint: usize,
+    pub joint: Joint,
     pub omnibus: Omnibus,
     pub probes: Vec<Probed>,
 }
@@ -34,9 +35,8 @@ pub struct Probed {
     /// The variables that it depends on.
     #[serde(rename = "where")]
     pub place: String,
-    /// Counted from 0.
     #[serde(skip)]
-    pub joint: usize,
+    pub joint: Joint,
     /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
     pub p_value: f64,
     /// Fall of the loss on left-out stretches, as a share.
@@ -91,7 +91,11 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
     effects.push(probe);
     let scale = Some(model.fit.scale);
     let fitted = study
-        .refit(&effects, &model.declared, model.fit.locals.clone(), scale)
+        .refit(
+            &model.with_effects(effects),
+            model.fit.locals.clone(),
+            scale,
+        )
         .ok()?;
     let without = left_out_losses(&fitted.fit, &folds(study));
     Some(Probed {
@@ -103,7 +107,7 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
 }
 
 /// The variable and the joint of the probe that lowers the loss most; one test among all probes and the omnibus test.
-fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, usize) {
+fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, Joint) {
     let RemainderSettings {
         significance,
         noteworthy,
@@ -130,7 +134,7 @@ fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> 
 fn variables(probe: &FittedEffect) -> String {
     let numbered = |name: &str| match name {
         "t" => name.to_owned(),
-        own => format!("{own}{}", probe.joint + 1),
+        own => probe.joint.name(own),
     };
     let names: Vec<String> = probe.effect.name.split('*').map(numbered).collect();
     names.join("*")

@@ -1,9 +1,9 @@
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::study::Study;
-use crate::identify::{Shooting, promise};
+use crate::data::Joint;
+use crate::identify::{Shooting, predicted_cost};
 use crate::model::{Effect, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
@@ -23,7 +23,7 @@ pub fn candidates(
 pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in effects {
-        for joint in 0..study.system.joints {
+        for joint in Joint::all(study.system.joints) {
             if is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
             {
@@ -39,7 +39,7 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
 }
 
 /// Effects of the torque cannot be observed where there is none.
-fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
+fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: Joint) -> bool {
     !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
 }
 
@@ -94,10 +94,9 @@ fn promised(
 ) -> Option<f64> {
     let mut effects = model.effects.clone();
     effects.push(start.clone());
-    let dynamics = study.system.dynamics_with(&effects, &study.sign);
-    let values = values_on(study.logs, &model.declared, &effects);
+    let dynamics = study.smoothed(&model.with_effects(effects)).dynamics();
     let (active, scale) = (study.active(&dynamics), model.fit.scale);
-    promise(shooting, &dynamics, &active, values, locals, scale)
+    predicted_cost(shooting, &dynamics, &active, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
@@ -114,8 +113,8 @@ pub fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Op
         return None;
     }
     let mut beside = model.clone();
-    let found = beside.effects.split_off(study.system.effects.len());
-    beside.effects.extend(
+    let found = beside.model.effects.split_off(study.system.effects.len());
+    beside.model.effects.extend(
         found
             .into_iter()
             .filter(|present| !contains(candidate, present)),

@@ -180,8 +180,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
     fn rescaled(&self, model: &Fitted) -> Result<Fitted, FitError> {
         let locals = model.fit.locals.clone();
-        self.study
-            .refit(&model.effects, &model.declared, locals, None)
+        self.study.refit(model, locals, None)
     }
 
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
@@ -264,7 +263,7 @@ fn weigh(
     start: FittedEffect,
     without: &[f64],
 ) -> Option<Evidence> {
-    let mut effects = beside(study, model, &start)?.effects;
+    let mut effects = beside(study, model, &start)?.model.effects;
     effects.push(start);
     let fitted = refit(study, model, &effects)?;
     Evidence::of(study, fitted, folds, without)
@@ -274,7 +273,11 @@ fn weigh(
 fn refit(study: &Study<'_>, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
     let locals = model.fit.locals.clone();
     study
-        .refit(effects, &model.declared, locals, Some(model.fit.scale))
+        .refit(
+            &model.with_effects(effects.to_vec()),
+            locals,
+            Some(model.fit.scale),
+        )
         .ok()
 }
 

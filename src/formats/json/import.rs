@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use thiserror::Error;
 
 use super::description::{Description, VERSION};
-use crate::model::{Effect, FileError, HybridError, ModelWeights, Parameter, System};
+use crate::model::{Effect, FileError, HybridError, Model, ModelWeights, Parameter};
 use crate::train::weights::from_bytes;
 use crate::train::{
     Backend, CheckpointError, FitSettings, Origin, Shape, TrainError, Training, save,
@@ -19,7 +19,7 @@ use crate::train::{
 pub struct Imported {
     description: Description,
     /// What its model file says.
-    pub system: System,
+    pub system: Model,
     numbers: ModelWeights,
 }
 
@@ -80,8 +80,8 @@ impl Imported {
         let shape = &description.shape;
         let file = description.weights.to_string_lossy();
         let numbers = from_bytes(shape, &bytes, &file, folder)?;
-        let system = System::from_text(path, &description.model_toml, effects)?;
-        let dynamics = system.dynamics(&system.sign());
+        let system = Model::from_text(path, &description.model_toml, effects)?;
+        let dynamics = system.dynamics();
         check(path, shape, &dynamics.parameters)?;
         Ok(Self {
             description,
@@ -95,7 +95,7 @@ impl Imported {
     /// # Errors
     /// A folder that cannot be written, or that holds anything but a checkpoint.
     pub fn save(self, dir: &Path, seed: u64, backend: Backend) -> Result<(), ImportError> {
-        let dynamics = self.system.dynamics(&self.system.sign());
+        let dynamics = self.system.dynamics();
         let shape = &self.description.shape;
         let model = shape.model(&self.numbers, &dynamics, &backend.device())?;
         let Description {

@@ -3,10 +3,10 @@ use std::f64::consts::TAU;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::rng;
-use crate::sim::batch::{Rows, W};
 use crate::lanes::Arch;
 use crate::plan::gaussian::Gaussian;
 use crate::plan::noise::Noise;
+use crate::sim::batch::{Rows, W};
 
 #[test]
 fn normal_numbers_are_normal() {
