@@ -10,7 +10,6 @@ use crate::model::{
     CommandFilter, Dynamics, HybridError, MlpWeights, ModelWeights, Parameter, System, nothing_but,
 };
 use crate::sim::Integrator;
-use crate::sim::Integrator;
 
 /// A model as every format reads it: equations with their values, the networks whose outputs are added to their
 /// derivative, and the step.

@@ -175,7 +175,7 @@ mod tests {
     use super::{Sampling, Starts};
     use crate::model::Library;
     use crate::plant::Plant;
-    use crate::sim::{Environment, Integrator};
+    use crate::sim::Integrator;
 
     fn sampling() -> Sampling {
         Sampling {

@@ -3,8 +3,9 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::json::{CHECKPOINT, MODEL, PLOTS, Report, TEXT};
+use super::json::{CHECKPOINT, MODEL, PLOTS, TEXT};
 use super::plot::PlotError;
+use super::schema::Report;
 use super::{model_file, picture, text};
 use crate::closeloop::Outcome;
 use crate::model::System;

@@ -1,3 +1,4 @@
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::comparison::{Comparison, Hypothesis, Trial};
@@ -6,18 +7,22 @@ use crate::closeloop::select::Rival;
 use crate::closeloop::study::Study;
 
 /// How far two explanations differ in the experiment that tells them apart best.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Separation {
     /// What to do; `None` where nothing that was simulated tells them apart.
     pub experiment: Option<String>,
     /// Joint, counted from 1, on which the difference shows most.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
     /// the other does, in rad (or m).
+    #[schemars(range(min = 0))]
     pub difference_rad: f64,
     /// The same in the present logs.
+    #[schemars(range(min = 0))]
     pub present_difference_rad: f64,
     /// What the model of the present logs does not explain of a position, standard deviation in rad (or m).
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub noise_rad: f64,
     /// Length in s of logs of the experiment that suffice.
     pub seconds: Option<f64>,

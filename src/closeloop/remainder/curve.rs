@@ -1,4 +1,5 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -7,19 +8,24 @@ use crate::data::statistics::{SIGMA_PER_MAD, quantile, upper_median};
 use crate::identify::{BLOCK_S, stretches};
 
 /// The residual force of a joint as a smooth curve over one variable, the others' shares taken off.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Curve {
     /// Counted from 1.
+    #[schemars(range(min = 1))]
     pub joint: usize,
     /// `q1`, `qd1`, `tau1` or `t`.
     pub variable: String,
     /// Of the variable.
     pub unit: &'static str,
+    #[schemars(length(min = 2))]
     pub x: Vec<f64>,
     /// In N m (or N).
+    #[schemars(length(min = 2))]
     pub force: Vec<f64>,
     /// Ends of the pointwise 95 % band.
+    #[schemars(length(min = 2))]
     pub low: Vec<f64>,
+    #[schemars(length(min = 2))]
     pub high: Vec<f64>,
 }
 
