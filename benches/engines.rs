@@ -9,7 +9,6 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::batch::{Rollouts, Rows};
 use residyn::closeloop::{Request, Split, close_loop};
 use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
@@ -19,6 +18,7 @@ use residyn::model::{
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
+use residyn::sim::batch::{Rollouts, Rows};
 use residyn::train::{Backend, FitSettings, Segments, Training};
 
 const STEP_S: f64 = 0.02;

@@ -9,7 +9,6 @@ use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::batch::Rollouts;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit};
 use residyn::model::{
@@ -18,6 +17,7 @@ use residyn::model::{
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
+use residyn::sim::batch::Rollouts;
 use residyn::train::{Backend, FitSettings, Progress, Segments, Training};
 
 const STEP_S: f64 = 0.02;

@@ -5,13 +5,14 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
-use super::grid::{Cell, Simulation, Source, hash};
+use super::grid::{Cell, Simulation, Source};
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
 use super::told::told;
 use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
 use crate::data::{Log, LogError};
+use crate::files::content_hash;
 use crate::model::{Library, System};
 
 /// Errors are compared at the middle one \[s\].
@@ -66,7 +67,7 @@ impl Cell {
         let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
             .expect("the effects were checked when the grid was read");
         // Cells share neither their motions nor their noise.
-        let mut rng = ChaCha8Rng::seed_from_u64(hash(self.id.as_bytes()));
+        let mut rng = ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()));
         let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();

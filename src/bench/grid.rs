@@ -10,11 +10,12 @@ use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use super::recording::{Condition, Driving};
+use crate::files::beside_or_named;
 
 /// Why a grid cannot be run.
 #[derive(Debug, Error)]
 pub enum GridError {
-    #[error("{path}: cannot be read: {source}; give a grid with --grid", path = .path.display())]
+    #[error("{path}: cannot be read: {source}", path = .path.display())]
     Open {
         path: PathBuf,
         source: std::io::Error,
@@ -209,16 +210,6 @@ impl File {
     }
 }
 
-/// A file beside the grid or, without one, the name of a built-in system.
-pub(super) fn beside_or_named(grid: &Path, model: &Path) -> PathBuf {
-    let beside = grid.parent().unwrap_or(Path::new("")).join(model);
-    if beside.is_file() {
-        beside
-    } else {
-        model.to_owned()
-    }
-}
-
 /// `pendulum/coulomb_friction@1(F_c=0.1)/base/1`
 pub(super) fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) -> String {
     let effect = |hidden: &Hidden| {
@@ -234,13 +225,6 @@ pub(super) fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) ->
         effects => effects.join("+"),
     };
     format!("{plant}/{effects}/{condition}/{seed}")
-}
-
-/// The 64-bit FNV-1a hash: the same on every machine and in every version.
-pub fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
 }
 
 #[cfg(test)]
@@ -321,11 +305,5 @@ mod tests {
         );
         assert!(wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one a joint"));
         assert!(wrong("logs = 4", "logs = 1").contains("conditions.base: needs"));
-    }
-
-    #[test]
-    fn the_hash_is_the_published_one() {
-        assert_eq!(hash(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(hash(b"a"), 0xaf63_dc4c_8601_ec8c);
     }
 }

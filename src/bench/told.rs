@@ -2,8 +2,8 @@
 
 use super::hidden::Hidden;
 use crate::closeloop::{Split, Study};
-use crate::evaluate::{Assessment, assess};
 use crate::model::{FittedEffect, Library, System};
+use crate::sim::metric::{Assessment, assess};
 
 /// Error of the model with the true effects, fitted from their true values to the logs that the search had:
 /// position, all joints together, at the middle horizon \[rad\]. `None` where the library lacks one of them.

@@ -12,6 +12,7 @@ use crate::data::{LeaveOut, Log};
 use crate::model::{Library, System};
 use crate::plant::Plant;
 use crate::report;
+use crate::runs::RunFolder;
 use crate::train::Origin;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
@@ -64,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
-    inputs::check_writable(&arguments.out)?;
+    let _folder = RunFolder::open(&arguments.out)?;
     let bar = progress::bar(Stage::ALL.len());
     let mut request = Request::new(&system, &library, split);
     request.against = against;

@@ -1,7 +1,7 @@
 use super::error::StudyError;
 use super::split::Split;
-use crate::evaluate::window_count;
 use crate::model::{Library, System};
+use crate::sim::metric::window_count;
 use crate::train::Backend;
 
 /// What closing the loop is asked for.

@@ -2,8 +2,8 @@ use std::f32::consts::TAU;
 
 use rand::{Rng, RngExt};
 
-use crate::batch::{Rows, W};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use crate::sim::batch::{Rows, W};
 
 /// Numbers below one that 24 random bits give: all exactly an f32.
 const UNIT: f32 = 1.0 / (1 << 24) as f32;

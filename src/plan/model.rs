@@ -1,5 +1,5 @@
 use super::Evaluate;
-use crate::batch::{Block, Rows};
+use crate::sim::batch::{Block, Rows};
 
 /// Where a plan starts: a state (positions, then velocities), a time, and the torques that were commanded before.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ impl Start {
     }
 
     /// After the torques `past` (`[step][joint]`, oldest first), each held for a step of the model, the last one until
-    /// `time_s`. The oldest was held for ever before; the last [`Rollouts::memory`](crate::batch::Rollouts::memory)
+    /// `time_s`. The oldest was held for ever before; the last [`Rollouts::memory`](crate::sim::batch::Rollouts::memory)
     /// of them matter.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
     pub fn after(state: &[f64], time_s: f64, past: &[Vec<f64>]) -> Self {

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use rand::Rng;
 
 use super::gaussian::Gaussian;
-use crate::batch::{Finish, Product, Rows};
 use crate::lanes::{Arch, Simd, WithSimd};
+use crate::sim::batch::{Finish, Product, Rows};
 
 /// Standard normal numbers for sequences of candidates: how these scatter around their mean.
 #[derive(Debug, Clone)]

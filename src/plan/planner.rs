@@ -6,9 +6,9 @@ use super::Settings;
 use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
-use crate::batch::{Rows, W};
 use crate::lanes::Arch;
 use crate::rounds::Rounds;
+use crate::sim::batch::{Rows, W};
 
 /// Who knows what sequences of inputs bring. One of them serves one block of candidates.
 pub trait Evaluate: Send {

@@ -1,4 +1,4 @@
-use crate::batch::{Rows, W};
+use crate::sim::batch::{Rows, W};
 
 /// The candidates of one iteration, and what they bring.
 pub struct Population<'a> {

@@ -1,7 +1,7 @@
 use super::method::Search;
 use super::population::Population;
-use crate::batch::{Rows, W};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use crate::sim::batch::{Rows, W};
 
 /// No distribution becomes narrower than this share of half an input's range: a search that has settled can still be
 /// drawn away by a better optimum.

@@ -9,10 +9,10 @@ use super::gaussian::Gaussian;
 use super::noise::Noise;
 use super::proposal::Proposal;
 use super::{Cem, Evaluate, Icem, Method, Mppi, Objective, Plan, Planner, Settings, Start};
-use crate::batch::{Rollouts, Rows, W};
 use crate::expr::SignForm;
 use crate::lanes::{Arch, Row};
 use crate::model::{Dynamics, FittedEffect, Library};
+use crate::sim::batch::{Rollouts, Rows, W};
 use crate::sim::{Commands, Environment, Hold, Integrator, RK4, Simulator};
 
 const SETTINGS: Settings = Settings {

@@ -8,8 +8,8 @@ use super::schema::{
     UnexplainedEntry,
 };
 use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, TakenBack};
-use crate::evaluate::{Assessment, Summary, summarise};
 use crate::model::{FittedEffect, OwnValue, Parameter};
+use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
 pub(super) const MODEL: &str = "model.toml";

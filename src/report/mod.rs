@@ -14,7 +14,7 @@ mod text;
 mod wording;
 
 pub use film::film;
-pub use folder::{WriteError, write, write_whole};
+pub use folder::{WriteError, write};
 pub use model_file::model_file;
 pub use schema::{Report, schema};
 pub use summary::summary;

@@ -10,8 +10,8 @@ use crate::closeloop::{
     UNKNOWN, Verdict,
 };
 use crate::data::Severity;
-use crate::evaluate::{Summary, summarise};
 use crate::identify::FitError;
+use crate::sim::metric::{Summary, summarise};
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {

@@ -13,6 +13,7 @@ mod manifest;
 mod moments;
 mod optimizer;
 mod penalty;
+pub mod recipe;
 mod segments;
 mod settings;
 mod sweep;

@@ -1,8 +1,8 @@
 use rand::Rng;
 
 use crate::data::statistics::bootstrap;
-use crate::evaluate::OpenLoop;
 use crate::identify::{BLOCK_S, stretches};
+use crate::sim::metric::OpenLoop;
 
 /// With this many logs whole trajectories are resampled.
 const ENOUGH_LOGS: usize = 5;

@@ -6,9 +6,9 @@ use crate::closeloop::per_log::take_over_intervals;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
-use crate::evaluate::Assessment;
 use crate::identify::{Uncertainty, uncertainty};
 use crate::model::{FittedEffect, OwnValue, Parameter, System};
+use crate::sim::metric::Assessment;
 
 /// One effect that was added.
 #[derive(Debug, Clone)]

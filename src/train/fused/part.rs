@@ -6,9 +6,9 @@ use super::plan::{CHUNK, Numbers, Plan};
 use super::record::Layout;
 use super::tapes::Tapes;
 use super::worker::{Desk, Worker, total};
-use crate::batch::Rows;
 use crate::lanes::{Element, Vector};
 use crate::model::Frame;
+use crate::sim::batch::Rows;
 
 /// One thread's share of a loss, with memory that serves again for the next.
 #[derive(Debug)]

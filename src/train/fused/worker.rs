@@ -5,11 +5,11 @@ use pulp::Simd;
 use super::plan::{CHUNK, Numbers, Plan};
 use super::record::{Layout, Stage as Recorded};
 use super::tapes::Tapes;
-use crate::batch::{Network, Rows, W};
 use crate::expr::Tape;
 use crate::lanes::{Element, Vector};
 use crate::model::Frame;
 use crate::sim::Stage;
+use crate::sim::batch::{Network, Rows, W};
 
 /// One thread at work on a chunk of blocks.
 pub(super) struct Worker<'a, S> {

@@ -13,28 +13,28 @@ pub enum Data {
     Simulated(Simulated),
 }
 
-/// Logs of a rig. States are smoothed from the logged positions.
+/// Logs of a rig. States are estimated by smoothing the logged positions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Logged {
     pub logs: Vec<PathBuf>,
-    /// Rows nearer than this (s) are put together.
+    /// Rows closer together than this are merged, s.
     pub step_s: f64,
-    /// Steps that the loss unrolls.
+    /// Number of steps that the loss unrolls.
     pub steps: usize,
 }
 
-/// Random trajectories of a simulated plant, with its exact states.
+/// Random trajectories of a simulated plant, with exact states.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Simulated {
     /// A plant or model file, or the name of a built-in system.
     pub plant: PathBuf,
     #[serde(flatten)]
     pub sampling: Sampling,
-    /// Steps that the loss unrolls.
+    /// Number of steps that the loss unrolls.
     pub steps: usize,
 }
 
-/// The keys of `[data]`, before it is known which of them belong together.
+/// All keys of `[data]`, before they are divided into those of logs and those of a plant.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Keys {
@@ -52,8 +52,8 @@ struct Keys {
 }
 
 impl Logged {
-    /// What suits logs of desk-sized rigs: steps of 10 ms are short against their motion and long
-    /// against encoder noise, and eight of them show what one hides in it.
+    /// Settings for logs of desk-sized rigs: a step of 10 ms is short compared with the motion, and eight steps together
+    /// show what one step buries in encoder noise.
     pub fn usual(logs: Vec<PathBuf>) -> Self {
         Self {
             logs,
@@ -98,7 +98,7 @@ impl Keys {
         ];
         if let Some((name, _)) = foreign.iter().find(|(_, given)| *given) {
             return Err(format!(
-                "`{name}` is of a simulated plant, but [data] has `logs`; remove it"
+                "`{name}` belongs to a simulated plant, but [data] has `logs`; remove it"
             ));
         }
         let logs = self.logs.unwrap_or_default();

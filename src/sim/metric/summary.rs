@@ -3,22 +3,22 @@ use serde::Serialize;
 use super::assessment::{OpenLoop, WindowError};
 use crate::data::statistics::median;
 
-/// The numbers of an assessment; one inner list a horizon, one number a joint.
+/// The numbers of an assessment, `[horizon][joint]`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub horizons_s: Vec<f64>,
     /// Root mean square over all rows of all windows, rad (or m).
     pub position_rmse: Vec<Vec<f64>>,
-    /// Median over the windows of a window's own root mean square, rad (or m).
+    /// Median over the windows of the root mean square per window, rad (or m).
     pub position_median: Vec<Vec<f64>>,
     /// As `position_rmse`, rad/s (or m/s), against the logged velocity.
     pub velocity_rmse: Vec<Vec<f64>>,
     pub windows: Vec<usize>,
-    /// Windows in which the model left every sensible range.
+    /// Number of windows in which the prediction diverged.
     pub diverged: Vec<usize>,
 }
 
-/// Put windows together into numbers; a horizon without windows has zeros and says so by its count.
+/// Summarise the windows of each horizon. A horizon without windows has zero errors and a zero count of windows.
 pub fn summarise(horizons: &[OpenLoop], joints: usize) -> Summary {
     let per_joint = |f: &dyn Fn(&OpenLoop, usize) -> f64| -> Vec<Vec<f64>> {
         horizons

@@ -1,37 +1,38 @@
-use std::path::Path;
+use serde_json::{Value, json};
 
-use serde_json::json;
-
-use super::difference::first_difference;
-use super::material::{Purpose, stream};
 use super::{Kind, Material, Recipe, RecipeError};
 use crate::expr::SignForm;
+use crate::files::{beside_or_named, content_id, text_or_embedded};
 use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, System};
+use crate::runs::{Identity, Purpose, RunFolder, stream};
 use crate::train::{Backend, Checkpoint, Origin, Training};
 
-/// A recipe with all that it names read and drawn: the start of a run, or of its continuation.
+/// A recipe with everything it refers to, read or sampled: ready to train or to resume.
 pub struct Job {
     pub recipe: Recipe,
     pub material: Material,
     /// The model before training.
     pub model: HybridModel,
-    /// For the checkpoints.
+    /// What the checkpoints record of the run.
     pub origin: Origin,
-    /// What the model file says, for the continuation.
+    /// The equations of the model file, for resuming.
     pub(super) dynamics: Dynamics,
 }
 
-/// A model file, read, with its text.
+/// The configuration's key for the command line that repeats the run.
+const COMMAND_LINE: &str = "command_line";
+
+/// A model file: its system and its text.
 pub(super) struct Declared {
     pub system: System,
     pub text: String,
 }
 
 impl Job {
-    /// Train from scratch.
+    /// Prepares training from scratch.
     ///
     /// # Errors
-    /// A recipe, model, plant or log that cannot be read or that do not fit each other.
+    /// A recipe, model, plant or log that cannot be read, or that do not match.
     pub fn train(
         recipe: Recipe,
         library: &Library,
@@ -55,7 +56,7 @@ impl Job {
         let config = json!({
             "command": "train",
             "recipe": recipe,
-            "data": fingerprint(&material),
+            "data": material.training.fingerprint(),
             "device": backend.name(),
         });
         Ok(Self {
@@ -71,61 +72,61 @@ impl Job {
         })
     }
 
-    /// The run: new, or where the checkpoint in `dir` left it.
+    /// Records the command line that repeats this run.
+    #[must_use]
+    pub fn begun_by(mut self, command_line: String) -> Self {
+        self.origin.config[COMMAND_LINE] = command_line.into();
+        self
+    }
+
+    /// Starts the training, or resumes it from the checkpoint in `folder`.
     ///
     /// # Errors
-    /// `dir` holds something else, or the checkpoint of another run.
-    pub fn begin(&self, dir: &Path) -> Result<Training, RecipeError> {
-        let Some(checkpoint) = Checkpoint::find(dir)? else {
-            let order = stream(self.origin.seed, Purpose::Order);
+    /// The folder holds something else, or the checkpoint of another run.
+    pub fn begin(&self, folder: &RunFolder) -> Result<Training, RecipeError> {
+        let Some(checkpoint) = Checkpoint::find(folder.path())? else {
+            let order = stream(self.origin.seed, Purpose::RecipeOrder);
             let settings = self.recipe.fit.clone();
             return Ok(Training::new(self.model.clone(), settings, order)?);
         };
-        if let Some(difference) = self.difference(&checkpoint) {
-            return Err(RecipeError::OtherRun {
-                dir: dir.to_owned(),
-                difference,
-            });
-        }
+        let (saved, mine) = (&checkpoint.manifest, &self.origin);
+        folder.expect(
+            &identity(&saved.config, saved.seed, &checkpoint.model_toml),
+            &identity(&mine.config, mine.seed, &mine.model_toml),
+        )?;
         Ok(checkpoint.training(&self.dynamics, &self.model.device())?)
     }
+}
 
-    /// What tells this run from that of a checkpoint; none where they are the same.
-    fn difference(&self, checkpoint: &Checkpoint) -> Option<String> {
-        let (saved, mine) = (&checkpoint.manifest, &self.origin);
-        let settings = || {
-            ["command", "recipe", "device", "from"]
-                .into_iter()
-                .find_map(|key| first_difference(key, &saved.config[key], &mine.config[key]))
-        };
-        // Last, since another seed or another recipe changes the data as well.
-        let files = || {
-            let same_data = saved.config["data"] == mine.config["data"];
-            let same_model = checkpoint.model_toml == mine.model_toml;
-            match (same_data, same_model) {
-                (true, true) => None,
-                (false, _) => Some("a log or the plant has changed since".to_owned()),
-                (true, false) => Some("the model file has changed since".to_owned()),
-            }
-        };
-        first_difference("seed", &json!(saved.seed), &json!(mine.seed))
-            .or_else(settings)
-            .or_else(files)
+/// The identity of a training, from what its checkpoints record.
+fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
+    let mut config = config.clone();
+    let mut take = |key: &str| config.as_object_mut().and_then(|all| all.remove(key));
+    let text = |value: Option<Value>| value.as_ref().and_then(Value::as_str).map(str::to_owned);
+    // How the command was spelled does not matter.
+    take(COMMAND_LINE);
+    let (command, data) = (text(take("command")), text(take("data")));
+    let inputs = [
+        ("a log or the plant", data.unwrap_or_default()),
+        ("the model file", content_id(model_toml.as_bytes())),
+    ];
+    Identity {
+        command: command.unwrap_or_default(),
+        seed,
+        config,
+        inputs: inputs.map(|(name, hash)| (name.to_owned(), hash)).into(),
     }
 }
 
 pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, RecipeError> {
-    let path = recipe.beside_or_named(&recipe.model);
+    let path = beside_or_named(&recipe.path, &recipe.model);
     let system = library.system(&path)?;
-    let embedded = || path.to_str().and_then(Library::system_text);
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(source) => match embedded() {
-            Some(text) => text.to_owned(),
-            None => return Err(RecipeError::Open { path, source }),
-        },
-    };
-    Ok(Declared { system, text })
+    let text = text_or_embedded(&path, Library::system_text)
+        .map_err(|source| RecipeError::Open { path, source })?;
+    Ok(Declared {
+        system,
+        text: text.into_owned(),
+    })
 }
 
 pub(super) fn equations(system: &System) -> Dynamics {
@@ -144,10 +145,6 @@ pub(super) fn new_network(
         ..MlpSettings::for_joints(system.joints)
     });
     let scaling = material.training.scaling(settings.angles);
-    let mut rng = stream(seed, Purpose::Network);
+    let mut rng = stream(seed, Purpose::RecipeNetwork);
     MlpWeights::new(system.joints, &settings, scaling, last, &mut rng)
-}
-
-pub(super) fn fingerprint(material: &Material) -> String {
-    format!("{:016x}", material.training.fingerprint())
 }

@@ -1,14 +1,12 @@
-//! Open-loop prediction error: how far a model runs from a log that it only sees the start and the
-//! torque of.
+//! Open-loop prediction error: how far a model that is given only the start state and the torques of a log departs from
+//! it.
 
 mod assessment;
-mod calibrate;
 mod open_loop;
 mod summary;
 mod trace;
 
 pub use assessment::{Assessment, OpenLoop, WindowError};
-pub use calibrate::{CalibrateError, Offsets, calibrate};
 pub use open_loop::{assess, window_count};
 pub use summary::{Summary, summarise};
 pub use trace::{Trace, traces};

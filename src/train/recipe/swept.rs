@@ -8,17 +8,17 @@ use super::{Job, Kind, Member};
 use crate::data::statistics::quartiles;
 use crate::train::Trained;
 
-/// What came of a sweep, as `sweep.json` has it. Numbers that are not finite are null there.
+/// The results of a sweep, as written to `sweep.json`. Numbers that are not finite are null there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Swept {
     pub schema: u32,
-    /// The program that wrote it.
+    /// Version of the program that wrote it.
     pub residyn: String,
     pub system: String,
     pub kind: Kind,
-    /// The recipe as resolved, its data and the device.
+    /// The resolved recipe, a hash of its data, the device and the command line.
     pub config: Value,
-    /// Of the data, which all models share.
+    /// Seed of the data, which all models share.
     pub seed: u64,
     /// Training segments.
     pub segments: usize,
@@ -34,14 +34,14 @@ pub struct Swept {
 pub struct Totals {
     pub models: usize,
     pub diverged: usize,
-    /// Of each model.
+    /// Epochs of each model.
     pub epochs: usize,
-    /// Time of the training, s.
+    /// Duration of the training, s.
     pub wall_s: f64,
     pub models_per_s: f64,
 }
 
-/// Of a sample, interpolated between neighbours.
+/// Quartiles of a sample, linearly interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quartiles {
     pub lower: f64,
@@ -52,20 +52,20 @@ pub struct Quartiles {
 /// One model of the sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Model {
-    /// Of its initial network.
+    /// Seed of its initial weights.
     pub seed: u64,
-    /// alpha or the first lambda; none in a model without a residual.
+    /// Weight alpha of the penalty, or the initial lambda; none for a model without a residual.
     pub alpha: Option<f64>,
     /// Prediction error on the training segments: mean of ||s' - s_hat'||^2.
     pub error: f64,
-    /// ||F_r||; 0 in a model without a residual.
+    /// ||F_r||; 0 for a model without a residual.
     pub residual_norm: f64,
     pub parameters: BTreeMap<String, f64>,
     pub diverged: bool,
 }
 
 impl Swept {
-    /// What came of the `trained` models of a sweep of `job`, one for each member, after `wall_s` seconds of training.
+    /// Summarises the `trained` models of a sweep of `job`, one per member, after `wall_s` seconds of training.
     pub fn new(job: &Job, members: &[Member], trained: Vec<Trained>, wall_s: f64) -> Self {
         let declared = job.model.declared();
         let fit = &job.recipe.fit;
@@ -109,7 +109,7 @@ impl Swept {
         }
     }
 
-    /// The outcome for people.
+    /// The results as a table for the terminal.
     pub fn text(&self) -> String {
         let Totals {
             models,
@@ -151,7 +151,7 @@ fn config(job: &Job) -> Value {
 }
 
 impl Quartiles {
-    /// None of an empty sample.
+    /// None for an empty sample.
     fn of(sample: impl Iterator<Item = f64>) -> Option<Self> {
         let sample: Vec<f64> = sample.collect();
         let [lower, median, upper] = (!sample.is_empty()).then(|| quartiles(&sample))?;

@@ -1,8 +1,7 @@
-//! Recipes: what to train on what data, in a text file; and the jobs that come of them, which can be
-//! interrupted and go on.
+//! Recipes: text files that say what to train on which data; and the jobs made from them, which can be interrupted and
+//! resumed.
 
 mod data;
-mod difference;
 mod error;
 mod file;
 mod job;
@@ -13,7 +12,6 @@ mod swept;
 mod tune;
 
 pub use data::{Data, Logged, Simulated};
-pub(crate) use difference::first_difference;
 pub use error::RecipeError;
 pub use file::{Kind, Recipe};
 pub use job::Job;

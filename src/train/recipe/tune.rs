@@ -2,18 +2,17 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::job::{declared, equations, fingerprint, new_network};
+use super::job::{declared, equations, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
 use crate::model::{LastLayer, Library, System};
 use crate::train::{Backend, Checkpoint, Origin};
 
 impl Job {
-    /// Fine-tune the model of a checkpoint on the recipe's data.
+    /// Fine-tunes the model of a checkpoint on the recipe's data.
     ///
-    /// All of the checkpoint's model keeps learning, at the recipe's rates. With `kind = "hybrid"` a
-    /// model without a residual is given one that starts as nothing, so that the checkpoint takes the
-    /// place of F_p; a residual that is there already goes on instead of getting a second beside it.
-    /// The other kinds add nothing, and must be what the checkpoint holds.
+    /// All parameters of the checkpoint's model are trained further, at the recipe's rates. With `kind = "hybrid"`, a model
+    /// without a residual is given one that is initially zero, so that the checkpoint takes the place of F_p; an existing
+    /// residual is trained further. The other kinds add nothing and must match the checkpoint.
     ///
     /// # Errors
     /// As [`Job::train`], or a checkpoint of another system or kind.
@@ -26,12 +25,12 @@ impl Job {
     ) -> Result<Self, RecipeError> {
         if !recipe.start.is_empty() || !recipe.hold.is_empty() {
             return Err(recipe.wrong(
-                "[start] and `hold` are for training from scratch; when tuning, the checkpoint says \
-                 them, so remove them"
+                "[start] and `hold` are for training from scratch; when tuning, the checkpoint \
+                 determines them; remove them"
                     .into(),
             ));
         }
-        // Only to refuse a checkpoint of another system: the equations come from beside the weights.
+        // Only to refuse a checkpoint of another system: the equations are those saved with the weights.
         let meant = equations(&declared(&recipe, library)?.system);
         let refused = |source| RecipeError::OtherModel {
             path: recipe.path.clone(),
@@ -43,7 +42,7 @@ impl Job {
         tuned(checkpoint, recipe, library, backend, seed)
     }
 
-    /// Fine-tune the model of a checkpoint on logs, as [`Recipe::for_logs`] says.
+    /// Fine-tunes the model of a checkpoint on logs with the recipe of [`Recipe::for_logs`].
     ///
     /// # Errors
     /// As [`Job::tune`].
@@ -80,7 +79,7 @@ fn tuned(
     let config = json!({
         "command": "tune",
         "recipe": recipe,
-        "data": fingerprint(&material),
+        "data": material.training.fingerprint(),
         "device": backend.name(),
         "from": {"config": manifest.config, "seed": manifest.seed, "epoch": manifest.epoch},
     });

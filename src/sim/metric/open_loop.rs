@@ -5,18 +5,19 @@ use rayon::prelude::*;
 use super::assessment::{Assessment, OpenLoop, WindowError};
 use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
-use crate::identify::{Window, initial_state};
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{Commands, PREDICTION_S, Point, RK4, Simulator, with_own_angles};
+use crate::sim::{
+    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
+};
 
-/// Windows side by side in one rollout.
+/// Windows that are integrated side by side.
 const LANES: usize = 8;
-/// A state beyond this (rad, or rad/s) is no motion of a rig.
+/// A prediction whose state exceeds this (rad, m, rad/s or m/s) has diverged.
 const SENSIBLE: f64 = 1e4;
-/// Halving the step may change no number by more than this share.
+/// Largest relative change of a number at which the substeps are short enough.
 const STEP_TOLERANCE: f64 = 1e-3;
-/// Steps are halved no further than this, in s.
+/// Substeps are halved down to this, in s.
 const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
 
 /// The open-loop error of `dynamics` with parameters `values` on `logs`. `values` may differ by log (own
@@ -79,7 +80,7 @@ fn run<'v>(
     horizons_s.iter().map(one).collect()
 }
 
-/// How many windows of `horizon_s` seconds the logs give.
+/// Number of windows of `horizon_s` seconds in the logs.
 pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
     logs.iter()
         .enumerate()
@@ -87,7 +88,7 @@ pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
         .sum()
 }
 
-/// The windows of one log: every half horizon from the first row that has enough before it.
+/// The windows of one log: one every half horizon, from the first row at which the state can be estimated.
 pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
     let slack = 1e-6 * horizon_s;
     let half_width = half_width_s(log.median_step());
@@ -119,7 +120,7 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
         .collect()
 }
 
-/// A log and a model at its values there.
+/// A log and the model at its values in that log.
 struct Replay<'l> {
     model: Point<'l>,
     commands: Commands<'l>,
@@ -188,7 +189,7 @@ impl WindowError {
         }
     }
 
-    /// Keep a state that left every sensible range at its edge: it counts as what it is, and stays a number.
+    /// Limit a state that has diverged, so that its error stays finite.
     fn hold(&mut self, state: &mut [Row<f64, LANES>], lane: usize) {
         for value in state.iter_mut() {
             let value = &mut value[lane];
@@ -203,7 +204,7 @@ impl WindowError {
         }
     }
 
-    /// Compare angles shown and velocities with a row of the log.
+    /// Add the errors of measured angles and velocities at a row of the log.
     fn add(
         &mut self,
         [angles, velocities]: [&[Row<f64, LANES>]; 2],

@@ -13,31 +13,31 @@ use crate::train::{FitSettings, LearningRates};
 const TUNING_EPOCHS: usize = 500;
 const TUNING_RATE: f64 = 0.003;
 
-/// What to train, from what start, on what data, and how.
+/// What to train, starting where, on which data, and how.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// A model file, as seen from the recipe, or the name of a built-in system.
+    /// A model file, relative to the recipe, or the name of a built-in system.
     pub model: PathBuf,
     pub kind: Kind,
-    /// Names of physical parameters that keep their values, besides those that the model file fixes.
+    /// Physical parameters to hold at their values, besides those that the model file fixes.
     #[serde(default)]
     pub hold: Vec<String>,
-    /// Values to start from, where they differ from those of the model file.
+    /// Initial values that differ from those of the model file.
     #[serde(default)]
     pub start: BTreeMap<String, f64>,
     pub data: Data,
-    /// The network F_r (or F, where there is nothing else); what the model file says where not given.
+    /// The network F_r (or F, if the model is a network alone); the model file's settings if not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<MlpSettings>,
     #[serde(default)]
     pub fit: FitSettings,
-    /// Where the recipe was read from.
+    /// The file that the recipe was read from.
     #[serde(skip)]
     pub path: PathBuf,
 }
 
-/// What a model is made of.
+/// The parts of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -59,7 +59,7 @@ impl Kind {
         }
     }
 
-    /// How the last layer of its network begins.
+    /// Initial weights of the last layer of its network.
     pub(super) fn last_layer(self) -> LastLayer {
         match self {
             Self::Hybrid | Self::Physics => LastLayer::Zero,
@@ -72,7 +72,7 @@ impl Recipe {
     /// Read a recipe.
     ///
     /// # Errors
-    /// Unreadable file, unknown key, values that contradict each other: with line and remedy.
+    /// An unreadable file, an unknown key, contradictory values: with line and remedy.
     pub fn read(path: &Path) -> Result<Self, RecipeError> {
         let text = std::fs::read_to_string(path).map_err(|source| RecipeError::Open {
             path: path.to_owned(),
@@ -81,7 +81,7 @@ impl Recipe {
         Self::from_text(path, &text)
     }
 
-    /// The recipe in `text`; files that it names are looked for beside `path`.
+    /// Parses the recipe in `text`; the files that it names are relative to `path`.
     ///
     /// # Errors
     /// As [`Recipe::read`].
@@ -96,8 +96,8 @@ impl Recipe {
         Ok(recipe)
     }
 
-    /// To fine-tune a model of `system` on logs: segments and integrator fit for rigs that are sampled
-    /// irregularly and finely, and steps small enough to keep what the model knows.
+    /// The recipe for fine-tuning a model of `system` on logs: segments and integrator suit rigs that are sampled finely
+    /// and irregularly, and the learning rates are low enough to keep what the model has learnt.
     pub fn for_logs(system: &str, logs: Vec<PathBuf>) -> Self {
         Self {
             model: system.into(),
@@ -120,7 +120,7 @@ impl Recipe {
         }
     }
 
-    /// Refuse what would be ignored in silence.
+    /// Refuses settings that would silently be ignored.
     fn check(&self) -> Result<(), String> {
         if self.kind == Kind::Physics && self.network.is_some() {
             return Err(
@@ -132,27 +132,12 @@ impl Recipe {
         let given = !self.start.is_empty() || !self.hold.is_empty();
         if self.kind == Kind::DataDriven && given {
             return Err(
-                "[start] and `hold` speak of physical parameters, but kind = \"data_driven\" has none; \
+                "[start] and `hold` are about physical parameters, but kind = \"data_driven\" has none; \
                  remove them, or take kind = \"hybrid\""
                     .into(),
             );
         }
         Ok(())
-    }
-
-    /// A file that the recipe names, as seen from here.
-    pub(super) fn beside(&self, file: &Path) -> PathBuf {
-        self.path.parent().unwrap_or(Path::new("")).join(file)
-    }
-
-    /// A file that the recipe names or, where there is none, the name as it is: that of something built in.
-    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        let beside = self.beside(file);
-        if beside.is_file() {
-            beside
-        } else {
-            file.to_owned()
-        }
     }
 
     /// Apply `[start]` and `hold`.

@@ -1,17 +1,18 @@
 use thiserror::Error;
 
+use super::{FitError, Shooting, fit};
 use crate::data::{Interval, Log};
 use crate::expr::Graph;
-use crate::identify::{FitError, Shooting, cut, fit};
 use crate::model::{Dynamics, Parameter};
+use crate::sim::cut;
 
-/// A model whose angles are read through sensors with a zero of their own in each log.
+/// A model with an unknown sensor offset per joint and log.
 #[derive(Debug, Clone)]
 pub struct Offsets {
     pub dynamics: Dynamics,
-    /// All parameters of that model, one list a log.
+    /// All parameters of that model, `[log][parameter]`.
     pub values: Vec<Vec<f64>>,
-    /// The offsets alone in rad (or m), `[log][joint]`.
+    /// The sensor offsets in rad (or m), `[log][joint]`.
     pub offsets: Vec<Vec<f64>>,
 }
 
@@ -30,10 +31,10 @@ pub enum CalibrateError {
     },
 }
 
-/// Windows in s over which offsets are estimated.
+/// Length in s of the windows over which offsets are estimated.
 const WINDOW_S: f64 = 0.5;
 
-/// Estimate each log's own sensor offsets on its first `fraction`, which is then left out of the log.
+/// Estimate the sensor offsets of each log on its first `fraction`, which is then left out of the log.
 ///
 /// # Errors
 /// A fraction outside of 0 to 1, or a beginning that is too short.
@@ -100,7 +101,7 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
     let mut parameters = dynamics.parameters.clone();
     let logged = inputs[..n].to_vec();
     for (joint, input) in inputs[..n].iter_mut().enumerate() {
-        // No formula can hold such a name, so none is taken.
+        // Names with spaces cannot occur in formulas, so this name is free.
         let name = format!("offset of q{}", joint + 1);
         let offset = graph.input(&name);
         *input = graph.sub(*input, offset);

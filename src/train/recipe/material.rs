@@ -1,50 +1,32 @@
 use std::path::PathBuf;
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-
 use super::data::{Data, Logged, Simulated};
 use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
+use crate::files::{beside, beside_or_named};
 use crate::model::{Library, System};
 use crate::plant::Plant;
+use crate::runs::{Purpose, stream};
 use crate::sim::as_modelled;
 use crate::train::{Segments, SegmentsError};
-
-/// What a seed is used for: each purpose draws from a stream of its own, so that more draws for one do
-/// not change the others.
-#[derive(Clone, Copy)]
-pub(super) enum Purpose {
-    Training,
-    Test,
-    Network,
-    Order,
-}
-
-/// The random numbers for one purpose.
-pub(super) fn stream(seed: u64, purpose: Purpose) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(purpose as u64);
-    rng
-}
 
 /// The data of a recipe, ready for training.
 pub struct Material {
     pub training: Segments,
-    /// As many other segments of the plant, to judge by; none with logs.
+    /// The same number of other segments of the plant, for testing; none with logs.
     pub test: Option<Segments>,
-    /// Name and true value of the parameters of a simulated plant.
+    /// Names and true values of the parameters of a simulated plant.
     pub truth: Vec<(String, f64)>,
-    /// What a reader of the logs should know, one sentence each.
+    /// Remarks on the logs, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl Material {
-    /// Read or draw the data.
+    /// Reads the logs or samples the plant.
     ///
     /// # Errors
-    /// Unreadable logs, another number of joints, a plant that diverges, logs that are too short.
+    /// Unreadable logs, logs that are too short, another number of joints, or a plant that diverges.
     pub fn gather(
         recipe: &Recipe,
         system: &System,
@@ -59,7 +41,8 @@ impl Material {
 }
 
 fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Material, RecipeError> {
-    let read = |path: &PathBuf| Log::read(recipe.beside(path), system.joints, &system.columns);
+    let read =
+        |path: &PathBuf| Log::read(beside(&recipe.path, path), system.joints, &system.columns);
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
         step_s: logged.step_s,
@@ -67,7 +50,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
     };
     let dynamics = equations(system);
     let modelled = |log: &Log| match recipe.kind {
-        // A network alone has no effects: it learns from what was commanded and shown.
+        // A network alone has no effects: it learns from the commanded torques and the sensor readings.
         Kind::DataDriven => log.clone(),
         Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, log),
     };
@@ -75,7 +58,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
     for log in &logs {
         let before = training.len();
         for trajectory in trajectories(&modelled(log), thinning) {
-            // A gap may leave a piece that holds no segment; a log without any is refused below.
+            // A piece between gaps may be too short for a segment; a log without any segment is refused below.
             if trajectory.time.len() > logged.steps {
                 push(&mut training, &trajectory).map_err(in_file(&log.path))?;
             }
@@ -109,7 +92,7 @@ fn from_plant(
         path: recipe.path.clone(),
         source,
     };
-    let path = recipe.beside_or_named(&simulated.plant);
+    let path = beside_or_named(&recipe.path, &simulated.plant);
     let plant = Plant::read(&path, library).map_err(of_plant)?;
     if plant.system.name != system.name || plant.system.joints != system.joints {
         return Err(recipe.wrong(format!(
@@ -128,8 +111,8 @@ fn from_plant(
     };
     let names = plant.system.parameters.iter().map(|p| p.name.clone());
     Ok(Material {
-        training: draw(Purpose::Training)?,
-        test: Some(draw(Purpose::Test)?),
+        training: draw(Purpose::RecipeTraining)?,
+        test: Some(draw(Purpose::RecipeTest)?),
         truth: names.zip(plant.parameters.iter().copied()).collect(),
         notes: Vec::new(),
     })

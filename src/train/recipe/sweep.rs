@@ -1,27 +1,27 @@
-use super::material::{Purpose, stream};
 use super::{Job, Kind, Recipe, RecipeError};
 use crate::model::MlpWeights;
+use crate::runs::{Purpose, stream};
 use crate::train::{Penalty, Start, Sweep};
 
-/// What one model of a sweep has of its own.
+/// What sets one model of a sweep apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Member {
-    /// Of its initial network and of the order of its minibatches.
+    /// Seed of its initial weights and of the order of its minibatches.
     pub seed: u64,
-    /// In place of the recipe's weight of the penalty.
+    /// Weight of the penalty; the recipe's own where there is none.
     pub alpha: Option<f64>,
 }
 
 impl Job {
-    /// A run of many models, all on the data of this job, in place of one. Each begins with the weights that a job of its
-    /// seed would draw.
+    /// Trains many models at once, all on the data of this job. Each starts from the weights that a job of its own seed
+    /// would draw.
     ///
     /// # Errors
-    /// A model without a network, in which nothing would differ; alphas where there is none; settings that are out of
-    /// range.
+    /// A model without a network, whose copies would all be equal; weights for a penalty that does not take them; settings
+    /// out of range.
     ///
     /// # Panics
-    /// When there are no members.
+    /// If `members` is empty.
     pub fn sweep(&self, members: &[Member]) -> Result<Sweep, RecipeError> {
         self.check(members)?;
         let made = self.model.frame().networks.last();
@@ -36,32 +36,33 @@ impl Job {
 
     fn start(&self, made: &MlpWeights, member: &Member) -> Start {
         let Recipe { kind, fit, .. } = &self.recipe;
-        let mut rng = stream(member.seed, Purpose::Network);
+        let mut rng = stream(member.seed, Purpose::RecipeNetwork);
         Start {
             network: made.redrawn(kind.last_layer(), &mut rng),
             penalty_weight: member.alpha.unwrap_or(fit.penalty.initial()),
-            order: stream(member.seed, Purpose::Order),
+            order: stream(member.seed, Purpose::RecipeOrder),
         }
     }
 
     fn check(&self, members: &[Member]) -> Result<(), RecipeError> {
         let Self { recipe, .. } = self;
         let with_alpha = members.iter().any(|member| member.alpha.is_some());
+        let no_alpha = |reason| RecipeError::NoAlpha {
+            path: recipe.path.clone(),
+            reason,
+        };
         match (recipe.kind, recipe.fit.penalty) {
             (Kind::Physics, _) => Err(recipe.wrong(
                 "kind = \"physics\" has no network, so that all models of a sweep would be the same; take kind = \
-                 \"hybrid\", or `residyn train`"
+                 \"hybrid\", or train one model"
                     .into(),
             )),
-            (Kind::DataDriven, _) if with_alpha => Err(recipe.wrong(
-                "alpha weighs the residual, and kind = \"data_driven\" has none; leave out --alpha, or take kind = \
-                 \"hybrid\""
-                    .into(),
+            (Kind::DataDriven, _) if with_alpha => Err(no_alpha(
+                "alpha weighs the residual, and kind = \"data_driven\" has none; take kind = \"hybrid\"",
             )),
-            (_, Penalty::Adaptive { .. }) if with_alpha => Err(recipe.wrong(
-                "[fit] has the adaptive penalty, which finds its weight itself; leave out --alpha, or take penalty = \
-                 { fixed = { alpha = 1e-4 } }"
-                    .into(),
+            (_, Penalty::Adaptive { .. }) if with_alpha => Err(no_alpha(
+                "[fit] has the adaptive penalty, which finds its weight itself; take penalty = \
+                 { fixed = { alpha = 1e-4 } }",
             )),
             _ => Ok(()),
         }
@@ -74,8 +75,8 @@ mod tests {
 
     use super::Member;
     use crate::model::Library;
-    use crate::recipe::{Job, Recipe};
     use crate::train::Backend;
+    use crate::train::recipe::{Job, Recipe};
 
     #[test]
     fn a_member_begins_with_the_weights_of_its_own_job() {

@@ -7,7 +7,7 @@ use super::{Job, Kind};
 use crate::model::HybridModel;
 use crate::train::{Objective, Segments, TrainError, Training};
 
-/// What came of a run, as `--json` prints it.
+/// The results of a training.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     pub schema: u32,
@@ -16,20 +16,20 @@ pub struct Outcome {
     pub epochs: usize,
     /// Training segments.
     pub segments: usize,
-    /// What was minimised, at the end.
+    /// Final value of the objective.
     pub loss: f64,
     /// Prediction error on the training segments: mean of ||s' - s_hat'||^2.
     pub error: Change,
-    /// The same on as many other segments of the plant; none with logs.
+    /// The same on test segments of the plant; none with logs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub test_error: Option<Change>,
-    /// ||F_r||; 0 in a model without a residual.
+    /// ||F_r||; 0 for a model without a residual.
     pub residual_norm: Change,
     pub parameters: Vec<Learnt>,
     pub checkpoint: PathBuf,
 }
 
-/// A number before and after training.
+/// A quantity before and after training.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Change {
     pub before: f64,
@@ -43,18 +43,18 @@ pub struct Learnt {
     pub unit: String,
     pub start: f64,
     pub found: f64,
-    /// Of a simulated plant.
+    /// True value, if the plant is simulated.
     #[serde(rename = "true", skip_serializing_if = "Option::is_none")]
     pub truth: Option<f64>,
-    /// Held at its start.
+    /// Whether it was held at its initial value.
     pub held: bool,
 }
 
 impl Job {
-    /// What came of a run of this job; `dir` is where its checkpoint lies.
+    /// The results of a training of this job, whose checkpoint is in `dir`.
     ///
     /// # Errors
-    /// A test error that cannot be computed: settings that do not fit the model.
+    /// Settings that do not match the model, so that the test error cannot be computed.
     pub fn outcome(&self, training: &Training, dir: &Path) -> Result<Outcome, TrainError> {
         let model = training.result()?;
         let history = training.history();
@@ -116,7 +116,7 @@ fn error_on(model: &HybridModel, run: &Training, segments: &Segments) -> Result<
 }
 
 impl Outcome {
-    /// The outcome for people.
+    /// The results as a table for the terminal.
     pub fn text(&self) -> String {
         let mut out = format!(
             "{}, {}: {} epochs on {} segments\n",

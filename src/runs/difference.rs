@@ -1,12 +1,16 @@
 use serde_json::Value;
 
-/// The first place within `place`, in order of keys, where two configurations differ, in words.
-pub(crate) fn first_difference(place: &str, saved: &Value, mine: &Value) -> Option<String> {
+/// The first place, in order of keys, where two configurations differ, in words; `place` is the path so far, empty at the
+/// top.
+pub(super) fn first_difference(place: &str, saved: &Value, mine: &Value) -> Option<String> {
     if let (Value::Object(saved), Value::Object(mine)) = (saved, mine) {
         let keys = saved.keys().chain(mine.keys());
         return keys
             .filter_map(|key| {
-                let place = format!("{place}.{key}");
+                let place = match place {
+                    "" => key.clone(),
+                    place => format!("{place}.{key}"),
+                };
                 let of = |map: &serde_json::Map<String, Value>| {
                     map.get(key).cloned().unwrap_or(Value::Null)
                 };
@@ -34,8 +38,8 @@ mod tests {
         );
         let more = json!({"seed": 1, "fit": {"epochs": 40, "integrator": "rk4"}, "from": 3});
         assert_eq!(
-            first_difference("run", &saved, &more).unwrap(),
-            "its `run.from` is null, here it is 3"
+            first_difference("", &saved, &more).unwrap(),
+            "its `from` is null, here it is 3"
         );
     }
 }

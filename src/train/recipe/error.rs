@@ -3,18 +3,22 @@ use std::path::PathBuf;
 use crate::data::LogError;
 use crate::model::{FileError, HybridError};
 use crate::plant::PlantError;
+use crate::runs::RunFolderError;
 use crate::train::{CheckpointError, SegmentsError, TrainError};
 
 /// Why a recipe cannot be carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum RecipeError {
-    #[error("{path}: cannot be read: {source}; give a recipe with --config", path = .path.display())]
+    #[error("{path}: cannot be read: {source}", path = .path.display())]
     Open {
         path: PathBuf,
         source: std::io::Error,
     },
     #[error("{path}: {message}", path = .path.display())]
     File { path: PathBuf, message: String },
+    /// Weights of the penalty were given to a recipe that cannot use them.
+    #[error("{path}: {reason}", path = .path.display())]
+    NoAlpha { path: PathBuf, reason: &'static str },
     #[error("{path}: [data]: {source}", path = .path.display())]
     Plant { path: PathBuf, source: PlantError },
     #[error("{path}: {source}", path = .path.display())]
@@ -27,12 +31,8 @@ pub enum RecipeError {
         path: PathBuf,
         source: Box<CheckpointError>,
     },
-    #[error(
-        "{dir} holds the checkpoint of another run: {difference}; give another folder with --out, or \
-         remove this one to start anew",
-        dir = .dir.display()
-    )]
-    OtherRun { dir: PathBuf, difference: String },
+    #[error("{0}")]
+    Folder(#[from] RunFolderError),
     #[error(transparent)]
     Model(#[from] FileError),
     #[error(transparent)]

@@ -1,7 +1,8 @@
 use crate::data::{Log, half_width_s};
-use crate::identify::{Window, initial_state};
 use crate::model::Dynamics;
-use crate::sim::{Commands, PREDICTION_S, Point, RK4, Simulator, with_own_angles};
+use crate::sim::{
+    Commands, PREDICTION_S, Point, RK4, Simulator, Window, initial_state, with_own_angles,
+};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]
@@ -11,13 +12,12 @@ pub struct Trace {
     pub q: Vec<Vec<f64>>,
 }
 
-/// Predictions of `horizon_s` seconds one after the other along a log, each started from the log: what a
-/// picture of an open-loop error shows.
+/// Consecutive predictions of `horizon_s` seconds along a log, each started from the log, for pictures.
 pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) -> Vec<Trace> {
     let model = Point::new(dynamics, values);
     let commands = Commands::of_log(&model, log);
     let own = with_own_angles(&model, log);
-    // Windows for the error overlap by half; a picture wants each second one.
+    // The windows of the error overlap by half: every second one covers the log once.
     super::open_loop::windows(0, log, horizon_s)
         .iter()
         .step_by(2)
