@@ -129,7 +129,7 @@ impl Work {
         let rng = ChaCha8Rng::seed_from_u64(4);
         let planner = Planner::new(&settings, &bounds, || rollouts.block(), &rng);
         let start = Start::new(&vec![0.1; 2 * self.joints], 0.0);
-        planner.helped(|| {
+        planner.with_workers(|| {
             best(|| {
                 planner.forget();
                 seconds(|| drop(planner.plan(start.clone())))

@@ -54,7 +54,6 @@ pub mod model;
 pub mod plan;
 pub mod plant;
 pub mod report;
-pub mod rounds;
 pub mod runs;
 pub mod sim;
 pub mod train;

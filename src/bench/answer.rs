@@ -55,7 +55,7 @@ fn named(finding: &Finding) -> Named {
             .chain(single)
             .collect(),
         p_value: finding.p_value,
-        error_reduction: finding.error_reduction,
+        error_reduction: finding.error_reduction.as_ref().ok().copied(),
     }
 }
 

@@ -15,9 +15,6 @@ use crate::data::{Log, LogError};
 use crate::files::content_hash;
 use crate::model::{Library, System};
 
-/// Errors are compared at the middle one \[s\].
-const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
-
 /// The result of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
@@ -104,7 +101,7 @@ impl Cell {
             errors: Errors {
                 before: outcome.errors.before.position_rms(),
                 after: outcome.errors.after.position_rms(),
-                told: told(&system, library, &split, &self.effects, &HORIZONS_S),
+                told: told(&system, library, &split, &self.effects),
             },
             truth,
             answer,

@@ -36,7 +36,7 @@ pub struct Named {
     pub parameters: Vec<Estimate>,
     pub p_value: f64,
     /// Share of the error that comes back without it.
-    pub error_reduction: f64,
+    pub error_reduction: Option<f64>,
 }
 
 /// The outcome of closing the loop.
@@ -145,7 +145,7 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
     let weak: Vec<Label> = answer
         .named
         .iter()
-        .filter(|effect| effect.error_reduction < HALF)
+        .filter(|effect| effect.error_reduction.is_none_or(|share| share < HALF))
         .map(labels)
         .collect();
     let passed = match group {
@@ -247,7 +247,7 @@ mod tests {
             label: label.to_owned(),
             parameters: values.iter().map(estimate).collect(),
             p_value: 1e-6,
-            error_reduction,
+            error_reduction: Some(error_reduction),
         }
     }
 

@@ -1,20 +1,15 @@
 //! The fit of the true structure: the best that any search could reach.
 
 use super::hidden::Hidden;
-use crate::closeloop::{Split, Study};
+use crate::closeloop::{Settings, Split, Study};
 use crate::model::{FittedEffect, Library, System};
 use crate::sim::metric::{Assessment, assess};
 
 /// Error of the model with the true effects, fitted from their true values to the logs that the search had:
 /// position, all joints together, at the middle horizon \[rad\]. `None` where the library lacks one of them.
-pub fn told(
-    system: &System,
-    library: &Library,
-    split: &Split,
-    effects: &[Hidden],
-    horizons_s: &[f64],
-) -> Option<f64> {
-    let mut study = Study::new(system, &split.train);
+pub fn told(system: &System, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
+    let settings = Settings::default();
+    let mut study = Study::new(system, &split.train, &settings);
     let declared = study.fit_declared().ok()?;
     let truth: Vec<FittedEffect> = effects
         .iter()
@@ -24,7 +19,12 @@ pub fn told(
     let model = study.refit(&truth, &declared.declared, locals, None).ok()?;
     let tests = split.test.iter();
     let values: Vec<Vec<f64>> = tests.map(|log| model.values_in(log)).collect();
-    let errors: Assessment = assess(&model.dynamics, |log| &values[log], &split.test, horizons_s);
+    let errors: Assessment = assess(
+        &model.dynamics,
+        |log| &values[log],
+        &split.test,
+        &settings.score.horizons_s,
+    );
     Some(errors.position_rms())
 }
 

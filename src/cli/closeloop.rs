@@ -7,7 +7,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Answer, Common, inputs, progress};
-use crate::closeloop::{Outcome, Reference, Request, Split, Stage, Verdict, calibrate, close_loop};
+use crate::closeloop::{
+    Outcome, Reference, Request, Settings, Split, Stage, Verdict, calibrate, close_loop,
+};
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, System};
 use crate::plant::Plant;
@@ -112,7 +114,7 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(S
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     inputs::print_notes(train.iter().chain(&test));
     let split = if test.is_empty() {
-        Split::of(train)
+        Split::of(train, &Settings::default().split)
     } else {
         Split::given(train, test)
     };
@@ -130,7 +132,10 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
         .map(record)
         .collect::<Result<Vec<_>>>()?;
     // What the plant hides stays with the plant: the loop gets the declared model and the logs.
-    Ok((plant.declared(), Split::of(logs)))
+    Ok((
+        plant.declared(),
+        Split::of(logs, &Settings::default().split),
+    ))
 }
 
 /// Models that predict the same joints, in the same units.

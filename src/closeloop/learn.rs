@@ -1,6 +1,5 @@
 //! Stage 8: train a small network on what the refined model leaves.
 
-use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use rand::{Rng, SeedableRng};
@@ -10,6 +9,7 @@ use thiserror::Error;
 use super::fitted::Fitted;
 use super::per_log::joined;
 use super::refine::Refined;
+use super::settings::LearnSettings;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
@@ -18,19 +18,6 @@ use crate::model::{
 };
 use crate::sim::{Integrator, Point, as_modelled};
 use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
-
-/// Rows nearer than this (s) are put together: the network is to learn a force, not the encoder's noise.
-const STEP_S: f64 = 0.01;
-/// Steps that a segment unrolls.
-const STEPS: usize = 8;
-/// About as many segments are enough for a network of some hundred weights.
-const SEGMENTS: usize = 1200;
-/// One stretch of this length (s) in every [`EVERY`] is kept to choose the epoch.
-const STRETCH_S: f64 = 2.0;
-const EVERY: usize = 5;
-const EPOCHS: usize = 250;
-/// The penalty on the network's size: it takes over only what pays for it.
-const ALPHA: f64 = 1e-3;
 
 /// A run that trained the residual network, for its checkpoint, and the hybrid that came of it.
 pub struct Learned {
@@ -66,7 +53,11 @@ pub(super) fn learn(
     };
     let hybrid = untrained(study, model, &training, backend, rng)?;
     // Training takes numbers from a stream of its own, which its checkpoint carries on.
-    let mut run = Training::new(hybrid, fit_settings(), ChaCha8Rng::from_rng(rng))?;
+    let mut run = Training::new(
+        hybrid,
+        fit_settings(&study.settings.learn),
+        ChaCha8Rng::from_rng(rng),
+    )?;
     run.run(&training, Some(&validation), &mut |at| {
         let text = format!(
             "{}, epoch {} of {}",
@@ -106,27 +97,30 @@ fn untrained(
     Ok(HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?)
 }
 
-fn fit_settings() -> FitSettings {
+fn fit_settings(settings: &LearnSettings) -> FitSettings {
     FitSettings {
-        epochs: EPOCHS,
+        epochs: settings.epochs,
         learning_rates: LearningRates {
             physics: 0.0,
-            residual: 0.003,
+            residual: settings.learning_rate,
             ..LearningRates::default()
         },
-        penalty: Penalty::Fixed { alpha: ALPHA },
+        penalty: Penalty::Fixed {
+            alpha: settings.alpha,
+        },
         integrator: Integrator::RK4,
-        record_every: NonZeroUsize::new(10).expect("not zero"),
+        record_every: settings.record_every,
         ..FitSettings::default()
     }
 }
 
-/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees what
-/// the model does.
+/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network's inputs are the
+/// model's own angles and torques.
 fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
+    let settings = &study.settings.learn;
     let thinning = Thinning {
-        step_s: STEP_S,
-        length_s: STRETCH_S,
+        step_s: settings.step_s,
+        length_s: settings.stretch_s,
     };
     let of_log = |(k, log): (usize, &Log)| {
         let point = Point::new(&model.dynamics, model.fit.values_of_log(k));
@@ -135,14 +129,14 @@ fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
     let logs = study.logs.iter().enumerate();
     let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
     let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
-    let stride = (rows / SEGMENTS).max(1);
+    let stride = (rows / settings.segments).max(1);
     let mut sets = [
-        Segments::new(study.system.joints, STEPS),
-        Segments::new(study.system.joints, STEPS),
+        Segments::new(study.system.joints, settings.steps),
+        Segments::new(study.system.joints, settings.steps),
     ];
     for (index, stretch) in stretches.iter().enumerate() {
-        let set = &mut sets[usize::from(index % EVERY == EVERY - 1)];
-        // A stretch that is too short holds no segment; that is no error here.
+        let set = &mut sets[usize::from(index % settings.every == settings.every - 1)];
+        // A stretch too short for a segment is skipped.
         let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
     }
     let [training, validation] = sets;

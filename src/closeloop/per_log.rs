@@ -1,5 +1,5 @@
-//! Values that single logs have of their own, on the way between effects, which name logs, and fits, which count
-//! them.
+//! Values of single logs, translated between effects, which refer to logs by name, and fits, which refer to them by
+//! index.
 
 use std::ops::Range;
 

@@ -7,7 +7,7 @@ const MOST_LINKS: usize = 40;
 
 /// An output file that cannot be written. What was there before is unchanged, and no part of the new file is left.
 #[derive(Debug, thiserror::Error)]
-#[error("{path} cannot be written: {source}", path = .path.display())]
+#[error("{path}: cannot be written: {source}", path = .path.display())]
 pub struct OutputError {
     pub path: PathBuf,
     pub source: io::Error,
@@ -133,7 +133,7 @@ mod tests {
             Err(io::Error::other("the disk is full"))
         });
         let told = broken.unwrap_err().to_string();
-        assert!(told.ends_with("a.txt cannot be written: the disk is full"));
+        assert!(told.ends_with("a.txt: cannot be written: the disk is full"));
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         let missing = write_whole(&folder.path().join("none/a.txt"), b"").unwrap_err();

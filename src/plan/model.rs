@@ -1,7 +1,7 @@
 use super::Evaluate;
 use crate::sim::batch::{Block, Rows};
 
-/// Where a plan starts: a state (positions, then velocities), a time, and the torques that were commanded before.
+/// Initial condition of a plan: state (positions, then velocities), time, and the torques commanded before.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     state: Vec<f32>,
@@ -11,7 +11,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// In f64, as the rest of the program has it. No torque was commanded before.
+    /// From f64; no torque was commanded before.
     pub fn new(state: &[f64], time_s: f64) -> Self {
         Self::after(state, time_s, &[])
     }
@@ -29,7 +29,7 @@ impl Start {
     }
 }
 
-/// A start, and what is left there of the torques before it.
+/// An initial condition with the part of the acting torques that earlier commands cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prepared {
     start: Start,

@@ -95,7 +95,8 @@ fn effect(finding: &Finding) -> EffectEntry {
         expression: finding.expression.clone(),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
-        error_reduction: finding.error_reduction,
+        error_reduction: finding.error_reduction.as_ref().ok().copied(),
+        error_reduction_failure: (finding.error_reduction.as_ref().err()).map(ToString::to_string),
     }
 }
 
@@ -147,7 +148,7 @@ fn alternative(alternative: &Alternative) -> AlternativeEntry {
         effects: alternative.effects.iter().map(effect_name).collect(),
         reason: alternative.reason.clone(),
         experiment: alternative.experiment(),
-        separation: alternative.separation.clone(),
+        separation: alternative.separation.clone().ok(),
     }
 }
 

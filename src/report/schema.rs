@@ -77,9 +77,13 @@ pub(super) struct EffectEntry {
     pub parameters: Vec<ParameterEntry>,
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
-    /// share of the position error that this effect alone takes away; negative where it adds
+    /// share of the position error that this effect alone takes away; negative where it adds; null where the refit
+    /// without the effect failed
     #[schemars(range(max = 1))]
-    pub error_reduction: f64,
+    pub error_reduction: Option<f64>,
+    /// why that refit failed
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_reduction_failure: Option<String>,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]

@@ -1,4 +1,4 @@
-//! Stage 10: what some logs could show: how often the search names an effect where there is none, and how small an effect
+//! Stage 10: what some logs can show: how often the search names an effect where there is none, and how small an effect
 //! it would name.
 
 mod detection_limit;
@@ -20,20 +20,20 @@ use crate::data::Log;
 use crate::data::statistics::wilson;
 use crate::model::{FittedEffect, Library, System};
 
-/// What the search makes of logs simulated from the accepted model, with the torques and the noise of the user's.
+/// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// What was named in each simulation of the accepted model: every one a false alarm.
     pub named: Vec<Vec<FittedEffect>>,
-    /// In how many of them something was left that nothing explains.
+    /// Number of them with a significant unexplained remainder.
     pub unexplained: usize,
     pub limits: Vec<DetectionLimit>,
+    /// Effects were hidden at this multiple of their smallest size.
+    pub hidden: f64,
     /// Of each joint in the training logs.
     pub top_torque: Vec<f64>,
 }
 
-/// Effects are hidden at this multiple of their smallest size.
-pub const HIDDEN: f64 = 1.5;
 /// Effects that are hidden: those that most rigs have.
 const COMMON: [&str; 4] = [
     "viscous_friction",
@@ -61,13 +61,13 @@ impl Calibration {
 }
 
 /// The effect to hide, if it is one of those that are.
-fn hidden(limit: &DetectionLimit) -> Option<FittedEffect> {
+fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
     let Smallest::Detectable { switch, values } = &limit.smallest else {
         return None;
     };
     let mut hidden = limit.effect.clone();
     hidden.values = values.iter().map(|value| (*value, None)).collect();
-    hidden.values[*switch].0 *= HIDDEN;
+    hidden.values[*switch].0 *= multiple;
     COMMON
         .contains(&hidden.effect.name.as_str())
         .then_some(hidden)
@@ -96,7 +96,10 @@ pub fn calibrate(
 ) -> Result<Calibration, StudyError> {
     let simulated = SimulatedLogs::new(study, accepted)?;
     let mut limits = detection_limits(study, accepted, library.effects())?;
-    let tried = limits.iter().filter(|limit| hidden(limit).is_some());
+    let multiple = study.settings.calibrate.hidden;
+    let tried = limits
+        .iter()
+        .filter(|limit| hidden(limit, multiple).is_some());
     let mut repeat = Repeat {
         study,
         library,
@@ -119,7 +122,7 @@ pub fn calibrate(
         named.push(repeat.named(&found));
     }
     for limit in &mut limits {
-        if let Some(effect) = hidden(limit)
+        if let Some(effect) = hidden(limit, multiple)
             && let Some(logs) = simulated.draw(&[effect], rng)
         {
             let text = format!("simulation with {}", limit.effect.label());
@@ -131,6 +134,7 @@ pub fn calibrate(
         named,
         unexplained,
         limits,
+        hidden: multiple,
         top_torque: study.top_torque.clone(),
     })
 }
@@ -145,7 +149,7 @@ fn declared(system: &System, accepted: &Fitted) -> System {
     declared
 }
 
-/// The whole search, once again and again.
+/// Repeats the whole search.
 struct Repeat<'a> {
     study: &'a Study<'a>,
     library: &'a Library,

@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
 use crate::data::Audit;
 use crate::data::statistics::{deviation, mean};
@@ -18,7 +19,7 @@ pub struct Omnibus {
     pub p_value: f64,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
     pub shares: Vec<f64>,
-    /// What of the declared model's residual variance above noise is still there.
+    /// Share of the declared model's residual variance above noise that remains.
     pub fraction: f64,
 }
 
@@ -32,22 +33,15 @@ impl Omnibus {
     }
 }
 
-/// Waves over a window with up to so many half periods are smooth: a force that a model lacks reaches the
-/// positions through two integrations, so that little of it is left in faster ones.
-const SMOOTH: usize = 6;
-/// Logs of pure noise that the residuals are compared with.
-const SIMULATED: usize = 999;
-/// A start state is varied by this share of a radian (or m) and of a radian (or m) per second: small against
-/// what a model's curvature shows, large against rounding.
-const VARIED: f64 = 1e-5;
-
 /// Compare, window by window, the share of the residuals' energy that is smooth in time with that of noise of the
 /// sensor, rounded as the sensor rounds, passed through the same fit of start states. The share of a window
 /// does not depend on how large the noise is, and one bad reading raises it no more than any noise does.
 pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
     let of_residuals = |windows: &[Window]| Energies::of(windows, |window| window.residual.clone());
     let windows = windows(study, after);
-    let seeds: Vec<u64> = (0..SIMULATED).map(|_| rng.random()).collect();
+    let seeds: Vec<u64> = (0..study.settings.remainder.noise_draws)
+        .map(|_| rng.random())
+        .collect();
     let declared = of_residuals(&self::windows(study, before));
     let found = of_residuals(&windows);
     let simulated: Vec<Energies> = seeds
@@ -67,7 +61,7 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
     #[allow(clippy::cast_precision_loss)] // a thousand
     let as_smooth = simulated.iter().filter(|s| excess(s) >= bar).count() as f64;
     #[allow(clippy::cast_precision_loss)]
-    let trials = SIMULATED as f64;
+    let trials = simulated.len() as f64;
     let noise: Vec<f64> = (0..joints).map(|j| nulls[j].noise(&found, j)).collect();
     // In units of the sensors' noise, so that joints can be added.
     let above = |energies: &Energies| -> f64 {
@@ -85,12 +79,12 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
     }
 }
 
-/// One window: its residual, and what the test needs to know of the fit and the sensor there.
+/// The residual of one window, with the fit and the sensor there.
 struct Window {
     joints: usize,
     /// In m or rad, `[row * joints + joint]`.
     residual: DVector<f64>,
-    /// What changes of the start state can do to the residual: orthonormal columns.
+    /// Basis of the residual's changes with the start state: orthonormal columns.
     absorbed: DMatrix<f64>,
     /// Smooth waves over the rows of the window: orthonormal columns.
     waves: DMatrix<f64>,
@@ -101,6 +95,11 @@ struct Window {
 }
 
 fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
+    let RemainderSettings {
+        slow_waves,
+        start_step,
+        ..
+    } = study.settings.remainder;
     let joints = study.system.joints;
     let shooting = &study.shooting;
     let found = model.fit.found();
@@ -110,7 +109,7 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
         .map(|k| {
             let mut locals = model.fit.locals.clone();
-            locals.iter_mut().for_each(|local| local[k] += VARIED);
+            locals.iter_mut().for_each(|local| local[k] += start_step);
             residuals(&locals)
         })
         .collect();
@@ -133,7 +132,7 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
                 positions: DVector::from_fn(size, |i, _| read(i) + residual[i]),
                 residual,
                 absorbed: slopes.qr().q(),
-                waves: waves(rows),
+                waves: waves(rows, slow_waves),
                 sensor: sensors[window.log].clone(),
             }
         })
@@ -147,7 +146,7 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
         let sensor = |j: usize| {
             let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
             let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
-            // Where the audit sees neither, any noise will do: shares do not depend on its size.
+            // Where the audit finds neither, any noise will do: shares do not depend on its size.
             [
                 if step > 0.0 {
                     noise
@@ -163,10 +162,10 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
 }
 
 /// The slowest waves of the discrete cosine transform of so many rows, at most half of all.
-fn waves(rows: usize) -> DMatrix<f64> {
+fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
     #[allow(clippy::cast_precision_loss)] // few rows
     let count = rows as f64;
-    DMatrix::from_fn(rows, (SMOOTH + 1).min(rows / 2), |row, wave| {
+    DMatrix::from_fn(rows, (slow + 1).min(rows / 2), |row, wave| {
         #[allow(clippy::cast_precision_loss)]
         let phase = PI * wave as f64 * (row as f64 + 0.5) / count;
         phase.cos() * ((if wave == 0 { 1.0 } else { 2.0 }) / count).sqrt()
@@ -174,9 +173,9 @@ fn waves(rows: usize) -> DMatrix<f64> {
 }
 
 impl Window {
-    /// What the sensor adds to the model's positions.
+    /// A draw of the error that the sensor adds to the model's positions.
     fn noise(&self, rng: &mut impl Rng) -> DVector<f64> {
-        // Where within a step of the encoder the zero lies is not known to the fraction that matters.
+        // The zero's place within a step of the encoder is unknown.
         let phases: Vec<f64> = (0..self.joints).map(|_| rng.random()).collect();
         DVector::from_fn(self.positions.len(), |i, _| {
             let [noise, step] = self.sensor[i % self.joints];
@@ -192,7 +191,7 @@ impl Window {
         })
     }
 
-    /// Smooth and whole energy of what the fit of the start state leaves of `signal`, one each a joint.
+    /// Slow and total energy of what the fit of the start state leaves of `signal`, one each a joint.
     fn energies(&self, signal: &DVector<f64>) -> Vec<[f64; 2]> {
         let left = signal - &self.absorbed * (self.absorbed.tr_mul(signal));
         (0..self.joints)
@@ -259,7 +258,7 @@ impl NoiseShare {
         }
     }
 
-    /// In deviations.
+    /// In standard deviations.
     fn excess(&self, share: f64) -> f64 {
         (share - self.mean) / self.deviation.max(f64::MIN_POSITIVE)
     }

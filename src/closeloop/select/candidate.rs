@@ -19,7 +19,7 @@ pub fn candidates(
     all
 }
 
-/// Every one of these effects on every joint where it can act and be seen.
+/// These effects on every joint where each can act and be observed.
 pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in effects {
@@ -38,7 +38,7 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     all
 }
 
-/// Effects of the torque cannot be seen where there is none.
+/// Effects of the torque cannot be observed where there is none.
 fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
     !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
 }
@@ -60,8 +60,8 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     points.into_iter().map(at).collect()
 }
 
-/// The starting point of a candidate that promises most beside the model at hand, and the cost it promises: found
-/// on a sample of the windows where there are several, and asked of all of them.
+/// The starting point of a candidate with the largest predicted decrease beside a model, and the predicted cost: chosen
+/// on a sample of the windows where there are several, and predicted on all of them.
 pub fn best_start(
     study: &Study<'_>,
     model: &Fitted,
@@ -84,7 +84,7 @@ pub fn best_start(
     Some((start, cost))
 }
 
-/// The cost that a candidate promises on some windows.
+/// The cost of some windows that one Gauss-Newton step predicts for a candidate.
 fn promised(
     study: &Study<'_>,
     shooting: &Shooting<'_>,

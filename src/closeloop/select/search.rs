@@ -3,22 +3,24 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::candidate::{beside, best_start, candidates, starts};
-use super::evidence::{Evidence, PLAIN, WORTHWHILE};
+use super::evidence::Evidence;
 use super::folds::{folds, left_out_losses};
 use super::simpler::simpler;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::stage::{Progress, Stage};
 use crate::closeloop::study::Study;
+use crate::identify::FitError;
 use crate::model::{Effect, EffectParameter, FittedEffect};
 
-/// One look at a model: what was tried beside the effects that it has, best first.
+/// One round of the search: the candidates tried beside the effects of a model, best first.
 #[derive(Debug, Clone)]
 pub struct Round {
-    /// Number of candidates that were looked at.
+    /// Number of candidates that were screened.
     pub candidates: usize,
-    /// Those that promised most, fitted, best first.
+    /// Those with the largest predicted decrease, fitted, best first.
     pub evidence: Vec<Evidence>,
-    /// Index of the one that the evidence is for.
+    /// Index of the one that is admitted.
     pub chosen: Option<usize>,
 }
 
@@ -41,17 +43,7 @@ impl Rival {
     }
 }
 
-/// Probability of a false alarm that a look admits, over all candidates and all their starting points.
-pub const FALSE_ALARM: f64 = 0.05;
-/// Few stretches cannot prove so much. There an effect is admitted that plainly helps if it alone is this
-/// significant.
-pub const SIGNIFICANT_ALONE: f64 = 0.01;
-/// Candidates that are fitted after all have been screened.
-const FITTED: usize = 8;
-/// Effects that one search adds at most.
-pub const MOST_EFFECTS: usize = 6;
-
-/// Effects of a model whatever their order.
+/// The effects of a model, in no particular order.
 type Key = Vec<String>;
 
 fn key(effects: &[FittedEffect]) -> Key {
@@ -60,22 +52,22 @@ fn key(effects: &[FittedEffect]) -> Key {
     key
 }
 
-/// A search for the effects that a model lacks, and what it has seen so far.
+/// A search for the effects that a model lacks, with the rounds so far.
 pub struct Search<'a, 'p> {
     study: &'a Study<'a>,
     library: &'a [Effect],
     folds: Vec<usize>,
-    /// What has been looked at, by the effects of the model.
-    looks: HashMap<Key, Round>,
-    /// Models that the search has passed through.
+    /// Rounds so far, by the effects of the model.
+    known_rounds: HashMap<Key, Round>,
+    /// Models that the search has visited.
     passed: Vec<Key>,
-    /// What was looked at to add one more effect, in this order.
+    /// The rounds that were to add one more effect, in their order.
     pub rounds: Vec<Round>,
     progress: &'p mut dyn FnMut(Progress<'_>),
 }
 
 impl<'a, 'p> Search<'a, 'p> {
-    /// `progress` is told what is being tried.
+    /// `progress` hears what is being tried.
     pub fn new(
         study: &'a Study<'a>,
         library: &'a [Effect],
@@ -84,8 +76,8 @@ impl<'a, 'p> Search<'a, 'p> {
         Self {
             study,
             library,
-            folds: folds(&study.shooting),
-            looks: HashMap::new(),
+            folds: folds(study),
+            known_rounds: HashMap::new(),
             passed: Vec::new(),
             rounds: Vec::new(),
             progress,
@@ -94,26 +86,29 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
     /// then exchange, simplify and remove until each effect is the best choice beside all others.
-    pub fn select(&mut self, declared: Fitted) -> Fitted {
+    ///
+    /// # Errors
+    /// A selected model that cannot be fitted again.
+    pub fn select(&mut self, declared: Fitted) -> Result<Fitted, FitError> {
         let mut model = declared;
-        while model.effects.len() < self.declared() + MOST_EFFECTS {
-            let round = self.look(&model, None);
+        while model.effects.len() < self.declared() + self.study.settings.select.most_effects {
+            let round = self.round(&model, None);
             self.rounds.push(round.clone());
             let next = match round.chosen {
                 Some(chosen) => Some(round.evidence[chosen].model.clone()),
                 None => self.exchanged(&model),
             };
             let Some(next) = next else { break };
-            let next = self.simplified(self.rescaled(&next));
+            let next = self.simplified(self.rescaled(&next)?);
             if self.has_passed(&next) {
                 break;
             }
             model = next;
         }
-        model
+        Ok(model)
     }
 
-    /// Tell what is being done.
+    /// Report progress.
     pub fn tell(&mut self, progress: Progress<'_>) {
         (self.progress)(progress);
     }
@@ -129,18 +124,19 @@ impl<'a, 'p> Search<'a, 'p> {
         known
     }
 
-    /// Weigh what could join `model`; `wanted` is among the candidates whatever it promises.
-    fn look(&mut self, model: &Fitted, wanted: Option<&FittedEffect>) -> Round {
+    /// Fit and rank the candidates that could join `model`; `wanted` is among them whatever its predicted decrease.
+    fn round(&mut self, model: &Fitted, wanted: Option<&FittedEffect>) -> Round {
         let at = key(&model.effects);
         let is_wanted = |c: &FittedEffect| wanted.is_some_and(|wanted| wanted.label() == c.label());
-        if let Some(known) = self.looks.get(&at)
+        if let Some(known) = self.known_rounds.get(&at)
             && (wanted.is_none() || known.evidence.iter().any(|e| is_wanted(&e.effect)))
         {
             return known.clone();
         }
         let all = candidates(self.study, self.library, &model.effects);
         let mut screened = self.screened(model, &all);
-        let rest = screened.split_off(FITTED.min(screened.len()));
+        let fitted = self.study.settings.select.fitted;
+        let rest = screened.split_off(fitted.min(screened.len()));
         screened.extend(rest.into_iter().filter(is_wanted));
         let losses = left_out_losses(&model.fit, &self.folds);
         self.say(&format!("fitting {} effects", screened.len()));
@@ -153,14 +149,14 @@ impl<'a, 'p> Search<'a, 'p> {
         let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
         let round = Round {
             candidates: all.len(),
-            chosen: choose(&evidence, trials),
+            chosen: choose(&evidence, trials, &study.settings.select),
             evidence,
         };
-        self.looks.insert(at, round.clone());
+        self.known_rounds.insert(at, round.clone());
         round
     }
 
-    /// Candidates at their most promising starting points, the most promising ones first.
+    /// Candidates at their best starting points, by predicted cost.
     fn screened(&mut self, model: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
         self.say(&format!("screening {} effects", all.len()));
         let study = self.study;
@@ -171,8 +167,8 @@ impl<'a, 'p> Search<'a, 'p> {
                 best_start(study, &beside, candidate)
             })
             .collect();
-        // A step away from "absent" promises little truth of an effect that cannot be absent: such candidates are
-        // always fitted.
+        // A Gauss-Newton step predicts badly for an effect that no value switches off: such candidates are always
+        // fitted.
         screened.sort_by(|a, b| {
             has_switch(&a.0)
                 .cmp(&has_switch(&b.0))
@@ -181,12 +177,11 @@ impl<'a, 'p> Search<'a, 'p> {
         screened.into_iter().map(|(start, _)| start).collect()
     }
 
-    /// The scale of the residuals has fallen: from now on the search looks with sharper eyes.
-    fn rescaled(&self, model: &Fitted) -> Fitted {
+    /// The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
+    fn rescaled(&self, model: &Fitted) -> Result<Fitted, FitError> {
         let locals = model.fit.locals.clone();
         self.study
             .refit(&model.effects, &model.declared, locals, None)
-            .unwrap_or_else(|_| model.clone())
     }
 
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
@@ -197,7 +192,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let first = simpler.par_iter().find_map_first(|effects| {
             let less = refit(study, &model, effects)?;
             let without: f64 = left_out_losses(&less.fit, folds).iter().sum();
-            (without < with * (1.0 + 0.5 * WORTHWHILE)).then_some(less)
+            (without < with * (1.0 + study.settings.select.simpler)).then_some(less)
         });
         match first {
             Some(less) => self.simplified(less),
@@ -205,12 +200,12 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Look at every effect of the model again, beside all others: what came early was chosen without knowing
-    /// what would follow. The first other model that the evidence is for.
+    /// Weigh every effect of the model again, beside all others: early ones were chosen without those that followed. The
+    /// first other model that the evidence supports.
     fn exchanged(&mut self, model: &Fitted) -> Option<Fitted> {
         (self.declared()..model.effects.len()).find_map(|k| {
             let (present, without) = self.without(model, k)?;
-            let round = self.look(&without, Some(&present));
+            let round = self.round(&without, Some(&present));
             match round.chosen.map(|chosen| &round.evidence[chosen]) {
                 None => Some(without),
                 Some(best) if best.effect.label() == present.label() => None,
@@ -219,26 +214,31 @@ impl<'a, 'p> Search<'a, 'p> {
         })
     }
 
-    /// What explains the logs as well as one of the effects of a model does, beside all others.
+    /// Effects that explain the logs as well as one of a model's effects does, beside its others.
     pub fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
+        let settings = &self.study.settings.select;
         let mut rivals = Vec::new();
         for k in self.declared()..model.effects.len() {
             let Some((present, without)) = self.without(model, k) else {
                 continue;
             };
-            let round = self.look(&without, Some(&present));
+            let round = self.round(&without, Some(&present));
             let is_present = |e: &&Evidence| e.effect.label() == present.label();
             let Some(chosen) = round.evidence.iter().find(is_present) else {
                 continue;
             };
             let others = round.evidence.iter().filter(|e| !is_present(e));
-            rivals.extend(others.filter(|e| e.is_as_good_as(chosen)).map(|e| Rival {
-                model: e.model.clone(),
-                effect: e.effect.clone(),
-                instead_of: present.clone(),
-                gain: e.gain,
-                gain_of_chosen: chosen.gain,
-            }));
+            rivals.extend(
+                others
+                    .filter(|e| e.is_as_good_as(chosen, settings))
+                    .map(|e| Rival {
+                        model: e.model.clone(),
+                        effect: e.effect.clone(),
+                        instead_of: present.clone(),
+                        gain: e.gain,
+                        gain_of_chosen: chosen.gain,
+                    }),
+            );
         }
         rivals
     }
@@ -287,16 +287,17 @@ fn has_switch(candidate: &FittedEffect) -> bool {
         .any(EffectParameter::is_switch)
 }
 
-/// Index of the evidence to act upon: of all candidates that are significant over so many trials, worthwhile
+/// Index of the candidate to admit: of all candidates that are significant over so many trials, worthwhile
 /// and as good as the best, the one with the fewest parameters.
-fn choose(evidence: &[Evidence], trials: usize) -> Option<usize> {
+fn choose(evidence: &[Evidence], trials: usize, settings: &SelectSettings) -> Option<usize> {
     #[allow(clippy::cast_precision_loss)] // few trials
-    let level = FALSE_ALARM / trials.max(1) as f64;
+    let level = settings.false_alarm / trials.max(1) as f64;
     let sound = |e: &Evidence| {
-        e.p_value < level && e.gain > WORTHWHILE || e.p_value < SIGNIFICANT_ALONE && e.gain > PLAIN
+        e.p_value < level && e.gain > settings.worthwhile
+            || e.p_value < settings.significant_alone && e.gain > settings.plain
     };
     let best = evidence.iter().find(|e| sound(e))?;
     (0..evidence.len())
-        .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best))
+        .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best, settings))
         .min_by_key(|&i| evidence[i].complexity())
 }

@@ -2,7 +2,9 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::Lab;
-use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, close_loop};
+use crate::closeloop::{
+    Finding, Outcome, Request, Settings, Split, StudyError, Verdict, close_loop,
+};
 use crate::control::Predictor;
 use crate::data::Log;
 use crate::experiment::ExperimentError;
@@ -188,7 +190,7 @@ impl Lab {
     }
 
     fn close(&self, logs: &[Log], seed: u64) -> Result<Outcome, StudyError> {
-        let split = Split::of(logs.to_vec());
+        let split = Split::of(logs.to_vec(), &Settings::default().split);
         let request = Request::new(&self.declared, &self.library, split);
         let mut rng = stream(seed, Purpose::Other(logs.len()));
         close_loop(request, &mut rng, &mut |_| {})

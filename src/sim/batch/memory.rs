@@ -5,26 +5,26 @@ use crate::model::Dynamics;
 use crate::model::mlp::to_f32;
 use crate::sim::Commands;
 
-/// What the filters of a model make of torques that are held over equal steps. Filters are linear: the mean torque that
-/// acts over a step is a weighted sum of the torques commanded over this step and those before.
+/// Discrete impulse response of a model's torque filters for torques that are held over equal steps. The filters are
+/// linear: the mean torque over a step is a weighted sum of the torques commanded in this step and the ones before.
 #[derive(Debug, Clone)]
 pub(super) struct Memory {
     /// `[joint][steps ago]`
     weights: Vec<Vec<f32>>,
 }
 
-/// Weights end where those left out come to less than this share of all.
+/// The response is truncated where the remaining weights sum to less than this share.
 const LEAST_REST: f64 = 1e-6;
-/// A command that acts later than this counts as if it acted then.
+/// Longest response; a command that acts later is counted in the last step.
 const MOST_STEPS: usize = 4096;
 
 impl Memory {
-    /// The memory of `equations` with their own parameters; none without filters.
+    /// The response of the filters of `equations`; none without filters.
     pub fn new(equations: &Dynamics, step_s: f64) -> Option<Self> {
         if equations.filters.is_empty() {
             return None;
         }
-        // The first command was held for ever before: the impulse comes after it.
+        // The first command is taken as held for ever before, so the impulse is the second.
         let mut impulse = Log::empty(equations.joints);
         impulse.time = (0..MOST_STEPS + 2).map(|row| step_s * row as f64).collect();
         let mut tau = vec![0.0; impulse.rows()];
@@ -40,14 +40,15 @@ impl Memory {
         })
     }
 
-    /// How many steps before the present one matter.
+    /// Number of earlier steps that affect the current one.
     pub fn steps(&self) -> usize {
         let longest = self.weights.iter().map(Vec::len).max();
         longest.map_or(0, |count| count - 1)
     }
 
-    /// What of the acting torque comes from torques commanded before a plan of so many steps: `past`
-    /// (`[step][joint]`) oldest first, which was held for ever before. `[step * n + joint]`, as far as they reach.
+    /// The part of the acting torque that is due to torques commanded before a plan of `steps` steps: `past`
+    /// (`[step][joint]`), oldest first, the oldest held for ever before. `[step * n + joint]`, up to the last step
+    /// affected.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
     pub fn carried(&self, past: &[Vec<f64>], steps: usize) -> Vec<f32> {
         let ago = |steps: usize| past.get(past.len().saturating_sub(steps));
@@ -66,8 +67,7 @@ impl Memory {
             .collect()
     }
 
-    /// The mean torque that acts over each step, from what is carried over and `commanded` torques, all
-    /// `[step * n + joint]`.
+    /// The mean torque over each step from the carried part and the `commanded` torques, all `[step * n + joint]`.
     pub fn act(&self, arch: Arch, carried: &[f32], commanded: &[Rows], acting: &mut Vec<Rows>) {
         acting.resize(commanded.len(), Rows::splat(0.0));
         arch.dispatch(Act {
@@ -79,7 +79,7 @@ impl Memory {
     }
 }
 
-/// Both kinds of filters leave a constant torque as it is: all weights together are 1.
+/// The truncated response. Both kinds of filters pass a constant torque unchanged, so the weights sum to 1.
 fn until_little_is_left(response: &[f64]) -> Vec<f32> {
     let mut rest = 1.0;
     let mut weights = Vec::new();
@@ -112,13 +112,11 @@ impl WithSimd for Act<'_> {
             let weights = &self.weights[k % n];
             for part in 0..Rows::parts::<S>() {
                 let commands = self.commanded[..=k].iter().rev().step_by(n);
-                let sum = commands.zip(weights).fold(
-                    Vector::splat(simd, carried),
-                    |sum, (command, weight)| {
-                        let weight = Vector::splat(simd, *weight);
-                        command.get(simd, part).mul_add(weight, sum)
-                    },
-                );
+                let mut sum = Vector::splat(simd, carried);
+                for (command, weight) in commands.zip(weights) {
+                    let weight = Vector::splat(simd, *weight);
+                    sum = command.get(simd, part).mul_add(weight, sum);
+                }
                 acting.set(part, sum);
             }
         }

@@ -1,5 +1,4 @@
-//! Many rows side by side in f32, as wide as the processor's vectors: networks and their derivatives, and rollouts of a
-//! whole model.
+//! Batched f32 evaluation on the processor's vectors: networks, their gradients, and rollouts of a complete model.
 
 mod memory;
 mod network;
@@ -16,8 +15,8 @@ pub use rollout::{Block, Rollouts};
 
 use crate::lanes::Row;
 
-/// Rows of a batch that are worked on together.
+/// Rows of a batch that are evaluated together, one in each lane.
 pub const W: usize = 32;
 
-/// One value of each of them.
+/// One value for each of these rows.
 pub type Rows = Row<f32, W>;

@@ -5,7 +5,7 @@ use pulp::Simd;
 use super::Rows;
 use super::product::{Finish, Product};
 
-/// The numbers of a multilayer perceptron with ReLU on every layer but the last, laid out for [`Rows`].
+/// Weights and biases of a multilayer perceptron, ReLU after every layer but the last, laid out for [`Rows`].
 #[derive(Debug, Clone)]
 pub struct Network {
     pub(super) layers: Vec<Layer>,
@@ -15,7 +15,7 @@ pub struct Network {
     transposed: Vec<f32>,
 }
 
-/// Where a layer's numbers and values are.
+/// Index ranges of a layer's numbers and values.
 #[derive(Debug, Clone)]
 pub(super) struct Layer {
     pub inputs: usize,
@@ -30,11 +30,11 @@ pub(super) struct Layer {
 }
 
 impl Network {
-    /// A network with these widths, from the features to the outputs. `numbers` are in the order of
+    /// A network with these layer widths, from features to outputs. `numbers` are in the order of
     /// [`MlpWeights::flat`](crate::model::MlpWeights::flat).
     ///
     /// # Panics
-    /// When the numbers are not as many as the widths ask for.
+    /// When the count of numbers does not follow from the widths.
     pub fn new(widths: &[usize], numbers: &[f32]) -> Self {
         let mut layers: Vec<Layer> = Vec::with_capacity(widths.len());
         let (mut number, mut turned, mut value) = (0, 0, 0);
@@ -62,10 +62,10 @@ impl Network {
         network
     }
 
-    /// The same network with other numbers.
+    /// Replace all weights and biases.
     ///
     /// # Panics
-    /// When they are not as many.
+    /// When the count of numbers is another.
     pub fn set_numbers(&mut self, numbers: &[f32]) {
         self.numbers.copy_from_slice(numbers);
         for layer in &self.layers {
@@ -80,12 +80,12 @@ impl Network {
         }
     }
 
-    /// Number of values that [`Network::forward`] makes: the outputs of all layers.
+    /// Length of the activations of [`Network::forward`]: the outputs of all layers.
     pub fn activations(&self) -> usize {
         self.outputs().end
     }
 
-    /// Where the network's outputs are among them.
+    /// Indices of the network's outputs within the activations.
     pub fn outputs(&self) -> Range<usize> {
         let last = self.layers.last();
         last.map_or(0..0, |layer| layer.values.clone())
@@ -101,7 +101,7 @@ impl Network {
         self.layers.first().map_or(0, |layer| layer.inputs)
     }
 
-    /// The outputs of every layer, one after the other, for features that are scaled already.
+    /// Compute the outputs of all layers, in order, from scaled features.
     #[inline(always)]
     pub fn forward<S: Simd>(&self, simd: S, features: &[Rows], activations: &mut [Rows]) {
         for (k, layer) in self.layers.iter().enumerate() {

@@ -5,7 +5,7 @@ use super::product::{Finish, Product};
 use super::{Rows, W};
 use crate::lanes::{Element, Vector};
 
-/// Some of the values of several blocks of rows.
+/// A range of the values of several blocks of rows.
 #[derive(Clone, Copy)]
 struct Columns<'a> {
     rows: &'a [Rows],
@@ -27,12 +27,12 @@ impl<'a> Columns<'a> {
 }
 
 impl Network {
-    /// The way back through the network for several blocks of rows. `activations` come in as
-    /// [`Network::forward`] left them, with the derivative of a number by the outputs in place of the outputs; each
-    /// layer's values become that number's derivatives by what went into its ReLU.
+    /// Backpropagation for several blocks of rows. `activations` are those of [`Network::forward`], with the loss
+    /// gradient with respect to the outputs in place of the outputs; every layer's values are replaced by the
+    /// gradient with respect to the inputs of its ReLU.
     ///
-    /// `sums` has one register for each of the network's numbers, to which that number's derivative is added lane by
-    /// lane. `by_features`, unless it is empty, becomes the derivative by the features.
+    /// `sums` holds one register for each weight and bias, to which its gradient is added lane by lane. `by_features`,
+    /// unless it is empty, receives the gradient with respect to the features.
     #[inline(always)]
     pub fn backward<S: Simd>(
         &self,
@@ -89,7 +89,7 @@ impl Network {
 }
 
 impl Layer {
-    /// Add the derivatives by the layer's weights and biases.
+    /// Accumulate the gradient of the layer's weights and biases.
     #[inline(always)]
     fn add_gradient<S: Simd>(
         &self,
@@ -124,7 +124,7 @@ impl Layer {
         }
     }
 
-    /// The weights of `O` outputs.
+    /// The weight gradient of `O` outputs.
     #[inline(always)]
     fn row_of_tiles<S: Simd, const O: usize>(
         &self,
@@ -152,7 +152,7 @@ impl Layer {
         }
     }
 
-    /// `O` outputs by `I` inputs: their sums stay in registers while the rows pass by.
+    /// `O` outputs by `I` inputs, accumulated in registers over all rows.
     #[inline(always)]
     fn tile<S: Simd, const O: usize, const I: usize>(
         &self,
@@ -175,11 +175,11 @@ impl Layer {
             let slopes = slopes.registers::<S, O>(block, output);
             let inputs = inputs.registers::<S, I>(block, input);
             for k in 0..W / f32::lanes::<S>() {
-                let inputs = inputs.map(|input| Vector::new(simd, input[k]));
                 for o in 0..O {
                     let slope = Vector::new(simd, slopes[o][k]);
                     for i in 0..I {
-                        sums[o][i] = slope.mul_add(inputs[i], sums[o][i]);
+                        let input = Vector::new(simd, inputs[i][k]);
+                        sums[o][i] = slope.mul_add(input, sums[o][i]);
                     }
                 }
             }

@@ -3,14 +3,14 @@ use pulp::Simd;
 use super::{Rows, W};
 use crate::lanes::{Element, Vector};
 
-/// What becomes of a sum before it is stored.
+/// Applied to a sum before it is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finish {
-    /// Nothing.
+    /// The sum itself.
     Plain,
-    /// Negative ones become zero.
+    /// max(sum, 0).
     Relu,
-    /// Zero where the value that it takes the place of is not positive: the derivative of ReLU.
+    /// The sum where the value that it overwrites is positive, else zero: the derivative of ReLU.
     Masked,
 }
 
@@ -28,7 +28,7 @@ impl Product<'_> {
     #[inline(always)]
     pub(crate) fn run<S: Simd>(self, simd: S, from: &[Rows], to: &mut [Rows]) {
         let mut first = 0;
-        // Sums stay in registers: eight outputs of two registers each where there are 32.
+        // The accumulators stay in registers: eight outputs with two registers each where there are 32 registers.
         if S::REGISTER_COUNT >= 32 {
             while to.len() - first >= 8 {
                 self.tile::<S, 8>(simd, first, from, to);
@@ -46,29 +46,33 @@ impl Product<'_> {
     }
 
     /// The outputs `first..first + T`.
+    ///
+    /// Plain loops on purpose: the compiler may leave `array::from_fn` and `array::map` as calls, and then every
+    /// register goes through memory.
     #[inline(always)]
     fn tile<S: Simd, const T: usize>(self, simd: S, first: usize, from: &[Rows], to: &mut [Rows]) {
         for pair in 0..W / (2 * f32::lanes::<S>()) {
-            let start = |t: usize| match self.bias.get(first + t) {
-                Some(bias) => Vector::splat(simd, *bias),
-                None => Vector::splat(simd, 0.0),
-            };
-            let mut sums: [[Vector<S, f32>; 2]; T] = std::array::from_fn(|t| [start(t); 2]);
-            for (weights, x) in self.weight.chunks_exact(to.len()).zip(from) {
-                let x = f32::registers::<S>(&x.0);
-                let x = [2 * pair, 2 * pair + 1].map(|k| Vector::new(simd, x[k]));
-                let weights: &[f32; T] = weights[first..]
-                    .first_chunk()
-                    .expect("a tile lies within the outputs");
-                for (sums, weight) in sums.iter_mut().zip(weights) {
-                    let weight = Vector::splat(simd, *weight);
-                    *sums = [x[0].mul_add(weight, sums[0]), x[1].mul_add(weight, sums[1])];
+            let mut sums = [[Vector::splat(simd, 0.0); 2]; T];
+            if let Some(bias) = self.bias.get(first..first + T) {
+                for t in 0..T {
+                    sums[t] = [Vector::splat(simd, bias[t]); 2];
                 }
             }
-            for (to, sums) in to[first..first + T].iter_mut().zip(sums) {
-                let to = &mut f32::registers_mut::<S>(&mut to.0)[2 * pair..2 * pair + 2];
-                for (to, sum) in to.iter_mut().zip(sums) {
-                    *to = self.finished(sum, Vector::new(simd, *to)).register;
+            for (weights, x) in self.weight.chunks_exact(to.len()).zip(from) {
+                let weights = &weights[first..first + T];
+                let (left, right) = (x.get(simd, 2 * pair), x.get(simd, 2 * pair + 1));
+                for t in 0..T {
+                    let weight = Vector::splat(simd, weights[t]);
+                    sums[t][0] = left.mul_add(weight, sums[t][0]);
+                    sums[t][1] = right.mul_add(weight, sums[t][1]);
+                }
+            }
+            let to = &mut to[first..first + T];
+            for t in 0..T {
+                for k in 0..2 {
+                    let part = 2 * pair + k;
+                    let sum = self.finished(sums[t][k], to[t].get(simd, part));
+                    to[t].set(part, sum);
                 }
             }
         }
@@ -79,7 +83,7 @@ impl Product<'_> {
         let zero = Vector::splat(sum.simd, 0.0);
         match self.finish {
             Finish::Plain => sum,
-            // Comparisons, so that what is not a number stays so.
+            // Comparisons, so that NaN propagates.
             Finish::Relu => sum.if_less(zero, zero, sum),
             Finish::Masked => zero.if_less(before, sum, zero),
         }

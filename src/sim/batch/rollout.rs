@@ -6,7 +6,7 @@ use crate::model::mlp::to_f32;
 use crate::model::{Dynamics, MlpWeights};
 use crate::sim::Integrator;
 
-/// Model, objective and integrator, ready to be rolled out from one state under many sequences of inputs.
+/// Model, objective and integrator, compiled for rollouts from one state under many input sequences.
 #[derive(Debug, Clone)]
 pub struct Rollouts {
     joints: usize,
@@ -15,13 +15,13 @@ pub struct Rollouts {
     program: Program,
     parameters: Vec<f32>,
     networks: Vec<Added>,
-    /// Where torques are filtered.
+    /// Present where the equations filter their torques.
     memory: Option<Memory>,
     integrator: Integrator,
     step_s: f32,
 }
 
-/// A network whose outputs are added to the last of the rates.
+/// A network whose outputs are added to the last components of ds/dt.
 #[derive(Debug, Clone)]
 struct Added {
     network: Network,
@@ -35,21 +35,21 @@ pub struct Block<'r> {
     rollouts: &'r Rollouts,
     arch: Arch,
     tape: Tape<'r, f32, W>,
-    /// Where the step began, and where its slope leads so far: positions, then velocities.
+    /// State at the start of the step, and the state accumulated so far for its end: positions, then velocities.
     state: Vec<Rows>,
     next: Vec<Rows>,
     rates: Vec<Rows>,
-    /// Of each network: features, then activations.
+    /// Features and activations of each network.
     values: Vec<[Vec<Rows>; 2]>,
-    /// The torques that act, `[step * n + joint]`, where they are not those commanded.
+    /// Filtered torques, `[step * n + joint]`; unused without filters.
     acting: Vec<Rows>,
 }
 
 impl Rollouts {
     /// `equations` with the outputs of `networks` added to their derivative, in steps of `step_s` seconds, under an
-    /// objective whose one output is the reward of the state and torque that a step leads to. Its inputs are `q`,
-    /// `qd`, `tau` of every joint and `t`; it sees the torque commanded. Where the equations filter their torques, the
-    /// mean of what they make of it acts over each step.
+    /// objective whose only output is the reward of the state at the end of a step. Its inputs are `q`, `qd` and the
+    /// commanded `tau` of every joint, and `t`. Where the equations filter their torques, the mean filtered torque acts
+    /// over each step.
     ///
     /// # Panics
     /// When a network or the objective does not belong to their joints.
@@ -82,13 +82,14 @@ impl Rollouts {
         self.joints
     }
 
-    /// How many steps before a plan matter to it: none without filters.
+    /// Number of steps before a plan whose torques still act in it: none without filters.
     pub fn memory(&self) -> usize {
         self.memory.as_ref().map_or(0, Memory::steps)
     }
 
-    /// What of the acting torque in a plan of so many steps comes from the torques `past` (`[step][joint]`, oldest
-    /// first, which was held for ever before): `[step * n + joint]`, as far as they reach. Empty without filters.
+    /// The part of the acting torque in a plan of `steps` steps that is due to the torques `past` (`[step][joint]`,
+    /// oldest first, the oldest held for ever before): `[step * n + joint]`, up to the last step affected. Empty
+    /// without filters.
     pub fn carried(&self, past: &[Vec<f64>], steps: usize) -> Vec<f32> {
         let memory = self.memory.as_ref();
         memory.map_or_else(Vec::new, |memory| memory.carried(past, steps))
@@ -135,7 +136,7 @@ fn added(joints: usize, networks: &[MlpWeights]) -> Vec<Added> {
     networks.iter().map(&mut add).collect()
 }
 
-/// One program for everything around the networks: sines and cosines serve all of it.
+/// One program for the equations, the reward and the networks' features, so that they share their sines and cosines.
 fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> Program {
     let n = equations.joints;
     let mut graph = Graph::new();
@@ -159,14 +160,14 @@ fn whole(equations: &Dynamics, networks: &[MlpWeights], objective: &Program) -> 
 }
 
 impl Block<'_> {
-    /// What this block rolls out.
+    /// The rollouts that this block belongs to.
     pub fn rollouts(&self) -> &Rollouts {
         self.rollouts
     }
 
     /// The sum of rewards of each rollout from `start` (positions, then velocities) at `time_s` under `inputs`
-    /// (`[step * n + joint]`), each held for a step, after torques of which so much is [carried](Rollouts::carried)
-    /// over. Not a number or infinite where a rollout diverges.
+    /// (`[step * n + joint]`), each held for a step; `carried` is what earlier torques add to the acting ones, see
+    /// [`Rollouts::carried`]. NaN or infinite where a rollout diverges.
     ///
     /// # Panics
     /// When `start` or `inputs` is not of the model's size.
@@ -216,7 +217,7 @@ struct Run<'a, 'r> {
 impl WithSimd for Run<'_, '_> {
     type Output = ();
 
-    /// The loops meet in one place, so that what is evaluated there is compiled into them once.
+    /// One evaluation in the innermost loop, also for the reward after the last step, so that it is inlined only once.
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self {
@@ -265,7 +266,7 @@ impl WithSimd for Run<'_, '_> {
 }
 
 impl Block<'_> {
-    /// Hold the torque that acts over `step`; the reward sees the input of the step before.
+    /// Set the torque that acts over `step`, and for the reward the commanded torque of the step before.
     #[inline(always)]
     fn hold(&mut self, inputs: &[Rows], acting: &[Rows], step: usize) {
         let n = self.rollouts.joints;
@@ -278,14 +279,14 @@ impl Block<'_> {
         }
     }
 
-    /// A substep begins where the last one led.
+    /// Start a substep from the end of the last one.
     #[inline(always)]
     fn begin(&mut self) {
         self.state.copy_from_slice(&self.next);
         self.tape.moving()[..self.next.len()].copy_from_slice(&self.next);
     }
 
-    /// ds/dt where the tape stands: the equations' part and that of the networks.
+    /// ds/dt at the tape's inputs: equations plus networks.
     #[inline(always)]
     fn rates<S: Simd>(&mut self, simd: S) {
         for (k, rate) in self.rates.iter_mut().enumerate() {
@@ -304,7 +305,7 @@ impl Block<'_> {
         }
     }
 
-    /// Add the slope to the step, and set the inputs of the next stage.
+    /// Add this stage's slope to the step, and set the inputs of the next stage.
     #[inline(always)]
     fn advance<S: Simd>(&mut self, simd: S, reach: f32, weight: f32) {
         let inner = self.tape.moving();
