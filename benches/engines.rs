@@ -14,11 +14,11 @@ use residyn::closeloop::{Request, Split, close_loop};
 use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn::model::{
-    Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
+    Dynamics, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
 };
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
-use residyn::train::{Backend, FitSettings, Segments, Training};
+use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 const STEP_S: f64 = 0.02;
 

@@ -13,12 +13,11 @@ use residyn::batch::Rollouts;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit};
 use residyn::model::{
-    Dynamics, HybridModel, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
-    System,
+    Dynamics, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, System,
 };
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
-use residyn::train::{Backend, FitSettings, Progress, Segments, Training};
+use residyn::train::{Backend, FitSettings, HybridModel, Progress, Segments, Training};
 
 const STEP_S: f64 = 0.02;
 /// Of each time the best of so many.

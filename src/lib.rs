@@ -40,22 +40,27 @@
 
 pub mod batch;
 pub mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod closeloop;
 pub mod control;
 pub mod data;
 pub mod evaluate;
+#[cfg(feature = "train")]
 pub mod experiment;
 pub mod export;
 pub mod expr;
 pub mod identify;
 pub mod lanes;
+#[cfg(feature = "train")]
 pub mod mbrl;
 pub mod mechanism;
 pub mod model;
 pub mod plan;
 pub mod plant;
+#[cfg(feature = "train")]
 pub mod recipe;
 pub mod report;
 pub mod rounds;
+#[cfg(feature = "train")]
 pub mod train;

@@ -1,7 +1,7 @@
 use super::Rows;
 use crate::data::Log;
 use crate::lanes::{Arch, Simd, Vector, WithSimd};
-use crate::model::mlp::to_f32;
+use crate::model::to_f32;
 use crate::model::{Commands, Dynamics};
 
 /// What the filters of a model make of torques that are held over equal steps. Filters are linear: the mean torque that

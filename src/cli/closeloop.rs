@@ -11,10 +11,9 @@ use crate::closeloop::{
     Contender, Outcome, Request, STAGES, Split, Verdict, calibrate, close_loop,
 };
 use crate::data::{LeaveOut, Log};
-use crate::model::{Library, System};
+use crate::model::{Library, Origin, System};
 use crate::plant::Plant;
 use crate::report;
-use crate::train::Origin;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
 ///

@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 fn measure(format: &Format, model: &Portable, arguments: &Arguments) -> Result<Difference, Unread> {
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let refused = |error: crate::model::HybridError| Unread::Refused(error.to_string());
+    let refused = |error: crate::model::NetworkError| Unread::Refused(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
     let own = model.answers(&samples).map_err(refused)?;
     Ok(own.difference(&format.ask(&arguments.out, &samples)?))

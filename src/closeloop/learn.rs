@@ -6,10 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use super::study::{Fitted, Study, joined};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{
-    Dynamics, HybridModel, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed,
-    as_modelled,
+    Dynamics, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed, as_modelled,
 };
-use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
+use crate::train::{
+    Backend, FitSettings, HybridModel, LearningRates, Penalty, Segments, TrainError, Training,
+};
 
 /// Rows nearer than this (s) are put together: the network is to learn a force, not the encoder's noise.
 const STEP_S: f64 = 0.01;

@@ -18,7 +18,7 @@ pub enum StudyError {
     #[error(transparent)]
     Train(#[from] crate::train::TrainError),
     #[error(transparent)]
-    Hybrid(#[from] crate::model::HybridError),
+    Hybrid(#[from] crate::train::HybridError),
 }
 
 /// Length in s of the windows of the first fit: even a poor start does not diverge in them.

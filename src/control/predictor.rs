@@ -1,5 +1,5 @@
 use crate::batch::Rollouts;
-use crate::model::{Dynamics, HybridModel, Integrator, MlpWeights};
+use crate::model::{Dynamics, Integrator, MlpWeights};
 use crate::plan::Objective;
 
 /// A model as a planner takes it: equations with their values, networks whose outputs are added to their derivative,
@@ -14,16 +14,12 @@ pub struct Predictor {
 impl Predictor {
     /// A model of equations alone.
     pub fn of_equations(equations: Dynamics, integrator: Integrator) -> Self {
-        Self {
-            equations,
-            networks: Vec::new(),
-            integrator,
-        }
+        Self::new(equations, Vec::new(), integrator)
     }
 
-    /// A trained model; `integrator` is the one that it was trained through.
-    pub fn of_model(model: &HybridModel, integrator: Integrator) -> Self {
-        let (equations, networks) = model.parts();
+    /// Equations and the networks whose outputs are added to their derivative; `integrator` is the one that the model
+    /// was trained through.
+    pub fn new(equations: Dynamics, networks: Vec<MlpWeights>, integrator: Integrator) -> Self {
         Self {
             equations,
             networks,

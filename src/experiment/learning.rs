@@ -6,8 +6,8 @@ use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
-use crate::model::{Dynamics, HybridModel, Integrator, Library, System};
-use crate::train::{Backend, Checkpoint, Origin};
+use crate::model::{Dynamics, Integrator, Library, Origin, System};
+use crate::train::{Backend, Checkpoint, HybridModel};
 
 /// A method with all that it names read.
 pub(super) struct Method {
@@ -82,12 +82,12 @@ impl Method {
     /// What it plans with before it has seen anything; none where it knows nothing.
     pub(super) fn prior(&self, integrator: Integrator) -> Result<Option<Predictor>, RunError> {
         let model = self.learner.untrained()?;
-        Ok(model.map(|model| Predictor::of_model(&model, integrator)))
+        Ok(model.map(|model| model.predictor(integrator)))
     }
 
     /// What it plans with once it has learnt.
     pub(super) fn predictor(&self, model: &HybridModel) -> Predictor {
-        Predictor::of_model(model, self.config.fit.integrator)
+        model.predictor(self.config.fit.integrator)
     }
 
     /// Do what is left of a run in `dir`.

@@ -3,19 +3,14 @@
 
 use std::path::{Path, PathBuf};
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use thiserror::Error;
 
 use super::{CarriedEffect, ExportError, File, Format, HeldFilter, Portable, Reader, rebuilt};
 use crate::expr::{Op, Program};
-use crate::model::{Effect, HybridError, Integrator, ModelWeights, System};
-use crate::train::weights::{from_bytes, to_bytes};
-use crate::train::{
-    Backend, CheckpointError, FitSettings, Origin, Shape, TrainError, Training, save,
-};
+use crate::model::weights::{from_bytes, to_bytes};
+use crate::model::{Effect, Integrator, ModelShape, ModelWeights, SavedModelError, System};
 
 pub(super) const JSON: Format = Format {
     name: "json",
@@ -51,7 +46,7 @@ pub struct Description {
     pub residyn: String,
     pub about: String,
     #[serde(flatten)]
-    pub shape: Shape,
+    pub shape: ModelShape,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
     pub integrator: Integrator,
@@ -126,11 +121,7 @@ pub enum ImportError {
     #[error(transparent)]
     Model(#[from] crate::model::FileError),
     #[error(transparent)]
-    Weights(#[from] CheckpointError),
-    #[error(transparent)]
-    Hybrid(#[from] HybridError),
-    #[error(transparent)]
-    Train(#[from] TrainError),
+    Weights(#[from] SavedModelError),
 }
 
 fn pair(model: &Portable, description: &Path, weights: &Path) -> Result<Vec<File>, ExportError> {
@@ -145,7 +136,7 @@ fn pair(model: &Portable, description: &Path, weights: &Path) -> Result<Vec<File
         });
     }
     let numbers = model.weights();
-    let shape = Shape::of(
+    let shape = ModelShape::of(
         model.name(),
         model.joints(),
         &model.equations.parameters,
@@ -251,34 +242,6 @@ impl Imported {
             numbers,
         })
     }
-
-    /// Write the model as a checkpoint that has not been trained any further. `seed` orders minibatches, should it be.
-    ///
-    /// # Errors
-    /// A folder that cannot be written, or that holds something else than a checkpoint.
-    pub fn save(self, dir: &Path, seed: u64, backend: Backend) -> Result<(), ImportError> {
-        let dynamics = self.system.dynamics(&self.system.sign());
-        let shape = &self.description.shape;
-        let model = shape.model(&self.numbers, &dynamics, &backend.device())?;
-        let Description {
-            integrator,
-            step_s,
-            origin,
-            model_toml,
-            ..
-        } = self.description;
-        let settings = FitSettings {
-            integrator,
-            ..FitSettings::default()
-        };
-        let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(seed))?;
-        let origin = Origin {
-            config: json!({"command": "import", "step_s": step_s, "origin": origin}),
-            seed,
-            model_toml,
-        };
-        Ok(save(dir, &training, &origin)?)
-    }
 }
 
 impl Description {
@@ -310,7 +273,7 @@ impl Description {
 /// A network needs no equations, so those of the model file may be any.
 fn check(
     path: &Path,
-    shape: &Shape,
+    shape: &ModelShape,
     declared: &[crate::model::Parameter],
 ) -> Result<(), ImportError> {
     let file: Vec<&str> = declared.iter().map(|p| p.name.as_str()).collect();

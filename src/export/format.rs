@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{Answers, FORMATS, Portable, PythonClient, Samples};
 use crate::expr::suggestion;
-use crate::model::HybridError;
+use crate::model::NetworkError;
 use crate::report::{WriteError, write_whole};
 
 /// A format that models are written in.
@@ -65,7 +65,7 @@ pub enum ExportError {
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error(transparent)]
-    Hybrid(#[from] HybridError),
+    Hybrid(#[from] NetworkError),
 }
 
 /// The format of this name.

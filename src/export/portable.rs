@@ -5,7 +5,7 @@ use serde_json::json;
 use super::prediction::Prediction;
 use super::{Answers, Samples};
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, Integrator, MlpWeights, ModelWeights, Parameter, System,
+    CommandFilter, Dynamics, Integrator, MlpWeights, ModelWeights, NetworkError, Parameter, System,
     nothing_but, with_residual,
 };
 
@@ -196,7 +196,7 @@ impl Portable {
     ///
     /// # Errors
     /// A network that is not one for the model's joints.
-    pub(super) fn prediction(&self) -> Result<Prediction, HybridError> {
+    pub(super) fn prediction(&self) -> Result<Prediction, NetworkError> {
         let mut networks = self.networks();
         let whole = networks.try_fold(self.equations.clone(), |dynamics, network| {
             with_residual(&dynamics, network)
@@ -223,7 +223,7 @@ impl Portable {
     ///
     /// # Errors
     /// A network that is not one for the model's joints.
-    pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, HybridError> {
+    pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, NetworkError> {
         Ok(Samples::draw(
             &self.prediction()?,
             &self.system.prismatic,
@@ -235,7 +235,7 @@ impl Portable {
     ///
     /// # Errors
     /// A network that is not one for the model's joints.
-    pub fn answers(&self, samples: &Samples) -> Result<Answers, HybridError> {
+    pub fn answers(&self, samples: &Samples) -> Result<Answers, NetworkError> {
         Ok(self.prediction()?.answers(samples))
     }
 }

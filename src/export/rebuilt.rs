@@ -9,15 +9,16 @@ use serde_json::Value;
 use super::prediction::Prediction;
 use super::{Answers, Samples, Unread};
 use crate::expr::{Graph, Node, Program};
-use crate::model::{CommandFilter, Dynamics, Filter, Integrator, ModelWeights, with_residual};
-use crate::train::Shape;
-use crate::train::weights::from_bytes;
+use crate::model::weights::from_bytes;
+use crate::model::{
+    CommandFilter, Dynamics, Filter, Integrator, ModelShape, ModelWeights, with_residual,
+};
 
 /// What such a reader looks at.
 #[derive(Deserialize)]
 struct Rebuilt {
     #[serde(flatten)]
-    shape: Shape,
+    shape: ModelShape,
     integrator: Integrator,
     step_s: f64,
     weights: PathBuf,
@@ -60,7 +61,7 @@ pub(super) fn answers(path: &Path, samples: &Samples) -> Result<Answers, Unread>
 
 impl Rebuilt {
     fn prediction(self, numbers: &ModelWeights) -> Result<Prediction, String> {
-        let Shape {
+        let ModelShape {
             system,
             joints,
             parameters,

@@ -3,10 +3,9 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::data::LogError;
-use crate::model::HybridError;
 use crate::plant::PlantError;
 use crate::report::WriteError;
-use crate::train::{CheckpointError, SegmentsError, TrainError};
+use crate::train::{CheckpointError, HybridError, SegmentsError, TrainError};
 
 /// Why a run of the loop cannot go on.
 #[derive(Debug, Error)]

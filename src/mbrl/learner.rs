@@ -2,8 +2,8 @@ use std::ops::ControlFlow;
 
 use super::RunError;
 use crate::control::{Purpose, stream};
-use crate::model::{Dynamics, HybridModel, InputScaling, LastLayer, MlpSettings, MlpWeights};
-use crate::train::{Backend, FitSettings, Segments, Training};
+use crate::model::{Dynamics, InputScaling, LastLayer, MlpSettings, MlpWeights};
+use crate::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 /// What a model knows before it has seen the plant.
 #[derive(Debug, Clone)]

@@ -7,9 +7,9 @@ use serde_json::json;
 use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
 use crate::control::Task;
 use crate::expr::SignForm;
-use crate::model::{Angles, Dynamics, Library, MlpSettings};
+use crate::model::{Angles, Dynamics, Library, MlpSettings, Origin};
 use crate::plant::{Noise, Plant};
-use crate::train::{Backend, FitSettings, Origin, Penalty};
+use crate::train::{Backend, FitSettings, Penalty};
 
 struct Setting {
     task: Task,

@@ -6,39 +6,32 @@ mod command;
 mod dynamics;
 mod effect;
 mod effects_in_file;
-mod equations;
-mod frame;
-mod hybrid;
 mod integrator;
 mod library;
-pub(crate) mod mlp;
 mod network;
 mod reader;
 mod rollout;
+mod saved;
 mod sections;
 mod sensors;
 mod shift;
-mod stack;
 mod system;
 mod typeset;
+pub(crate) mod weights;
 
 pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
-pub(crate) use frame::Frame;
-pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};
-#[cfg(test)]
-pub(crate) use hybrid::{PRIOR_ID, RESIDUAL_ID};
-pub use integrator::{Integrator, Step};
+pub use integrator::Integrator;
 pub use library::Library;
-pub(crate) use network::nothing_but;
 pub use network::{
-    Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, ResidualOn,
-    with_residual,
+    Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,
+    ResidualOn, with_residual,
 };
+pub(crate) use network::{nothing_but, to_f32};
 pub use reader::FileError;
 pub use rollout::Rollout;
+pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
 pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use shift::absorbed;
-pub(crate) use stack::Stack;
 pub use system::{FittedEffect, OwnValue, System, put_own};

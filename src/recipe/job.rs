@@ -6,8 +6,8 @@ use super::difference::first_difference;
 use super::material::{Purpose, stream};
 use super::{Kind, Material, Recipe, RecipeError};
 use crate::expr::SignForm;
-use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, System};
-use crate::train::{Backend, Checkpoint, Origin, Training};
+use crate::model::{Dynamics, LastLayer, Library, MlpSettings, MlpWeights, Origin, System};
+use crate::train::{Backend, Checkpoint, HybridModel, Training};
 
 /// A recipe with all that it names read and drawn: the start of a run, or of its continuation.
 pub struct Job {

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::{Job, Kind};
-use crate::model::HybridModel;
-use crate::train::{Objective, Segments, TrainError, Training};
+use crate::train::{HybridModel, Objective, Segments, TrainError, Training};
 
 /// What came of a run, as `--json` prints it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

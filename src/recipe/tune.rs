@@ -4,8 +4,8 @@ use serde_json::json;
 
 use super::job::{declared, equations, fingerprint, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
-use crate::model::{LastLayer, Library, System};
-use crate::train::{Backend, Checkpoint, Origin};
+use crate::model::{LastLayer, Library, Origin, System};
+use crate::train::{Backend, Checkpoint};
 
 impl Job {
     /// Fine-tune the model of a checkpoint on the recipe's data.

@@ -7,8 +7,8 @@ use super::json::{CHECKPOINT, MODEL, PLOTS, Report, TEXT};
 use super::plot::PlotError;
 use super::{model_file, picture, text};
 use crate::closeloop::Outcome;
-use crate::model::System;
-use crate::train::{CheckpointError, Origin};
+use crate::model::{Origin, System};
+use crate::train::CheckpointError;
 
 /// Why results could not be written.
 #[derive(Debug, Error)]

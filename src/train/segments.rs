@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::{Backend, Blocks, TrainError};
-use crate::model::{Angles, Frame, InputScaling};
+use super::{Backend, Blocks, Frame, TrainError};
+use crate::model::{Angles, InputScaling};
 
 /// Why rows of numbers are no segments.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

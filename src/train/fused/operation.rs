@@ -17,7 +17,8 @@ use super::plan::{KEPT, Plan};
 use super::scheme::Scheme;
 use super::work::Work;
 use super::{Blocks, Crew};
-use crate::model::{HybridModel, Integrator};
+use crate::model::Integrator;
+use crate::train::HybridModel;
 
 /// E and ||F_r||, `[2]`.
 pub(in crate::train) fn loss(

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::Blocks;
 use super::scheme::Scheme;
 use crate::batch::{Network, Rows};
-use crate::model::Frame;
+use crate::train::Frame;
 
 /// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
 /// enough that all that is made of them stays near the processor.

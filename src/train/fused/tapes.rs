@@ -1,6 +1,6 @@
 use crate::batch::W;
 use crate::expr::{Program, Tape};
-use crate::model::Frame;
+use crate::train::Frame;
 
 /// The programs of a frame, ready to run.
 #[derive(Debug)]

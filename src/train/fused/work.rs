@@ -4,8 +4,8 @@ use pulp::Arch;
 
 use super::part::{Backward, Forward, Part};
 use super::plan::{Numbers, Plan};
-use crate::model::Frame;
 use crate::rounds::Rounds;
+use crate::train::Frame;
 use crate::train::loss::NORM_FLOOR;
 
 /// The threads that losses are taken on, and memory that serves again for the next.

@@ -8,7 +8,7 @@ use super::tapes::Tapes;
 use crate::batch::{Network, Rows, W};
 use crate::expr::Tape;
 use crate::lanes::{Element, Vector};
-use crate::model::Frame;
+use crate::train::Frame;
 
 /// One thread at work on a chunk of blocks.
 pub(super) struct Worker<'a, S> {

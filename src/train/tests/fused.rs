@@ -10,10 +10,12 @@ use rand::RngExt;
 use super::{hybrid, one_joint, parameter, rng, transitions};
 use crate::expr::SignForm;
 use crate::model::{
-    Angles, Dynamics, HybridModel, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
-    PRIOR_ID, RESIDUAL_ID, ResidualOn,
+    Angles, Dynamics, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn,
 };
-use crate::train::{Backend, Batch, FitSettings, Objective, Segments, Start, Sweep, Training};
+use crate::train::hybrid::{PRIOR_ID, RESIDUAL_ID};
+use crate::train::{
+    Backend, Batch, FitSettings, HybridModel, Objective, Segments, Start, Sweep, Training,
+};
 
 const INTEGRATORS: [Integrator; 3] = [
     Integrator::SemiImplicitEuler,

@@ -1,8 +1,8 @@
 use burn::module::Module;
 
 use super::{hybrid, rng, transitions};
-use crate::model::{HybridModel, Integrator, LastLayer, MlpWeights, ModelWeights};
-use crate::train::{Backend, Objective, Segments};
+use crate::model::{Integrator, LastLayer, MlpWeights, ModelWeights};
+use crate::train::{Backend, HybridModel, Objective, Segments};
 
 /// A trajectory with irregular steps, cut into segments of three.
 fn segments() -> Segments {

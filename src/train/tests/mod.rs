@@ -4,6 +4,7 @@ mod checkpoints;
 mod fused;
 mod gradients;
 mod parity;
+mod plant;
 mod recovery;
 mod resume;
 mod shrinking;
@@ -12,9 +13,9 @@ mod sweep;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Backend, Segments};
+use super::{Backend, HybridModel, Segments};
 use crate::expr::{Graph, Scope, SignForm, parse};
-use crate::model::{Dynamics, HybridModel, LastLayer, MlpSettings, MlpWeights, Parameter};
+use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
 
 pub(super) const DT: f64 = 0.02;
 

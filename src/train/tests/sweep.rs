@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 
 use super::fused::{equations, network, segments};
 use super::{one_joint, parameter, rng, transitions};
-use crate::model::{Angles, HybridModel, Integrator, LastLayer, ResidualOn};
+use crate::model::{Angles, Integrator, LastLayer, ResidualOn};
 use crate::train::optimizer::Stepper;
 use crate::train::{
-    Backend, Batch, Batching, FitSettings, Objective, Penalty, Segments, Start, Sweep, Trained,
-    Training,
+    Backend, Batch, Batching, FitSettings, HybridModel, Objective, Penalty, Segments, Start, Sweep,
+    Trained, Training,
 };
 
 const BACKENDS: &[Backend] = Backend::ALL;
@@ -93,7 +93,7 @@ fn assert_close(found: &Trained, wanted: &Trained) {
 
 #[test]
 fn every_model_is_as_trained_alone() {
-    for backend in BACKENDS {
+    for &backend in BACKENDS {
         for (joints, steps) in [(1, 1), (1, 3), (2, 1), (2, 3)] {
             let segments = segments(joints, 37, steps);
             let network = |on| network(joints, Angles::SinCos, on, 7);
@@ -189,7 +189,7 @@ fn minibatches_penalties_and_bounds_are_those_of_a_run_alone() {
 
 #[test]
 fn a_model_that_diverges_leaves_the_others_as_they_are() {
-    for backend in BACKENDS {
+    for &backend in BACKENDS {
         let (model, segments) = bounded(backend);
         let sound = starts(&model, LastLayer::Random);
         let wanted = sweep(&model, &settings(), &sound, &segments);
@@ -217,7 +217,7 @@ fn segments_of_other_joints_are_refused() {
 fn equations_without_parameters_can_have_a_residual() {
     let segments = segments(1, 20, 1);
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
-    for backend in BACKENDS {
+    for &backend in BACKENDS {
         let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
         let model = HybridModel::physics(&dynamics, &backend.device())
             .and_then(|model| model.with_residual(&residual))
