@@ -4,7 +4,7 @@
 //! everything else reads that program. [`closeloop`] fits a declared model to logs and names the effects
 //! that it lacks; [`evaluate`] measures how far a model runs from logs; [`plant`] simulates rigs with effects
 //! that nobody is told about; [`train`] trains hybrid models of physics and a network; [`plan`] finds inputs by which a
-//! model does what is wanted; [`export`] writes models for other programs. The binary
+//! model does what is wanted; [`formats`] reads and writes those of other programs. The binary
 //! `residyn` is a thin layer over these modules.
 //!
 //! The library prints nothing outside of [`cli`], reads no clock, and takes its random numbers as an argument.
@@ -48,13 +48,12 @@ pub mod data;
 pub mod evaluate;
 #[cfg(feature = "train")]
 pub mod experiment;
-pub mod export;
 pub mod expr;
+pub mod formats;
 pub mod identify;
 pub mod lanes;
 #[cfg(feature = "train")]
 pub mod mbrl;
-pub mod mechanism;
 pub mod model;
 pub mod plan;
 pub mod plant;

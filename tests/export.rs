@@ -1,10 +1,12 @@
-//! Exported models, read by the programs that they are for.
+//! Exported models, read by programs of their users.
 
 use std::io::Write;
 use std::path::Path;
 
 use residyn::control::{Meter, Task};
-use residyn::export::{Answers, Format, Portable, PythonClient, Samples, Unread, find};
+use residyn::formats::{
+    Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
+};
 use residyn::model::{Integrator, System};
 use serde_json::{Value, json};
 
@@ -13,75 +15,98 @@ use crate::common::{USER_EFFECT, rng, system};
 use crate::models;
 use crate::support::{refuses, residyn, succeeds, text};
 
-/// The rebuilding of a description that docs/export.md shows.
+/// The client of descriptions that docs/export.md shows.
 const DESCRIPTION: PythonClient = PythonClient {
     name: "description.py",
     script: include_str!("../docs/clients/description.py"),
     packages: "numpy safetensors",
 };
 
-/// What a reader says of a model that was written to a folder of its own; loudly none without a reader.
-pub fn answers(name: &str, ask: impl FnOnce() -> Result<Answers, Unread>) -> Option<Answers> {
-    match ask() {
-        Ok(answers) => Some(answers),
-        Err(Unread::NoReader(reason)) => {
+/// What a client predicts; none, said loudly, without a client on this machine.
+pub fn predictions(
+    name: &str,
+    predict: impl FnOnce() -> Result<Predictions, ClientError>,
+) -> Option<Predictions> {
+    match predict() {
+        Ok(predictions) => Some(predictions),
+        Err(ClientError::Unavailable(reason)) => {
             let required = std::env::var_os("RESIDYN_PYTHON").is_some();
             assert!(!required, "{name}: {reason}");
             // Not eprintln!, which the test harness swallows.
             let _ = writeln!(std::io::stderr(), "SKIPPED {name}: {reason}; run tests/run");
             None
         }
-        Err(Unread::Refused(said)) => panic!("{name}: {said}"),
+        Err(ClientError::Failed(said)) => panic!("{name}: {said}"),
     }
 }
 
-/// Steps, derivatives and a rollout are all there and as predicted here.
-pub fn agree(name: &str, own: &Answers, theirs: &Answers, tolerance: f64) {
+/// Steps, derivatives and the rollout are all there and match the program's own.
+pub fn agree(name: &str, own: &Predictions, theirs: &Predictions, tolerance: f64) {
     let difference = own.difference(theirs);
     for (what, difference) in [
         ("step", difference.next),
         ("derivative", difference.derivative),
         ("rollout", difference.rollout),
     ] {
-        let difference = difference.unwrap_or_else(|| panic!("{name}: no answer for a {what}"));
+        let difference = difference.unwrap_or_else(|| panic!("{name}: no prediction of a {what}"));
         assert!(difference <= tolerance, "{name}, {what}: {difference:e}");
     }
 }
 
-fn question(model: &Portable) -> (Samples, Answers) {
+fn expected(model: &ExportModel) -> (Samples, Predictions) {
     let samples = model.samples(&mut rng(1)).unwrap();
-    let own = model.answers(&samples).unwrap();
+    let own = model.predict(&samples).unwrap();
     (samples, own)
 }
 
-/// Every kind of model in one format, as its reader sees it.
-fn every_model_is_read_alike(format: &Format, extension: &str) {
-    for (name, model) in models::all() {
+/// Every model in one format, as the format's client predicts it.
+pub fn client_agrees(format: &Format, models: &[(&str, ExportModel)]) {
+    for (name, model) in models {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(format!("{name}.{extension}"));
-        format.write(&model, &path).unwrap();
-        let (samples, own) = question(&model);
+        let path = folder.path().join(name.replace(' ', "_"));
+        let path = path.with_extension(format.extension);
+        format.write(model, &path).unwrap();
+        let (samples, own) = expected(model);
         let name = format!("{name} as {}", format.name);
-        if let Some(theirs) = answers(&name, || format.ask(&path, &samples)) {
+        if let Some(theirs) = predictions(&name, || format.predict(&path, &samples)) {
             agree(&name, &own, &theirs, format.tolerance);
         }
     }
 }
 
+/// What holds for a new format without a test of its own.
+#[test]
+fn every_format_is_read_by_its_client_and_documented() {
+    let pendulum = models::all().swap_remove(0);
+    let guide = include_str!("../docs/export.md");
+    for format in FORMATS {
+        if !matches!(format.client, Client::None(_)) {
+            client_agrees(format, std::slice::from_ref(&pendulum));
+        }
+        let mut headings = guide.lines().filter_map(|line| line.strip_prefix("## "));
+        let has_section = headings.any(|heading| heading.split(' ').any(|w| w == format.name));
+        assert!(
+            has_section,
+            "docs/export.md has no section on {}",
+            format.name
+        );
+    }
+}
+
 #[test]
 fn onnxruntime_predicts_the_same() {
-    every_model_is_read_alike(find("onnx").unwrap(), "onnx");
+    client_agrees(find("onnx").unwrap(), &models::all());
 }
 
 #[test]
 fn a_python_module_predicts_the_same() {
-    every_model_is_read_alike(find("python").unwrap(), "py");
+    client_agrees(find("python").unwrap(), &models::all());
 }
 
 #[test]
 fn a_description_is_read_back_to_the_same_model() {
-    every_model_is_read_alike(find("json").unwrap(), "json");
-    every_model_is_read_alike(find("safetensors").unwrap(), "safetensors");
+    client_agrees(find("json").unwrap(), &models::all());
+    client_agrees(find("safetensors").unwrap(), &models::all());
 }
 
 #[test]
@@ -90,8 +115,8 @@ fn a_description_can_be_rebuilt_with_numpy() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("model.json");
         find("json").unwrap().write(&model, &path).unwrap();
-        let (samples, own) = question(&model);
-        if let Some(theirs) = answers(name, || DESCRIPTION.ask(&path, &samples)) {
+        let (samples, own) = expected(&model);
+        if let Some(theirs) = predictions(name, || DESCRIPTION.predict(&path, &samples)) {
             agree(name, &own, &theirs, 1e-9);
         }
     }
@@ -313,9 +338,9 @@ delta = 0.005
 driven = 1
 "#;
     let system = models::system("pendulum", effects);
-    let model = Portable::stated(&system, Integrator::Rk4, 0.01, Value::Null);
+    let model = ExportModel::of_system(&system, Integrator::Rk4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
-        let limits = (find(name).unwrap().limits)(&model);
+        let limits = (find(name).unwrap().not_carried)(&model);
         for piece in [
             "what the sensors show",
             "values of q_z1 that single logs have",
@@ -332,13 +357,13 @@ fn names_and_units_of_files_do_not_break_a_module() {
                 lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
                 [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
     let system = System::from_text(Path::new("odd.toml"), text, &[]).unwrap();
-    let model = Portable::stated(&system, Integrator::Rk4, 0.01, json!("\"\"\"\n\\"));
+    let model = ExportModel::of_system(&system, Integrator::Rk4, 0.01, json!("\"\"\"\n\\"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.module");
     let format = find("python").unwrap();
     format.write(&model, &path).unwrap();
-    let (samples, own) = question(&model);
-    if let Some(theirs) = answers("odd", || format.ask(&path, &samples)) {
+    let (samples, own) = expected(&model);
+    if let Some(theirs) = predictions("odd", || format.predict(&path, &samples)) {
         agree("odd", &own, &theirs, format.tolerance);
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use rand::RngExt;
-use residyn::export::{Answers, Portable, Samples, find};
+use residyn::formats::{ExportModel, Predictions, Samples, find};
 use residyn::lanes::Row;
 use residyn::model::{Commands, Integrator, Library, StepTorque, System};
 use serde_json::json;
@@ -35,16 +35,16 @@ let.int_ = "(double < time) * (q1 >= 0.1) + where(q1 <= 1, 1, 0)"
 qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 0.1 * t"
 "#;
 
-fn odd() -> Portable {
+fn odd() -> ExportModel {
     let library = Library::built_in();
     let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
-    Portable::stated(&system, Integrator::Rk4, 0.01, json!("*/ \\"))
+    ExportModel::of_system(&system, Integrator::Rk4, 0.01, json!("*/ \\"))
 }
 
 /// A model's header in a folder of its own.
 struct Header {
     name: &'static str,
-    model: Portable,
+    model: ExportModel,
     folder: TempDir,
 }
 
@@ -173,7 +173,7 @@ fn question(samples: &Samples) -> String {
 const CLIENT: &str = "docs/clients/c.c";
 
 /// What the client answers under these flags.
-fn answers(header: &Header, flags: &[&str], samples: &Samples) -> Answers {
+fn predictions(header: &Header, flags: &[&str], samples: &Samples) -> Predictions {
     let rows = header.ask(CLIENT, flags, &question(samples));
     let (points, rollout) = rows.split_at(samples.states.len());
     let (next, derivative) = points
@@ -183,7 +183,7 @@ fn answers(header: &Header, flags: &[&str], samples: &Samples) -> Answers {
             (next.to_vec(), derivative.to_vec())
         })
         .unzip();
-    Answers {
+    Predictions {
         next: Some(next),
         derivative: Some(derivative),
         rollout: Some(rollout.to_vec()),
@@ -194,8 +194,11 @@ fn answers(header: &Header, flags: &[&str], samples: &Samples) -> Answers {
 fn the_compiled_header_predicts_what_the_program_does() {
     for header in headers(&["cc"]) {
         let samples = header.model.samples(&mut rng(3)).unwrap();
-        let own = header.model.answers(&samples).unwrap();
-        let theirs = find("c").unwrap().ask(&header.path(), &samples).unwrap();
+        let own = header.model.predict(&samples).unwrap();
+        let theirs = find("c")
+            .unwrap()
+            .predict(&header.path(), &samples)
+            .unwrap();
         let difference = own.difference(&theirs);
         assert!(
             difference.pointwise() <= 1e-9,
@@ -215,9 +218,9 @@ fn the_compiled_header_predicts_what_the_program_does() {
 fn in_single_precision_it_is_as_close_as_that_allows() {
     for header in headers(&["cc"]) {
         let samples = header.model.samples(&mut rng(4)).unwrap();
-        let own = header.model.answers(&samples).unwrap();
+        let own = header.model.predict(&samples).unwrap();
         let float = format!("-D{}_FLOAT", header.model.name().to_uppercase());
-        let difference = own.difference(&answers(&header, &["-O2", &float], &samples));
+        let difference = own.difference(&predictions(&header, &["-O2", &float], &samples));
         assert!(
             difference.pointwise() <= 1e-5,
             "{} {difference:?}",
@@ -235,8 +238,8 @@ fn nothing_is_read_or_written_where_it_must_not_be() {
     ];
     for header in headers(&["cc"]) {
         let samples = header.model.samples(&mut rng(5)).unwrap();
-        let own = header.model.answers(&samples).unwrap();
-        let difference = own.difference(&answers(&header, &flags, &samples));
+        let own = header.model.predict(&samples).unwrap();
+        let difference = own.difference(&predictions(&header, &flags, &samples));
         assert!(
             difference.pointwise() <= 1e-9,
             "{} {difference:?}",

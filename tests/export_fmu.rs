@@ -3,17 +3,17 @@
 use std::io::{Cursor, Read};
 use std::process::Command;
 
-use residyn::export::{Format, Portable, find};
+use residyn::formats::{ExportModel, Format, find};
 use serde_json::{Value, json};
 use zip::ZipArchive;
 
 use crate::clients::client;
 use crate::common::rng;
-use crate::export::answers;
+use crate::export::predictions;
 use crate::export_c::{succeeds, there_are};
 use crate::models;
 
-fn model(name: &str) -> Portable {
+fn model(name: &str) -> ExportModel {
     let mut models = models::all().into_iter();
     models.find(|(known, _)| *known == name).unwrap().1
 }
@@ -37,8 +37,8 @@ fn a_simulator_predicts_what_the_program_does() {
         let path = folder.path().join("model.fmu");
         format.write(&model, &path).unwrap();
         let samples = model.samples(&mut rng(3)).unwrap();
-        let own = model.answers(&samples).unwrap();
-        let Some(theirs) = answers(name, || format.ask(&path, &samples)) else {
+        let own = model.predict(&samples).unwrap();
+        let Some(theirs) = predictions(name, || format.predict(&path, &samples)) else {
             continue;
         };
         let difference = own.difference(&theirs);
@@ -80,7 +80,7 @@ fn a_simulator_can_tune_keep_and_differentiate_it() {
         changed.value = tuned;
         let case = json!({
             "samples": samples, "parameter": parameter, "value": value, "unit": unit,
-            "other_value": tuned, "other_rollout": other.answers(&samples).unwrap().rollout,
+            "other_value": tuned, "other_rollout": other.predict(&samples).unwrap().rollout,
             "solver_tolerance": solver_tolerance,
         });
         let folder = tempfile::tempdir().unwrap();
@@ -95,7 +95,7 @@ fn a_simulator_can_tune_keep_and_differentiate_it() {
 }
 
 /// Names and bytes of what is in the unit.
-fn unpacked(model: &Portable, format: &Format) -> Vec<(String, Vec<u8>)> {
+fn unpacked(model: &ExportModel, format: &Format) -> Vec<(String, Vec<u8>)> {
     let files = (format.files)(model, "model.fmu".as_ref()).unwrap();
     let mut archive = ZipArchive::new(Cursor::new(&files[0].bytes)).unwrap();
     let mut unpacked = Vec::new();

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use rand::RngExt;
 use residyn::expr::SignForm;
-use residyn::mechanism::{Chain, model_text, read_mjcf, read_urdf};
+use residyn::formats::{FORMATS, Format};
+use residyn::model::chain::{Chain, model_text};
 use residyn::model::{Dynamics, FittedEffect, Library, System};
 use serde_json::json;
 
@@ -27,13 +28,19 @@ pub fn fixture(name: &str) -> PathBuf {
     root.join("tests/fixtures/mechanisms").join(name)
 }
 
+/// The format of robot descriptions that a file's extension tells.
+fn format(file: &Path) -> &'static Format {
+    let extension = file.extension().unwrap();
+    let mut formats = FORMATS.iter().filter(|format| format.robots.is_some());
+    formats.find(|f| extension == f.extension).unwrap()
+}
+
+pub fn read(file: &Path) -> Chain {
+    (format(file).robots.as_ref().unwrap().read)(file).unwrap()
+}
+
 fn chain(name: &str) -> Chain {
-    let file = fixture(name);
-    if name.ends_with("urdf") {
-        read_urdf(&file).unwrap()
-    } else {
-        read_mjcf(&file).unwrap()
-    }
+    read(&fixture(name))
 }
 
 fn system(chain: &Chain) -> System {
@@ -247,13 +254,9 @@ fn message(name: &str, from: &str, to: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join(name);
     fs::write(&file, contents.replacen(from, to, 1)).unwrap();
-    let source = if name.ends_with("urdf") {
-        "--from-urdf"
-    } else {
-        "--from-mjcf"
-    };
+    let source = format!("--from-{}", format(&file).name);
     let out = folder.path().join("model.toml");
-    let message = refuses(&["new", source, text(&file), "--out", text(&out)]);
+    let message = refuses(&["new", &source, text(&file), "--out", text(&out)]);
     assert!(!out.exists(), "a file was left behind");
     message
 }
@@ -419,10 +422,10 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
 }
 
 #[test]
-fn the_other_format_is_met_with_its_option() {
+fn the_other_format_is_named() {
     let file = fixture("rp.xml");
     let said = refuses(&["new", "--from-urdf", text(&file)]);
-    assert!(said.contains("read it with --from-mjcf"), "{said}");
+    assert!(said.contains("this is MJCF, read it as mjcf"), "{said}");
     let said = refuses(&["new", "--from-urdf", "nowhere.urdf"]);
     assert!(said.contains("nowhere.urdf: cannot be read"), "{said}");
     let said = refuses(&["new"]);
@@ -441,7 +444,7 @@ fn angles_that_were_rounded_are_taken_as_written_and_noted() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("exact.urdf");
     fs::write(&file, contents.replacen("1.5708", "1.5707963268", 1)).unwrap();
-    let text = model_text(&read_urdf(&file).unwrap());
+    let text = model_text(&read(&file));
     let short = "M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\"";
     assert!(text.contains(short), "{text}");
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use rand_chacha::ChaCha8Rng;
-use residyn::export::Portable;
+use residyn::formats::ExportModel;
 use residyn::model::{
     Angles, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights,
     ResidualOn, System,
@@ -56,7 +56,7 @@ m = 4.0
 "#;
 
 /// All of them, by name.
-pub fn all() -> Vec<(&'static str, Portable)> {
+pub fn all() -> Vec<(&'static str, ExportModel)> {
     let fine = Integrator::Fine {
         steps: 4.try_into().unwrap(),
     };
@@ -113,11 +113,16 @@ pub fn system(name: &str, effects: &str) -> System {
     .unwrap()
 }
 
-fn physics(system: &System, integrator: Integrator, step_s: f64) -> Portable {
-    Portable::stated(system, integrator, step_s, origin(system))
+fn physics(system: &System, integrator: Integrator, step_s: f64) -> ExportModel {
+    ExportModel::of_system(system, integrator, step_s, origin(system))
 }
 
-fn hybrid(system: &System, residual: &MlpWeights, integrator: Integrator, step_s: f64) -> Portable {
+fn hybrid(
+    system: &System,
+    residual: &MlpWeights,
+    integrator: Integrator,
+    step_s: f64,
+) -> ExportModel {
     let mut model = physics(system, integrator, step_s);
     model.residual = Some(residual.clone());
     model
@@ -128,13 +133,13 @@ fn data_driven(
     prior: &MlpWeights,
     integrator: Integrator,
     step_s: f64,
-) -> Portable {
+) -> ExportModel {
     let numbers = ModelWeights {
         parameters: Vec::new(),
         prior: Some(prior.clone()),
         residual: None,
     };
-    Portable::new(system, numbers, integrator, step_s, origin(system))
+    ExportModel::new(system, numbers, integrator, step_s, origin(system))
 }
 
 fn origin(system: &System) -> serde_json::Value {
@@ -167,17 +172,17 @@ fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> Ml
 #[test]
 fn the_models_are_of_every_kind() {
     let models = all();
-    let some = |kind: fn(&Portable) -> bool| models.iter().any(|(_, model)| kind(model));
-    assert!(some(
-        |m| m.networks().next().is_none() && m.effects.is_empty()
-    ));
+    let some = |kind: fn(&ExportModel) -> bool| models.iter().any(|(_, model)| kind(model));
+    assert!(some(|m| m.prior.is_none()
+        && m.residual.is_none()
+        && m.effects.is_empty()));
     assert!(some(
         |m| !m.equations.filters.is_empty() && m.residual.is_some()
     ));
     assert!(some(|m| m.prior.is_some()));
     for (name, model) in &models {
         let samples = model.samples(&mut rng(1)).unwrap();
-        let answers = model.answers(&samples).unwrap();
+        let answers = model.predict(&samples).unwrap();
         let numbers = answers.rollout.unwrap().concat();
         assert!(numbers.iter().all(|x| x.abs() < 100.0), "{name} runs away");
     }

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use residyn::export::{Portable, find};
 use residyn::expr::SignForm;
-use residyn::mechanism::{model_text, read_mjcf, read_urdf};
+use residyn::formats::{ExportModel, FORMATS, find};
+use residyn::model::chain::model_text;
 use residyn::model::{Integrator, Library, System};
 use serde_json::json;
 
 use crate::common::{assert_near, dynamics, points, rng};
-use crate::export::{agree, answers};
-use crate::mechanism::fixture;
+use crate::export::{client_agrees, predictions};
+use crate::mechanism::{fixture, read};
 use crate::models;
 use crate::support::{refuses, residyn, text};
 
@@ -19,19 +19,19 @@ fn effect(name: &str, joint: usize, values: &str) -> String {
     format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
 }
 
-fn portable(name: &str, integrator: Integrator, effects: &[String]) -> Portable {
+fn portable(name: &str, integrator: Integrator, effects: &[String]) -> ExportModel {
     let text = Library::system_text(name).unwrap().to_owned() + &effects.concat();
     of_text(&text, integrator)
 }
 
-fn of_text(text: &str, integrator: Integrator) -> Portable {
+fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     let library = Library::built_in();
     let system = System::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
-    Portable::stated(&system, integrator, 0.01, json!({}))
+    ExportModel::of_system(&system, integrator, 0.01, json!({}))
 }
 
 /// What both formats carry.
-fn plain() -> Vec<(&'static str, Portable)> {
+fn plain() -> Vec<(&'static str, ExportModel)> {
     let fine = Integrator::Fine {
         steps: 4.try_into().unwrap(),
     };
@@ -77,7 +77,7 @@ fn plain() -> Vec<(&'static str, Portable)> {
 }
 
 /// Equations alone: what they are those of has to be found.
-fn stated() -> Vec<(&'static str, Portable)> {
+fn stated() -> Vec<(&'static str, ExportModel)> {
     let stated = |slides: &str, mass: &[&[&str]], bias: &[&str]| {
         let text = format!(
             "[system]\nname = \"stated\"\njoints = {}\nprismatic = {slides}\n[dynamics]\nmass = {mass:?}\nbias = {bias:?}\n",
@@ -93,7 +93,7 @@ fn stated() -> Vec<(&'static str, Portable)> {
         "(0.4*sin(q2) - 0.1*cos(q2))*qd1^2 + 0.3*qd2",
     ];
     let inclined = &["-4 - 0.3*sin(q2)*qd2^2", "-2.7*sin(q2) - 0.6*cos(q2)"];
-    let arm = read_urdf(&fixture("planar_2r.urdf")).unwrap();
+    let arm = read(&fixture("planar_2r.urdf"));
     vec![
         ("leaning pendulum", stated("[]", &[&["0.7"]], lean)),
         ("inclined slide", stated("[1]", &[&["2"]], &["5 + 0.3*qd1"])),
@@ -114,7 +114,7 @@ fn stated() -> Vec<(&'static str, Portable)> {
 }
 
 /// What MJCF carries beside that, by steps.
-fn driven() -> Vec<(&'static str, Portable)> {
+fn driven() -> Vec<(&'static str, ExportModel)> {
     let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
     let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");
     let gain = |joint| effect("actuator_gain", joint, "g = 0.3");
@@ -148,31 +148,16 @@ fn driven() -> Vec<(&'static str, Portable)> {
     ]
 }
 
-fn mujoco_agrees(format: &str, extension: &str, models: &[(&str, Portable)]) {
-    let format = find(format).unwrap();
-    for (name, model) in models {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("model").with_extension(extension);
-        format.write(model, &path).unwrap();
-        let samples = model.samples(&mut rng(1)).unwrap();
-        let own = model.answers(&samples).unwrap();
-        let name = format!("{name} as {}", format.name);
-        if let Some(theirs) = answers(&name, || format.ask(&path, &samples)) {
-            agree(&name, &own, &theirs, format.tolerance);
-        }
-    }
-}
-
 #[test]
 fn mujoco_moves_mjcf_alike() {
-    mujoco_agrees("mjcf", "xml", &plain());
-    mujoco_agrees("mjcf", "xml", &driven());
-    mujoco_agrees("mjcf", "xml", &stated());
+    client_agrees(find("mjcf").unwrap(), &plain());
+    client_agrees(find("mjcf").unwrap(), &driven());
+    client_agrees(find("mjcf").unwrap(), &stated());
 }
 
 #[test]
 fn mujoco_moves_urdf_alike() {
-    mujoco_agrees("urdf", "urdf", &plain());
+    client_agrees(find("urdf").unwrap(), &plain());
 }
 
 #[test]
@@ -184,8 +169,8 @@ fn a_lag_has_the_same_derivative() {
     let path = folder.path().join("model.xml");
     format.write(&model, &path).unwrap();
     let samples = model.samples(&mut rng(1)).unwrap();
-    let own = model.answers(&samples).unwrap();
-    if let Some(theirs) = answers("lag", || format.ask(&path, &samples)) {
+    let own = model.predict(&samples).unwrap();
+    if let Some(theirs) = predictions("lag", || format.predict(&path, &samples)) {
         let difference = own.difference(&theirs);
         assert!(
             difference.derivative.unwrap() <= format.tolerance,
@@ -193,7 +178,7 @@ fn a_lag_has_the_same_derivative() {
         );
         assert_eq!((difference.next, difference.rollout), (None, None));
     }
-    let limits = (format.limits)(&model);
+    let limits = (format.not_carried)(&model);
     assert!(limits[0].starts_with("the lag within a step"), "{limits:?}");
 }
 
@@ -202,15 +187,10 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
     let library = Library::built_in();
     for (name, model) in plain() {
         let folder = tempfile::tempdir().unwrap();
-        for (format, extension) in [("mjcf", "xml"), ("urdf", "urdf")] {
-            let path = folder.path().join("model").with_extension(extension);
-            find(format).unwrap().write(&model, &path).unwrap();
-            let chain = if format == "mjcf" {
-                read_mjcf(&path)
-            } else {
-                read_urdf(&path)
-            };
-            let mut chain = chain.unwrap();
+        for format in FORMATS.iter().filter(|format| format.robots.is_some()) {
+            let path = folder.path().join("model").with_extension(format.extension);
+            format.write(&model, &path).unwrap();
+            let mut chain = read(&path);
             // URDF says nothing of gravity.
             let down = chain.gravity.normalize();
             let own = model.declared().parameters;
@@ -236,7 +216,7 @@ fn what_is_not_carried_is_said() {
         + &effect("rotor_inertia", 2, "J = 0.1")
         + &effect("actuator_gain", 2, "g = 0.5");
     let model = portable("acrobot", Integrator::Rk4, &[rest]);
-    let said = |format: &str| (find(format).unwrap().limits)(&model).join("\n");
+    let said = |format: &str| (find(format).unwrap().not_carried)(&model).join("\n");
     let (mjcf, urdf) = (said("mjcf"), said("urdf"));
     assert!(
         mjcf.starts_with("stribeck_friction on joint 1") && mjcf.lines().count() == 1,

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
 use super::{Answer, Common};
-use crate::export::{Difference, File, Format, Portable, Unread, find};
+use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
 use crate::model::{Integrator, Library};
 use crate::train::Manifest;
 
@@ -45,17 +45,17 @@ const STEP_S: f64 = 0.01;
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let format = arguments.format;
     let model = portable(arguments)?;
-    let limits = (format.limits)(&model);
-    for limit in &limits {
-        eprintln!("not carried: {limit}");
+    let not_carried = (format.not_carried)(&model);
+    for what in &not_carried {
+        eprintln!("not carried: {what}");
     }
     let files = format.write(&model, &arguments.out)?;
     let measured = measure(format, &model, arguments);
     inputs::print(&match arguments.common.json {
-        true => format!("{:#}\n", printed(format, &files, &limits, &measured)),
+        true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
         false => text(format, &files, &measured),
     })?;
-    if let Err(Unread::Refused(said)) = &measured {
+    if let Err(ClientError::Failed(said)) = &measured {
         bail!("what was written cannot be read: {said}");
     }
     let same = |d: &Difference| d.pointwise() <= format.tolerance;
@@ -65,15 +65,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     })
 }
 
-fn measure(format: &Format, model: &Portable, arguments: &Arguments) -> Result<Difference, Unread> {
+fn measure(
+    format: &Format,
+    model: &ExportModel,
+    arguments: &Arguments,
+) -> Result<Difference, ClientError> {
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let refused = |error: crate::model::NetworkError| Unread::Refused(error.to_string());
+    let refused = |error: crate::model::NetworkError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
-    let own = model.answers(&samples).map_err(refused)?;
-    Ok(own.difference(&format.ask(&arguments.out, &samples)?))
+    let own = model.predict(&samples).map_err(refused)?;
+    Ok(own.difference(&format.predict(&arguments.out, &samples)?))
 }
 
-fn portable(arguments: &Arguments) -> Result<Portable> {
+fn portable(arguments: &Arguments) -> Result<ExportModel> {
     if let Some(step) = arguments.step.filter(|s| !(*s > 0.0 && s.is_finite())) {
         bail!("--step {step}: a step is a number of seconds above zero");
     }
@@ -84,7 +88,7 @@ fn portable(arguments: &Arguments) -> Result<Portable> {
     }
 }
 
-fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<Portable> {
+fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<ExportModel> {
     let device = arguments.common.device;
     let (checkpoint, system, _) = inputs::checkpoint(dir, library, device)?;
     let Manifest {
@@ -93,7 +97,7 @@ fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result
         settings,
         ..
     } = &checkpoint.manifest;
-    Ok(Portable::new(
+    Ok(ExportModel::new(
         &system,
         checkpoint.weights.clone(),
         arguments.integrator.unwrap_or(settings.integrator),
@@ -109,9 +113,9 @@ fn step_of(config: &Value) -> Option<f64> {
     steps.find_map(|step| step?.as_f64())
 }
 
-fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Portable> {
+fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<ExportModel> {
     let system = library.system(file)?;
-    Ok(Portable::stated(
+    Ok(ExportModel::of_system(
         &system,
         arguments.integrator.unwrap_or(Integrator::Rk4),
         arguments.step.unwrap_or(STEP_S),
@@ -122,8 +126,8 @@ fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Port
 fn printed(
     format: &Format,
     files: &[File],
-    limits: &[String],
-    measured: &Result<Difference, Unread>,
+    not_carried: &[String],
+    measured: &Result<Difference, ClientError>,
 ) -> Value {
     let file =
         |file: &File| json!({"path": file.path, "bytes": file.bytes.len(), "about": file.about});
@@ -134,13 +138,13 @@ fn printed(
     json!({
         "format": format.name,
         "files": files.iter().map(file).collect::<Vec<_>>(),
-        "not_carried": limits,
+        "not_carried": not_carried,
         "difference": difference,
         "not_measured": measured.as_ref().err().map(ToString::to_string),
     })
 }
 
-fn text(format: &Format, files: &[File], measured: &Result<Difference, Unread>) -> String {
+fn text(format: &Format, files: &[File], measured: &Result<Difference, ClientError>) -> String {
     let mut out = String::new();
     for File { path, bytes, about } in files {
         let _ = writeln!(out, "{}: {about}, {}", path.display(), size(bytes.len()));

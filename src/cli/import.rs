@@ -5,7 +5,7 @@ use clap::Args;
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
-use crate::export::Imported;
+use crate::formats::Imported;
 use crate::train::save_imported;
 
 /// Make a checkpoint of a model that was exported as JSON and safetensors
@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let imported = Imported::read(&arguments.file, library.effects())?;
     let (system, by) = (
         imported.system.name.clone(),
-        imported.description.residyn.clone(),
+        imported.written_by().to_owned(),
     );
     save_imported(&arguments.out, imported, seed, device)?;
     let out = arguments.out.display();

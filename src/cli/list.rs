@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs};
 use crate::control::Task;
-use crate::export::FORMATS;
+use crate::formats::FORMATS;
 use crate::model::{Effect, Library, System};
 use crate::plant::Plant;
 
@@ -31,7 +31,7 @@ enum What {
     Formats,
 }
 
-/// Formats that the program reads and writes beside those of `export`, and what for.
+/// Formats of the program's own files and of logs.
 const OTHERS: &[(&str, &str)] = &[
     ("csv", "logs, in and out"),
     (
@@ -130,13 +130,15 @@ fn tasks() -> Result<(String, serde_json::Value)> {
 }
 
 fn formats() -> (String, serde_json::Value) {
-    let exported = FORMATS
-        .iter()
-        .map(|f| (f.name, format!("{}, out", f.about)));
+    let models = FORMATS.iter().map(|format| {
+        let read = format.robots.as_ref();
+        let read = read.map_or_else(String::new, |robots| format!("; {}, in", robots.about));
+        (format.name, format!("{}, out{read}", format.about))
+    });
     let others = OTHERS
         .iter()
         .map(|(name, what)| (*name, (*what).to_owned()));
-    let all: Vec<_> = exported.chain(others).collect();
+    let all: Vec<_> = models.chain(others).collect();
     let text = all.iter().map(|(name, what)| format!("{name}: {what}\n"));
     let values = all
         .iter()

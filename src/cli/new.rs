@@ -1,11 +1,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use clap::Args;
+use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
-use crate::mechanism::{Chain, model_text, read_mjcf, read_urdf};
+use crate::formats::{FORMATS, Format, RobotReader};
+use crate::model::chain::model_text;
 use crate::model::{Library, System};
 use crate::report::write_whole;
 
@@ -22,19 +23,60 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-#[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
+/// The robot description to read: one flag for each format that has them.
+#[derive(Debug)]
 struct Description {
-    /// URDF of up to three revolute, continuous or prismatic joints, one carrying the next
-    #[arg(long, value_name = "FILE")]
-    from_urdf: Option<PathBuf>,
-    /// MJCF of up to three hinge or slide joints, one carrying the next
-    #[arg(long, value_name = "FILE")]
-    from_mjcf: Option<PathBuf>,
+    reader: &'static RobotReader,
+    file: PathBuf,
+}
+
+/// The formats of robot descriptions, each with its flag.
+fn flags() -> impl Iterator<Item = (&'static str, &'static Format, &'static RobotReader)> {
+    FORMATS.iter().filter_map(|format| {
+        let reader = format.robots.as_ref()?;
+        // Clap takes static names alone.
+        let flag: &'static str = format!("from-{}", format.name).leak();
+        Some((flag, *format, reader))
+    })
+}
+
+impl Args for Description {
+    fn augment_args(command: Command) -> Command {
+        let flag = |(name, format, reader): (&'static str, &Format, &RobotReader)| {
+            let help = format!("{} of {}", format.name.to_uppercase(), reader.about);
+            let file = Arg::new(name).long(name).value_name("FILE").help(help);
+            file.value_parser(value_parser!(PathBuf))
+        };
+        let names = flags().map(|(name, ..)| name);
+        let one_of_them = ArgGroup::new("description").args(names).required(true);
+        command.args(flags().map(flag)).group(one_of_them)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Description {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let mut given = flags().filter_map(|(name, _, reader)| {
+            let file = matches.get_one::<PathBuf>(name)?.clone();
+            Some(Self { reader, file })
+        });
+        given
+            .next()
+            .ok_or_else(|| clap::Error::new(clap::error::ErrorKind::MissingRequiredArgument))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let chain = chain(&arguments.description)?;
+    let Description { reader, file } = &arguments.description;
+    let chain = (reader.read)(file)?;
     let text = model_text(&chain);
     let name = Path::new(&chain.name);
     let system = System::from_text(name, &text, Library::built_in().effects())?;
@@ -58,12 +100,4 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         inputs::print(&text)?;
     }
     Ok(Answer::Yes)
-}
-
-fn chain(description: &Description) -> Result<Chain> {
-    match (&description.from_urdf, &description.from_mjcf) {
-        (Some(urdf), _) => Ok(read_urdf(urdf)?),
-        (None, Some(mjcf)) => Ok(read_mjcf(mjcf)?),
-        (None, None) => anyhow::bail!("give --from-urdf or --from-mjcf"),
-    }
 }

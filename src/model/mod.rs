@@ -2,6 +2,7 @@
 //! integrators that run it.
 
 mod assemble;
+pub mod chain;
 mod command;
 mod dynamics;
 mod effect;

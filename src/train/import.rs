@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use super::{Backend, CheckpointError, FitSettings, HybridModel, Training, save};
-use crate::export::{Description, Imported};
+use crate::formats::Imported;
 use crate::model::Origin;
 
 /// Write an exported model as a checkpoint that has not been trained any further. `seed` orders the minibatches of a
@@ -27,22 +27,16 @@ pub fn save_imported(
     let dynamics = system.dynamics(&system.sign());
     let device = backend.device();
     let model = HybridModel::restored(&description.shape, &numbers, &dynamics, &device)?;
-    let Description {
-        integrator,
-        step_s,
-        origin,
-        model_toml,
-        ..
-    } = description;
     let settings = FitSettings {
-        integrator,
+        integrator: description.integrator,
         ..FitSettings::default()
     };
     let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(seed))?;
+    let (step_s, exported) = (description.step_s, description.origin);
     let origin = Origin {
-        config: json!({"command": "import", "step_s": step_s, "origin": origin}),
+        config: json!({"command": "import", "step_s": step_s, "origin": exported}),
         seed,
-        model_toml,
+        model_toml: description.model_toml,
     };
     save(dir, &training, &origin)
 }

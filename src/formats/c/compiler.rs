@@ -1,0 +1,32 @@
+use std::process::Command;
+
+use crate::formats::ClientError;
+
+/// The C compiler: `$CC`, which may bring arguments, else `cc`.
+pub(in crate::formats) fn compiler() -> Command {
+    let named = std::env::var("CC").unwrap_or_default();
+    let mut words = named.split_whitespace();
+    let mut command = Command::new(words.next().unwrap_or("cc"));
+    command.args(words);
+    command
+}
+
+/// Run it.
+///
+/// # Errors
+/// No compiler, or one that refuses; in its words.
+pub(in crate::formats) fn compile(mut command: Command) -> Result<(), ClientError> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let run = command.output().map_err(|error| {
+        ClientError::Unavailable(format!(
+            "{name} does not start ({error}); name a C compiler in CC"
+        ))
+    })?;
+    match run.status.success() {
+        true => Ok(()),
+        false => Err(ClientError::Failed(format!(
+            "{name}: {}",
+            String::from_utf8_lossy(&run.stderr)
+        ))),
+    }
+}

@@ -1,0 +1,168 @@
+//! One C99 header: derivative, step and both Jacobians, without allocation, in double or float.
+
+mod client;
+mod compiler;
+mod equations;
+mod names;
+mod networks;
+
+pub(super) use compiler::{compile, compiler};
+pub(super) use names::Names;
+
+use super::verify::Client;
+use super::{ExportError, ExportModel, File, Format};
+use crate::expr::Notation;
+use crate::model::{CommandFilter, Integrator};
+
+pub(super) const FORMAT: Format = Format {
+    name: "c",
+    about: "one C99 header with its Jacobians, in double or float, without allocation",
+    extension: "h",
+    not_carried: ExportModel::sensors_not_carried,
+    files: |model, path| {
+        Ok(vec![File {
+            path: path.to_owned(),
+            bytes: header(model)?.into_bytes(),
+            about: "derivative, step and Jacobians in C".into(),
+        }])
+    },
+    client: Client::Own(client::predict),
+    tolerance: 1e-9,
+    robots: None,
+};
+
+/// The text of the header.
+pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
+    // Networks that do not belong to the model are refused first.
+    model.reference()?;
+    let names = Names::new(model);
+    let code = [
+        include_str!("types.h").to_owned(),
+        sizes(model),
+        parameters(model, &names),
+        include_str!("functions.h").to_owned(),
+        memory(model, &names),
+        networks::tables(model, &names),
+        equations::derivative(model, &names),
+        include_str!("flow.h").to_owned(),
+        match model.integrator {
+            Integrator::SemiImplicitEuler => include_str!("semi_implicit_euler.h"),
+            Integrator::Rk4 | Integrator::Fine { .. } => include_str!("rk4.h"),
+        }
+        .to_owned(),
+        include_str!("step.h").to_owned(),
+    ];
+    let (head, upper) = (head(model, &names), &names.upper);
+    let code = names.fill(&code.concat());
+    Ok(format!(
+        "{head}#ifndef {upper}_H\n#define {upper}_H\n\n{code}\n#undef {upper}_\n#endif\n"
+    ))
+}
+
+/// The comment at the head of the file.
+fn head(model: &ExportModel, names: &Names) -> String {
+    let mut lines = vec![
+        format!("{}: {}", model.name(), model.system.about),
+        format!(
+            "Written by residyn {}, integrator {}, steps of {} s.",
+            env!("CARGO_PKG_VERSION"),
+            model.integrator,
+            model.step_s
+        ),
+    ];
+    lines.extend(
+        (FORMAT.not_carried)(model)
+            .iter()
+            .map(|limit| format!("Not carried: {limit}.")),
+    );
+    let usage = names
+        .fill(include_str!("usage.txt"))
+        .replace("@STEP@", &model.step_s.to_string());
+    lines.extend(["".to_owned(), usage.trim_end().to_owned(), "".to_owned()]);
+    let origin = serde_json::to_string_pretty(&model.provenance()).expect("JSON is text");
+    lines.push(
+        origin
+            .replace("*/", "*\\/")
+            .replace("/*", "\\/*")
+            .replace("??/", "??\\/"),
+    );
+    let lines = lines.join("\n");
+    let lines: String = lines
+        .lines()
+        .map(|line| format!(" * {}", comment(line)).trim_end().to_owned() + "\n")
+        .collect();
+    format!("/*\n{lines} */\n")
+}
+
+/// Text that can stand in a comment.
+fn comment(text: &str) -> String {
+    let text = text
+        .replace("*/", "* /")
+        .replace("/*", "/ *")
+        .replace("??/", "?? /");
+    let text = text.replace(['\n', '\r'], " ");
+    text.trim_end_matches('\\').to_owned()
+}
+
+fn sizes(model: &ExportModel) -> String {
+    let n = model.joints();
+    let parts = model.integrator.parts();
+    format!(
+        "#define MODEL_JOINTS {n}\n#define MODEL_STATES {} /* positions, then velocities */\n\
+         #define MODEL_COLUMNS {} /* states and torques, which derivatives are by */\n\
+         #define MODEL_PARTS {parts} /* of a step */\n",
+        2 * n,
+        3 * n
+    )
+}
+
+fn parameters(model: &ExportModel, names: &Names) -> String {
+    let parameters = &model.equations.parameters;
+    let notes = model.parameter_notes();
+    let fields: String = (parameters.iter().zip(notes))
+        .map(|(parameter, note)| {
+            let field = names.field(&parameter.name);
+            let known = [parameter.unit.clone(), note]
+                .into_iter()
+                .filter(|text| !text.is_empty());
+            let known = known.collect::<Vec<_>>().join("; ");
+            format!("    model_real {field}; /* {} */\n", comment(&known))
+        })
+        .collect();
+    let values: Vec<String> = parameters.iter().map(|p| names.number(p.value)).collect();
+    let (fields, values) = match parameters.is_empty() {
+        true => (
+            "    char unused; /* the model is a network alone */\n".to_owned(),
+            "0".to_owned(),
+        ),
+        false => (fields, values.join(", ")),
+    };
+    format!(
+        "\ntypedef struct {{\n{fields}}} model_parameters;\n\n\
+         /* The values that were exported. */\n\
+         static inline model_parameters model_defaults(void)\n{{\n    \
+         const model_parameters defaults = {{{values}}};\n    return defaults;\n}}\n"
+    )
+}
+
+/// Capacity for past torques relative to what delays span at the exported step: parameters may change, and steps may be
+/// shorter.
+const HEADROOM: f64 = 2.0;
+
+fn memory(model: &ExportModel, names: &Names) -> String {
+    if model.equations.filters.is_empty() {
+        return include_str!("memoryless.h").to_owned();
+    }
+    let of_joints = |kind: CommandFilter| {
+        let of_joint = |joint: usize| names.filter(model, joint, kind);
+        let each: Vec<String> = (0..model.joints()).map(of_joint).collect();
+        each.join(", ")
+    };
+    let delays = (0..model.joints()).filter_map(|joint| model.filter(joint, CommandFilter::Delay));
+    let longest = delays.fold(0.0, f64::max);
+    let past = (HEADROOM * longest / model.step_s).ceil() + 2.0;
+    include_str!("memory.h")
+        .replace("@PAST@", &past.to_string())
+        .replace("@DELAYS@", &of_joints(CommandFilter::Delay))
+        .replace("@LAGS@", &of_joints(CommandFilter::Lag))
+}

@@ -1,0 +1,87 @@
+//! What a format is: a writer, a client that reads the written files, and, for robot descriptions, a reader.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use super::ExportModel;
+use super::verify::{Client, ClientError, Predictions, Samples};
+use crate::model::chain::Chain;
+use crate::model::{FileError, NetworkError};
+use crate::report::{WriteError, write_whole};
+
+/// A format of other programs.
+#[derive(Debug)]
+pub struct Format {
+    pub name: &'static str,
+    /// What is written, in a few words.
+    pub about: &'static str,
+    /// The usual extension of its files, without a dot.
+    pub extension: &'static str,
+    /// What of a model the format cannot carry, and what takes its place; known before anything is written.
+    pub not_carried: fn(&ExportModel) -> Vec<String>,
+    /// The files for an output path, in memory.
+    pub files: fn(&ExportModel, &Path) -> Result<Vec<File>, ExportError>,
+    /// Predicts from the written files.
+    pub client: Client,
+    /// The largest allowed difference between the client's predictions and the program's own, relative to the largest
+    /// magnitude of each state.
+    pub tolerance: f64,
+    /// Reads robot descriptions, where these are what the format is for.
+    pub robots: Option<RobotReader>,
+}
+
+/// Reads a serial chain of bodies from a robot description.
+#[derive(Debug)]
+pub struct RobotReader {
+    /// What can be read, in a few words.
+    pub about: &'static str,
+    pub read: fn(&Path) -> Result<Chain, FileError>,
+}
+
+/// A file to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct File {
+    pub path: PathBuf,
+    pub bytes: Vec<u8>,
+    /// What it holds, in a few words.
+    pub about: String,
+}
+
+/// Why a model cannot be exported.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    #[error("a model of `{system}` cannot be written as {format}: {reason}")]
+    Model {
+        format: &'static str,
+        system: String,
+        reason: String,
+    },
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error(transparent)]
+    Hybrid(#[from] NetworkError),
+}
+
+impl Format {
+    /// Write the model. All files are made in memory first; then each appears whole or not at all.
+    ///
+    /// # Errors
+    /// A model that the format cannot carry, or a folder that cannot be written.
+    pub fn write(&self, model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+        let files = (self.files)(model, path)?;
+        for file in &files {
+            write_whole(&file.path, &file.bytes)?;
+        }
+        Ok(files)
+    }
+
+    /// What the format's client predicts from a written file.
+    ///
+    /// # Errors
+    /// No client available, or one that fails on the file.
+    pub fn predict(&self, path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
+        self.client.predict(path, samples)
+    }
+}

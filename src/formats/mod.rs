@@ -1,0 +1,56 @@
+//! Formats of other programs, one file or folder each. Models are written in all of them; robot descriptions are read as
+//! well. A written file is checked against the program's own predictions ([`Format::predict`]).
+//!
+//! A new format is a file with a [`Format`] and one line in [`FORMATS`]: commands, lists and tests read that table.
+
+mod c;
+mod discrete_filter;
+mod export_model;
+mod fmu;
+mod format;
+mod json;
+mod latex;
+mod mjcf;
+mod onnx;
+mod python;
+mod robot;
+mod urdf;
+mod verify;
+
+pub use export_model::{ExportModel, ExportedEffect};
+pub use format::{ExportError, File, Format, RobotReader};
+pub use json::{ImportError, Imported};
+pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples};
+
+use crate::expr::suggestion;
+
+/// Every format.
+pub const FORMATS: &[&Format] = &[
+    &c::FORMAT,
+    &fmu::fmi3::FORMAT,
+    &fmu::fmi2::FORMAT,
+    &json::JSON,
+    &latex::FORMAT,
+    &mjcf::FORMAT,
+    &onnx::FORMAT,
+    &python::FORMAT,
+    &json::SAFETENSORS,
+    &urdf::FORMAT,
+];
+
+/// The format of this name.
+///
+/// # Errors
+/// Unknown name, with the nearest known one.
+pub fn find(name: &str) -> Result<&'static Format, String> {
+    let known = || FORMATS.iter().map(|format| format.name);
+    let format = FORMATS.iter().find(|format| format.name == name);
+    format.copied().ok_or_else(|| {
+        let near = suggestion(name, known());
+        let all: Vec<&str> = known().collect();
+        format!(
+            "unknown format `{name}`{near}; there are {}",
+            all.join(", ")
+        )
+    })
+}

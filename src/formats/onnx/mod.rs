@@ -1,0 +1,142 @@
+//! ONNX: the whole step as a graph, and the derivative as a second one in a file beside it. Rows of a batch are
+//! independent, everything is in single precision.
+
+mod builder;
+mod derivative;
+mod proto;
+mod step;
+
+use std::path::Path;
+
+use prost::Message;
+use serde_json::json;
+
+use super::discrete_filter::DiscreteFilter;
+use super::verify::{Client, PythonClient};
+use super::{ExportError, ExportModel, File, Format};
+use builder::Builder;
+use derivative::Derivative;
+use proto::{Graph, Model, OperatorSet, Property};
+
+pub(super) const FORMAT: Format = Format {
+    name: "onnx",
+    about: "a step and, beside it, the derivative, as graphs of single precision with a free batch dimension",
+    extension: "onnx",
+    not_carried,
+    files,
+    client: Client::Python(PythonClient {
+        name: "onnx.py",
+        script: include_str!("../../../docs/clients/onnx.py"),
+        packages: "numpy onnxruntime",
+    }),
+    tolerance: 1e-5,
+    robots: None,
+};
+
+/// Versions that every runtime of recent years reads.
+const IR_VERSION: i64 = 8;
+const OPERATOR_SET: i64 = 17;
+
+fn not_carried(model: &ExportModel) -> Vec<String> {
+    let mut lost = vec!["double precision: all numbers are single".to_owned()];
+    if !DiscreteFilter::all(model).is_empty() {
+        let step = model.step_s;
+        lost.push(format!(
+            "another step than {step} s: delay and lag are written for it; their memory is an input and an output"
+        ));
+    }
+    lost.extend(model.sensors_not_carried());
+    lost
+}
+
+fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push("-derivative.");
+    name.push(path.extension().unwrap_or("onnx".as_ref()));
+    let derivative = path.with_file_name(name);
+    let file = |path: &Path, graph: Graph, about: &str| File {
+        path: path.to_owned(),
+        bytes: packed(model, graph),
+        about: about.to_owned(),
+    };
+    let with = match DiscreteFilter::all(model).is_empty() {
+        true => "",
+        false => ", memory",
+    };
+    Ok(vec![
+        file(
+            path,
+            step::graph(model),
+            &format!(
+                "state, torque{with} -> next_state{}",
+                with.replace(", ", ", next_")
+            ),
+        ),
+        file(
+            &derivative,
+            derivative_graph(model),
+            "state, torque -> derivative",
+        ),
+    ])
+}
+
+fn derivative_graph(model: &ExportModel) -> Graph {
+    let n = model.joints();
+    let mut builder = Builder::default();
+    let inputs = step::inputs(&mut builder, model, "torque that acts");
+    let derivative = Derivative::new(&mut builder, model);
+    let rates = derivative.write(
+        &mut builder,
+        &inputs.state,
+        &inputs.torque,
+        inputs.time.as_ref(),
+    );
+    let derivative = builder.concat(&rates, &inputs.state[0]);
+    builder.output(
+        "derivative",
+        &derivative,
+        2 * n,
+        "velocities, then accelerations",
+    );
+    builder.finish("derivative")
+}
+
+fn packed(model: &ExportModel, graph: Graph) -> Vec<u8> {
+    let text = |key: &str, value: String| Property {
+        key: key.to_owned(),
+        value,
+    };
+    let parameters: Vec<_> = (model.equations.parameters.iter())
+        .map(|p| json!({"name": p.name, "value": p.value, "unit": p.unit, "ci95": p.ci95}))
+        .collect();
+    let units: Vec<_> = (0..model.joints())
+        .map(|joint| model.units(joint))
+        .collect();
+    let memory: Vec<_> = (DiscreteFilter::all(model).iter())
+        .map(|f| json!({"joint": f.joint + 1, "past_torques": f.past, "lagged_torque": f.lags}))
+        .collect();
+    let json = |value: serde_json::Value| value.to_string();
+    let message = Model {
+        ir_version: IR_VERSION,
+        producer_name: "residyn".to_owned(),
+        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        doc_string: model.system.about.clone(),
+        graph: Some(graph),
+        opset_import: vec![OperatorSet {
+            domain: String::new(),
+            version: OPERATOR_SET,
+        }],
+        metadata_props: vec![
+            text("system", model.name().to_owned()),
+            text("joints", model.joints().to_string()),
+            text("dt", model.step_s.to_string()),
+            text("integrator", model.integrator.to_string()),
+            text("units", json(json!(units))),
+            text("parameters", json(json!(parameters))),
+            text("effects", json(json!(model.effects))),
+            text("memory", json(json!(memory))),
+            text("origin", json(model.origin.clone())),
+        ],
+    };
+    message.encode_to_vec()
+}

@@ -1,0 +1,255 @@
+//! What simulators of rigid bodies can carry of a model: a mechanism with the same equations, and of the effects those
+//! that a joint or a drive has there.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::expr::SignForm;
+use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
+use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
+
+/// A mechanism with its drives.
+pub(in crate::formats) struct Mechanism {
+    pub joints: Vec<Joint>,
+    pub drives: Vec<Drive>,
+    /// m/s^2, against z
+    pub gravity: f64,
+    /// What is not carried.
+    pub not_carried: Vec<String>,
+}
+
+/// What a drive makes of its command: `gear * clamp(gain * command + constant)`.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::formats) struct Drive {
+    pub gain: f64,
+    pub gear: f64,
+    /// N m or N
+    pub constant: f64,
+    /// N m or N, before the gear.
+    pub limit: Option<f64>,
+    /// Time constant in s.
+    pub lag: Option<f64>,
+}
+
+/// A body as files give it: in the frame of its parent at q = 0.
+pub(in crate::formats) struct Link {
+    pub pose: Pose,
+    pub axis: Vector3<f64>,
+    pub mass: f64,
+    pub centre: Vector3<f64>,
+    /// About the centre of mass, in the body's axes.
+    pub tensor: Matrix3<f64>,
+}
+
+impl Mechanism {
+    /// The mechanism of a model.
+    ///
+    /// # Errors
+    /// Equations of none that is known, or a network in their place.
+    pub fn of(model: &ExportModel) -> Result<Self, String> {
+        if model.prior.is_some() {
+            return Err("a network stands in place of its equations".into());
+        }
+        if model.depends_on_time() {
+            return Err("its motion depends on time".into());
+        }
+        let found = recover(&model.declared(), &model.system.prismatic)?;
+        let still = Drive {
+            gain: 1.0,
+            gear: 1.0,
+            constant: 0.0,
+            limit: None,
+            lag: None,
+        };
+        let mut mechanism = Self {
+            drives: vec![still; found.joints.len()],
+            joints: found.joints,
+            gravity: found.gravity,
+            not_carried: Vec::new(),
+        };
+        for effect in &model.effects {
+            mechanism.carry(effect, model);
+        }
+        mechanism.note_conflicts();
+        if model.residual.is_some() {
+            mechanism
+                .not_carried
+                .push("the network for what the equations lack".into());
+        }
+        mechanism.not_carried.extend(model.sensors_not_carried());
+        Ok(mechanism)
+    }
+
+    fn carry(&mut self, effect: &ExportedEffect, model: &ExportModel) {
+        let parameters = &model.equations.parameters;
+        let value = |name: &String| {
+            parameters
+                .iter()
+                .find(|p| p.name == *name)
+                .map_or(0.0, |p| p.value)
+        };
+        let values: Vec<f64> = effect.parameters.iter().map(value).collect();
+        let k = effect.joint - 1;
+        let (joint, drive) = (&mut self.joints[k], &mut self.drives[k]);
+        match (effect.name.as_str(), &values[..]) {
+            ("viscous_friction", [b]) => joint.drivetrain.damping += b,
+            ("coulomb_friction", [level]) => joint.drivetrain.friction += level,
+            ("rotor_inertia", [inertia]) => joint.drivetrain.armature += inertia,
+            ("joint_spring", [stiffness, rest]) => {
+                joint.drivetrain.spring = Some(Spring {
+                    stiffness: *stiffness,
+                    rest: *rest,
+                });
+            }
+            ("gravity_tilt", [angle]) => joint.reference -= angle,
+            // What is after the limit is a gear.
+            ("actuator_gain", [excess]) if drive.limit.is_some() => drive.gear *= 1.0 + excess,
+            ("actuator_gain", [excess]) => drive.gain *= 1.0 + excess,
+            ("actuator_saturation", [limit]) => drive.limit = Some(*limit),
+            ("actuator_lag", [time]) => drive.lag = Some(*time),
+            ("constant_torque", [torque]) => drive.constant = *torque,
+            _ => self.not_carried.push(format!(
+                "{} on joint {}: {}",
+                effect.name, effect.joint, effect.expression
+            )),
+        }
+    }
+
+    /// What is added to a torque is added before its limit there, and after it here.
+    fn note_conflicts(&mut self) {
+        for (k, drive) in self.drives.iter_mut().enumerate() {
+            if drive.limit.is_some() && drive.constant != 0.0 {
+                self.not_carried.push(format!(
+                    "constant_torque on joint {}, beside the limit of its drive",
+                    k + 1
+                ));
+                drive.constant = 0.0;
+            }
+        }
+    }
+
+    /// The bodies from the base outwards.
+    pub fn links(&self) -> Vec<Link> {
+        let mut parent = Pose::identity();
+        let link = |joint: &Joint| {
+            let own = frame(joint);
+            let pose = parent.then(&at_zero(joint)).then(&own.inverse());
+            parent = own;
+            let inertia = joint.inertia.seen_from(&own);
+            let centre = inertia.moment / inertia.mass;
+            let back = Pose {
+                rotation: Matrix3::identity(),
+                origin: -centre,
+            };
+            Link {
+                pose,
+                axis: joint.axis,
+                mass: inertia.mass,
+                centre,
+                tensor: central(&inertia, &back),
+            }
+        };
+        self.joints.iter().map(link).collect()
+    }
+}
+
+fn central(inertia: &Inertia, back: &Pose) -> Matrix3<f64> {
+    let tensor = inertia.seen_from(back).tensor;
+    (tensor + tensor.transpose()) * 0.5
+}
+
+/// A joint's frame in that of its body.
+fn frame(joint: &Joint) -> Pose {
+    Pose {
+        rotation: Matrix3::from_columns(&[
+            joint.across,
+            joint.axis.cross(&joint.across),
+            joint.axis,
+        ]),
+        origin: Vector3::zeros(),
+    }
+}
+
+/// The joint's frame while its coordinate is zero.
+fn at_zero(joint: &Joint) -> Pose {
+    let (sin, cos) = joint.reference.sin_cos();
+    let back = if joint.slides {
+        Pose {
+            rotation: Matrix3::identity(),
+            origin: -Vector3::z() * joint.reference,
+        }
+    } else {
+        #[rustfmt::skip]
+        let rotation = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
+        Pose {
+            rotation,
+            origin: Vector3::zeros(),
+        }
+    };
+    joint.pose.then(&back)
+}
+
+/// For each joint the speed over which dry friction reverses; 0 where it does so at once.
+pub(in crate::formats) fn friction_widths(model: &ExportModel) -> String {
+    let widths = model.system.sign().into_iter().map(|sign| match sign {
+        SignForm::Exact => 0.0,
+        SignForm::Smooth { width } => width,
+    });
+    numbers(widths)
+}
+
+/// Numbers of 15 digits with blanks between them; what rounding left of zero is zero.
+pub(in crate::formats) fn numbers(numbers: impl IntoIterator<Item = f64>) -> String {
+    let mut text = String::new();
+    for number in numbers {
+        let number = if number.abs() < 1e-15 {
+            0.0
+        } else {
+            rounded(number)
+        };
+        let _ = write!(text, "{}{number}", if text.is_empty() { "" } else { " " });
+    }
+    text
+}
+
+/// What can stand in an attribute.
+pub(in crate::formats) fn escaped(text: &str) -> String {
+    let pairs = [
+        ('&', "&amp;"),
+        ('<', "&lt;"),
+        ('>', "&gt;"),
+        ('"', "&quot;"),
+    ];
+    pairs
+        .iter()
+        .fold(text.to_owned(), |text, (from, to)| text.replace(*from, to))
+}
+
+/// Where the file is from, as a comment.
+pub(in crate::formats) fn head(model: &ExportModel) -> String {
+    // Two hyphens end a comment.
+    let origin = model.provenance().to_string().replace("--", "- -");
+    format!("<?xml version=\"1.0\"?>\n<!-- {origin} -->\n")
+}
+
+/// The one file of a format, from what it writes of the mechanism.
+pub(in crate::formats) fn file(
+    model: &ExportModel,
+    path: &Path,
+    format: &'static str,
+    text: fn(&ExportModel, &Mechanism) -> String,
+) -> Result<Vec<File>, ExportError> {
+    let refused = |reason| ExportError::Model {
+        format,
+        system: model.name().to_owned(),
+        reason,
+    };
+    let mechanism = Mechanism::of(model).map_err(refused)?;
+    Ok(vec![File {
+        path: path.to_owned(),
+        bytes: text(model, &mechanism).into_bytes(),
+        about: "a mechanism with the same equations".to_owned(),
+    }])
+}

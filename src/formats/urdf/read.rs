@@ -1,0 +1,261 @@
+//! URDF: links, each hung to its parent by one joint.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use nalgebra::{Matrix3, Vector3};
+use roxmltree::Node;
+
+use crate::formats::robot::tree::{self, Body, Hinge};
+use crate::formats::robot::xml::{self, Source, named};
+use crate::model::FileError;
+use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
+
+/// Where the format says nothing of gravity: m/s^2, against z.
+const GRAVITY: f64 = 9.81;
+
+/// Read a serial mechanism from a URDF file. Gravity acts against z of the root link.
+///
+/// # Errors
+/// An unreadable file, XML that is none, and what is no serial chain of revolute, continuous or prismatic joints: with
+/// line, column and remedy.
+pub fn read_urdf(path: &Path) -> Result<Chain, FileError> {
+    let text = xml::text(path)?;
+    let source = Source::new(path, &text)?;
+    let file = Robot {
+        root: source.root("robot")?,
+        source: &source,
+    };
+    let base = file.base()?;
+    let tree = file.body(base, None)?;
+    file.check_all_hang_on(&tree)?;
+    let joints = tree::chain(&source, &tree)?;
+    file.note_the_rest();
+    let name = file
+        .root
+        .attribute("name")
+        .map_or_else(|| source.stem(), tree::plain);
+    Ok(Chain {
+        name,
+        gravity: Vector3::new(0.0, 0.0, -GRAVITY),
+        joints,
+        notes: source.into_notes(),
+    })
+}
+
+struct Robot<'s, 'x> {
+    source: &'s Source<'x>,
+    root: Node<'s, 'x>,
+}
+
+impl<'s, 'x> Robot<'s, 'x> {
+    /// The link that is nobody's child.
+    fn base(&self) -> Result<Node<'s, 'x>, FileError> {
+        let mut children = HashSet::new();
+        for joint in named(self.root, "joint") {
+            let link = self.end(joint, "child")?;
+            if !children.insert(link.id()) {
+                let message =
+                    "this joint closes a loop: its child has a parent already; open the loop";
+                return Err(self.source.error(joint, message));
+            }
+        }
+        let mut bases = named(self.root, "link").filter(|link| !children.contains(&link.id()));
+        let Some(base) = bases.next() else {
+            let message = "no link is the root, which no joint has as its child; give one";
+            return Err(self.source.error(self.root, message));
+        };
+        match bases.next() {
+            None => Ok(base),
+            Some(other) => {
+                let message = "a second link that no joint has as its child; join it to the others";
+                Err(self.source.error(other, message))
+            }
+        }
+    }
+
+    /// The link that a joint's `<parent>` or `<child>` names.
+    fn end(&self, joint: Node<'s, 'x>, which: &'static str) -> Result<Node<'s, 'x>, FileError> {
+        let Some(end) = named(joint, which).next() else {
+            return Err(self
+                .source
+                .error(joint, format!("<{which}> is missing in this joint")));
+        };
+        let name = self.source.name(end, "link")?;
+        let mut links = named(self.root, "link");
+        links
+            .find(|link| link.attribute("name") == Some(name))
+            .ok_or_else(|| {
+                let message = format!("there is no link `{name}`; correct the name");
+                self.source.attribute_error(end, "link", message)
+            })
+    }
+
+    /// A link and all that it carries, held by `joint`.
+    fn body(&self, link: Node<'s, 'x>, joint: Option<Node<'s, 'x>>) -> Result<Body, FileError> {
+        let (pose, joints) = match joint {
+            Some(joint) => (self.pose(joint)?, self.hinge(joint)?),
+            None => (Pose::identity(), None),
+        };
+        let mut children = Vec::new();
+        for joint in named(self.root, "joint") {
+            if self.end(joint, "parent")? == link {
+                children.push(self.body(self.end(joint, "child")?, Some(joint))?);
+            }
+        }
+        Ok(Body {
+            name: self.source.name(link, "name")?.to_owned(),
+            at: joint.unwrap_or(link).range().start,
+            pose,
+            joints: joints.into_iter().collect(),
+            inertia: self.inertia(link)?,
+            children,
+        })
+    }
+
+    /// Links that carry each other in a ring hang on nothing.
+    fn check_all_hang_on(&self, tree: &Body) -> Result<(), FileError> {
+        let hangs = |link: &Node<'s, 'x>| tree.holds(link.attribute("name").unwrap_or_default());
+        named(self.root, "link")
+            .find(|link| !hangs(link))
+            .map_or(Ok(()), |link| {
+                let message =
+                    "this link does not hang on the root: its joints form a loop; open the loop";
+                Err(self.source.error(link, message))
+            })
+    }
+
+    /// `<origin>` of an element: turned about the fixed x, then y, then z.
+    fn pose(&self, of: Node<'s, 'x>) -> Result<Pose, FileError> {
+        let Some(origin) = named(of, "origin").next() else {
+            return Ok(Pose::identity());
+        };
+        let [roll, pitch, yaw] = self.source.angles(origin, "rpy")?.unwrap_or_default();
+        Ok(Pose {
+            rotation: turn(Vector3::z(), yaw)
+                * turn(Vector3::y(), pitch)
+                * turn(Vector3::x(), roll),
+            origin: self.source.vector(origin, "xyz")?,
+        })
+    }
+
+    fn inertia(&self, link: Node<'s, 'x>) -> Result<Inertia, FileError> {
+        let Some(inertial) = named(link, "inertial").next() else {
+            return Ok(Inertia::none());
+        };
+        let part = |name| {
+            let missing = || {
+                self.source
+                    .error(inertial, format!("<{name}> is missing in <inertial>"))
+            };
+            named(inertial, name).next().ok_or_else(missing)
+        };
+        let mass = self.source.required(part("mass")?, "value")?;
+        let inertia = part("inertia")?;
+        let entry = |key| self.source.required(inertia, key);
+        let (xy, xz, yz) = (entry("ixy")?, entry("ixz")?, entry("iyz")?);
+        #[rustfmt::skip]
+        let tensor = Matrix3::new(
+            entry("ixx")?, xy, xz,
+            xy, entry("iyy")?, yz,
+            xz, yz, entry("izz")?,
+        );
+        let name = link.attribute("name").unwrap_or_default();
+        tree::check_inertia(self.source, inertia.range().start, name, mass, &tensor)?;
+        Ok(Inertia::central(mass, tensor, &self.pose(inertial)?))
+    }
+
+    /// What a joint lets move; none where it is fixed.
+    fn hinge(&self, joint: Node<'s, 'x>) -> Result<Option<Hinge>, FileError> {
+        let (source, name) = (self.source, self.source.name(joint, "name")?);
+        let slides = match source.name(joint, "type")? {
+            "fixed" => return Ok(None),
+            "revolute" | "continuous" => false,
+            "prismatic" => true,
+            other => {
+                let message = format!(
+                    "joint `{name}` is of type `{other}`; known are fixed, revolute, continuous and prismatic: fix the joint, or describe it by several"
+                );
+                return Err(source.attribute_error(joint, "type", message));
+            }
+        };
+        if let Some(mimic) = named(joint, "mimic").next() {
+            let message = format!(
+                "joint `{name}` mimics another, which closes a loop; remove <mimic> and fix the joint, or let it move freely"
+            );
+            return Err(source.error(mimic, message));
+        }
+        let axis = match named(joint, "axis").next() {
+            Some(axis) => source.direction(axis, "xyz", Vector3::x())?,
+            None => Vector3::x(),
+        };
+        let mut drivetrain = Drivetrain::default();
+        if let Some(dynamics) = named(joint, "dynamics").next() {
+            drivetrain.damping = source.not_negative(dynamics, "damping")?;
+            drivetrain.friction = source.not_negative(dynamics, "friction")?;
+        }
+        drivetrain.effort = self.effort(joint)?;
+        Ok(Some(Hinge {
+            name: name.to_owned(),
+            at: joint.range().start,
+            slides,
+            axis,
+            anchor: Vector3::zeros(),
+            reference: 0.0,
+            drivetrain,
+        }))
+    }
+
+    /// The largest torque, if it is above zero; a range of positions is noted.
+    fn effort(&self, joint: Node<'s, 'x>) -> Result<Option<f64>, FileError> {
+        let Some(limit) = named(joint, "limit").next() else {
+            return Ok(None);
+        };
+        let name = joint.attribute("name").unwrap_or_default();
+        let [low, high] = ["lower", "upper"].map(|key| self.source.number_or(limit, key, 0.0));
+        let (low, high) = (low?, high?);
+        if low < high && joint.attribute("type") != Some("continuous") {
+            self.source.note(
+                limit,
+                format!("the range of `{name}`, {low} to {high}, is not carried"),
+            );
+        }
+        if limit.has_attribute("velocity") {
+            self.source.note(
+                limit,
+                format!("the largest speed of `{name}` is not carried"),
+            );
+        }
+        let effort = self.source.not_negative(limit, "effort")?;
+        if limit.has_attribute("effort") && effort == 0.0 {
+            self.source.note(
+                limit,
+                format!("the largest effort of `{name}` is given as 0 and is not carried"),
+            );
+        }
+        Ok((effort > 0.0).then_some(effort))
+    }
+
+    /// What else the file has that acts on the motion.
+    fn note_the_rest(&self) {
+        let source = self.source;
+        let all = || self.root.descendants();
+        if let Some(collision) = all().find(|node| node.has_tag_name("collision")) {
+            source.note(collision, "contacts are not carried");
+        }
+        for transmission in named(self.root, "transmission") {
+            source.note(
+                transmission,
+                "transmissions are not carried: tau is the torque or force at the joint",
+            );
+        }
+        for safety in all().filter(|node| node.has_tag_name("safety_controller")) {
+            source.note(safety, "safety controllers are not carried");
+        }
+        for extension in ["gazebo", "mujoco"] {
+            if let Some(node) = named(self.root, extension).next() {
+                source.note(node, format!("<{extension}> extensions are not read"));
+            }
+        }
+    }
+}

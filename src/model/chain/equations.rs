@@ -1,0 +1,311 @@
+//! The equations of motion of a chain, M(q) qdd + h(q, qd) + g dV/dq = tau, linear in the physical parameters.
+//!
+//! Velocities go out along the chain, each joint's share on its own (a Jacobian), in the axes of each link. What one
+//! unit of a parameter adds to the mass matrix and to the potential is then a sum of products.
+
+use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
+
+use super::body::Joint;
+use super::series::{Series, Wave};
+
+/// A vector of functions.
+type Vector = [Series; 3];
+
+/// What a physical parameter is. The order is the one in which parameters are preferred where the motion shows only
+/// combinations: those about the axis first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Entries of the inertia tensor about the joint's frame.
+    Tensor(usize, usize),
+    /// Mass times centre of mass, along an axis of the frame.
+    Moment(usize),
+    Mass,
+    /// Of the drive: it adds to the joint's own inertia.
+    Rotor,
+}
+
+/// In order of preference for a link that turns.
+const OF_TURNING: [Kind; 10] = [
+    Kind::Tensor(2, 2),
+    Kind::Moment(0),
+    Kind::Moment(1),
+    Kind::Tensor(0, 0),
+    Kind::Tensor(0, 1),
+    Kind::Tensor(0, 2),
+    Kind::Tensor(1, 1),
+    Kind::Tensor(1, 2),
+    Kind::Moment(2),
+    Kind::Mass,
+];
+
+/// A physical parameter and what one unit of it adds to the equations.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    pub kind: Kind,
+    /// Counted from 0.
+    pub joint: usize,
+    pub value: f64,
+    pub mass: Vec<Vec<Series>>,
+    /// Per m/s^2 of gravity, without its constant.
+    pub potential: Series,
+}
+
+impl Kind {
+    /// `zz`, `mx`, `m`, `J`.
+    pub fn stem(self) -> String {
+        let axis = |k: usize| ["x", "y", "z"][k];
+        match self {
+            Self::Tensor(a, b) => format!("{}{}", axis(a), axis(b)),
+            Self::Moment(a) => format!("m{}", axis(a)),
+            Self::Mass => "m".into(),
+            Self::Rotor => "J".into(),
+        }
+    }
+
+    /// Powers of length that its coefficients in the mass matrix have between joints that turn.
+    fn lengths(self) -> i32 {
+        match self {
+            Self::Tensor(..) | Self::Rotor => 0,
+            Self::Moment(_) => 1,
+            Self::Mass => 2,
+        }
+    }
+
+    /// The value of a joint's parameter; 0 where it is no more than rounding.
+    fn value(self, joint: &Joint) -> f64 {
+        let (inertia, size) = (&joint.inertia, joint.inertia.tensor.trace());
+        let (value, size) = match self {
+            Self::Tensor(a, b) => (inertia.tensor[(a, b)], size),
+            Self::Moment(a) => (inertia.moment[a], (inertia.mass * size).sqrt()),
+            Self::Mass => (inertia.mass, inertia.mass),
+            Self::Rotor => (joint.drivetrain.armature, joint.drivetrain.armature),
+        };
+        if value.abs() > 1e-12 * size {
+            value
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The parameters of a chain that are not zero, in order of preference; rotors come last.
+pub(super) fn columns(joints: &[Joint], gravity: &Vector3<f64>) -> Vec<Column> {
+    let lengths = Lengths::of(joints);
+    let mut frame = Frame::base(joints.len(), gravity);
+    let mut columns = Vec::new();
+    for (k, joint) in joints.iter().enumerate() {
+        frame = frame.beyond(k, joint);
+        let mut kinds = OF_TURNING;
+        if joint.slides {
+            kinds.rotate_right(1);
+        }
+        columns.extend(kinds.map(|kind| frame.column(kind, k, joint)));
+    }
+    columns.extend(joints.iter().enumerate().map(|(k, joint)| Column {
+        mass: rotor(joints.len(), k),
+        kind: Kind::Rotor,
+        joint: k,
+        value: Kind::Rotor.value(joint),
+        potential: Series::default(),
+    }));
+    columns.retain(|column| column.value != 0.0);
+    columns.iter_mut().for_each(|column| lengths.clean(column));
+    columns
+}
+
+fn rotor(joints: usize, joint: usize) -> Vec<Vec<Series>> {
+    let mut mass = vec![vec![Series::default(); joints]; joints];
+    mass[joint][joint] = Series::constant(1.0);
+    mass
+}
+
+/// The outermost joint that moves nothing with inertia in some position, if there is one.
+pub(crate) fn without_inertia(joints: &[Joint]) -> Option<usize> {
+    let columns = columns(joints, &Vector3::zeros());
+    let is_regular =
+        |first: usize| (0..4).all(|trial| is_regular(&columns, joints.len(), first, trial));
+    (0..joints.len()).rev().find(|first| !is_regular(*first))
+}
+
+/// Whether the mass matrix of the joints from `first` on is positive definite, beyond rounding.
+fn is_regular(columns: &[Column], joints: usize, first: usize, trial: u32) -> bool {
+    let q: Vec<f64> = (0..joints)
+        .map(|j| 0.3 + f64::from(trial) * (1.0 + 0.4 * j as f64))
+        .collect();
+    let mass = DMatrix::from_fn(joints - first, joints - first, |i, j| {
+        let of = |column: &Column| column.value * column.mass[first + i][first + j].value(&q);
+        columns.iter().map(of).sum::<f64>()
+    });
+    let scale: f64 = mass.diagonal().iter().product();
+    Cholesky::new(mass).is_some_and(|root| root.determinant() > 1e-12 * scale)
+}
+
+/// The frame of a link in motion, in its own axes.
+struct Frame {
+    /// For each joint the velocity of the origin per unit of the joint's speed.
+    linear: Vec<Vector>,
+    /// And the angular velocity.
+    angular: Vec<Vector>,
+    /// The direction of gravity.
+    down: Vector,
+    /// How far down the origin is.
+    depth: Series,
+}
+
+impl Frame {
+    fn base(joints: usize, gravity: &Vector3<f64>) -> Self {
+        let direction = gravity.try_normalize(0.0).unwrap_or_default();
+        Self {
+            linear: vec![Vector::default(); joints],
+            angular: vec![Vector::default(); joints],
+            down: constant(&direction),
+            depth: Series::default(),
+        }
+    }
+
+    /// The frame of the link that joint `k` moves, this one being that of the link before.
+    fn beyond(&self, k: usize, joint: &Joint) -> Self {
+        let step = origin(k, joint);
+        let carried = |(v, w): (&Vector, &Vector)| inward(k, joint, &add(v, &cross(w, &step)));
+        let mut linear: Vec<Vector> = self.linear.iter().zip(&self.angular).map(carried).collect();
+        let mut angular: Vec<Vector> = self.angular.iter().map(|w| inward(k, joint, w)).collect();
+        let own = if joint.slides {
+            &mut linear
+        } else {
+            &mut angular
+        };
+        own[k] = constant(&Vector3::z());
+        Self {
+            linear,
+            angular,
+            down: inward(k, joint, &self.down),
+            depth: &self.depth + &dot(&self.down, &step),
+        }
+    }
+
+    fn column(&self, kind: Kind, k: usize, joint: &Joint) -> Column {
+        let n = self.linear.len();
+        let row = |i| (0..n).map(|j| self.entry(kind, i, j)).collect();
+        let potential = match kind {
+            Kind::Mass => -&self.depth,
+            Kind::Moment(a) => -&self.down[a],
+            Kind::Tensor(..) | Kind::Rotor => Series::default(),
+        };
+        Column {
+            kind,
+            joint: k,
+            value: kind.value(joint),
+            mass: (0..n).map(row).collect(),
+            potential: potential.without_constant(),
+        }
+    }
+
+    /// Kinetic energy is half of m v.v + w.I w + 2 mc.(v x w).
+    fn entry(&self, kind: Kind, i: usize, j: usize) -> Series {
+        let ([v, w], [v_j, w_j]) = (
+            [&self.linear[i], &self.angular[i]],
+            [&self.linear[j], &self.angular[j]],
+        );
+        match kind {
+            Kind::Mass => dot(v, v_j),
+            Kind::Moment(a) => &cross(v, w_j)[a] + &cross(v_j, w)[a],
+            Kind::Tensor(a, b) if a == b => &w[a] * &w_j[a],
+            Kind::Tensor(a, b) => &(&w[a] * &w_j[b]) + &(&w[b] * &w_j[a]),
+            Kind::Rotor => unreachable!("rotors have no frame"),
+        }
+    }
+}
+
+/// Where the origin of the link's frame is in the frame of the link before.
+fn origin(k: usize, joint: &Joint) -> Vector {
+    let rest = constant(&joint.pose.origin);
+    if !joint.slides {
+        return rest;
+    }
+    let moved = &Series::coordinate(k) - &Series::constant(joint.reference);
+    let along: Vector3<f64> = joint.pose.rotation.column(2).into();
+    add(&rest, &std::array::from_fn(|a| &moved * along[a]))
+}
+
+/// A vector of the link before in the axes of the link that joint `k` moves.
+fn inward(k: usize, joint: &Joint, vector: &Vector) -> Vector {
+    let at_rest = turned(&joint.pose.rotation.transpose(), vector);
+    if joint.slides {
+        return at_rest;
+    }
+    let (sin, cos) = joint.reference.sin_cos();
+    let c = &(&Series::cos(k) * cos) + &(&Series::sin(k) * sin);
+    let s = &(&Series::sin(k) * cos) - &(&Series::cos(k) * sin);
+    let [x, y, z] = at_rest;
+    [&(&c * &x) + &(&s * &y), &(&c * &y) - &(&s * &x), z]
+}
+
+fn constant(vector: &Vector3<f64>) -> Vector {
+    std::array::from_fn(|a| Series::constant(vector[a]))
+}
+
+fn add(a: &Vector, b: &Vector) -> Vector {
+    std::array::from_fn(|k| &a[k] + &b[k])
+}
+
+fn dot(a: &Vector, b: &Vector) -> Series {
+    let products = a.iter().zip(b).map(|(a, b)| a * b);
+    products.fold(Series::default(), |sum, product| &sum + &product)
+}
+
+fn cross(a: &Vector, b: &Vector) -> Vector {
+    std::array::from_fn(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        &(&a[i] * &b[j]) - &(&a[j] * &b[i])
+    })
+}
+
+fn turned(by: &Matrix3<f64>, vector: &Vector) -> Vector {
+    std::array::from_fn(|a| {
+        let parts = (0..3).map(|b| &vector[b] * by[(a, b)]);
+        parts.fold(Series::default(), |sum, part| &sum + &part)
+    })
+}
+
+/// What sizes coefficients have: a power of the chain's length, by their unit.
+#[derive(Debug, Clone)]
+pub(super) struct Lengths {
+    /// m
+    length: f64,
+    slides: Vec<bool>,
+}
+
+impl Lengths {
+    pub fn of(joints: &[Joint]) -> Self {
+        let offsets = joints.iter().skip(1).map(|joint| joint.pose.origin.norm());
+        let longest = offsets.fold(0.0, f64::max);
+        Self {
+            length: if longest > 0.0 { longest } else { 1.0 },
+            slides: joints.iter().map(|joint| joint.slides).collect(),
+        }
+    }
+
+    /// A coefficient of a parameter in an equation of these joints, without what rounding left over.
+    pub fn cleaned(&self, kind: Kind, of: &[usize], series: &Series) -> Series {
+        let sliding = of.iter().filter(|joint| self.slides[**joint]).count();
+        self.with_powers(kind.lengths() - small(sliding), series)
+    }
+
+    fn with_powers(&self, lengths: i32, series: &Series) -> Series {
+        let powers = |wave: &Wave| small(wave.powers.iter().map(|p| usize::from(*p)).sum());
+        series.cleaned(|wave| self.length.powi(lengths - powers(wave)))
+    }
+
+    fn clean(&self, column: &mut Column) {
+        for (i, row) in column.mass.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = self.cleaned(column.kind, &[i, j], entry);
+            }
+        }
+        column.potential = self.with_powers(column.kind.lengths() - 1, &column.potential);
+    }
+}
+
+fn small(count: usize) -> i32 {
+    i32::try_from(count).expect("a handful")
+}
