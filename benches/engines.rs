@@ -242,14 +242,7 @@ fn identify(c: &mut Criterion) {
     let mut group = c.benchmark_group("identify");
     group.sample_size(10).bench_function("demo", |b| {
         b.iter(|| {
-            let request = Request {
-                system: &system,
-                library: &library,
-                split: split.clone(),
-                against: Vec::new(),
-                horizons_s: [0.1, 0.5, 1.0],
-                backend: None,
-            };
+            let request = Request::new(&system, &library, split.clone());
             black_box(close_loop(request, &mut rng.clone(), &mut |_| {}).expect("a model"));
         });
     });

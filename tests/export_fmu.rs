@@ -164,7 +164,7 @@ fn the_description_names_units_effects_and_intervals() {
         let exponents = ["kg", "m", "s"].map(|unit| said("N m", unit));
         assert_eq!(exponents, [Some("1"), Some("2"), Some("-2")]);
         assert_eq!(said("joint[1].lagged_torque", "unit"), Some("N m"));
-        let limits = (format.limits)(&model);
+        let limits = (format.not_carried)(&model);
         assert!(
             limits.iter().any(|limit| limit.contains("delay")),
             "{limits:?}"

@@ -339,9 +339,9 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
             "planar_2r.urdf",
             "damping=\"0.02\"",
             "damping=\"-1\"",
-            &["line 25, column 24", "from zero on"],
+            &["line 25, column 24", "give zero or a positive number"],
         ),
-        ("planar_2r.urdf", "</robot>", "", &["no XML"]),
+        ("planar_2r.urdf", "</robot>", "", &["not valid XML"]),
         (
             "spatial_3r.urdf",
             "type=\"fixed\"",

@@ -204,7 +204,7 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
                 let moving = &point[..=3 * n];
                 let [found, wanted] = [&back, &model.equations]
                     .map(|d| d.program.eval(&[moving, &d.values()].concat())[n]);
-                assert_near(found, wanted, 1e-9, &format!("{name} as {format}"));
+                assert_near(found, wanted, 1e-9, &format!("{name} as {}", format.name));
             }
         }
     }
@@ -244,7 +244,9 @@ fn what_is_no_mechanism_is_refused() {
         .write(data, Path::new("no.xml"))
         .unwrap_err();
     assert!(
-        error.to_string().contains("a network stands in place"),
+        error
+            .to_string()
+            .contains("a network replaces its equations"),
         "{error}"
     );
     let folder = tempfile::tempdir().unwrap();

@@ -1,12 +1,14 @@
 //! What closing the loop said, in the words of the bench.
 
-use super::judge::{Answer, Estimate, Label, Named, label, of_log};
+use super::hidden::{Label, label};
+use super::judge::{Answer, Estimate, Named, of_log};
 use crate::closeloop::{Finding, Outcome};
 use crate::model::{FittedEffect, Parameter};
 
 /// The answer in an outcome.
 pub fn answer(outcome: &Outcome) -> Answer {
     let of_effects: Vec<&str> = outcome
+        .effects
         .findings
         .iter()
         .flat_map(|finding| &finding.parameters)
@@ -17,21 +19,23 @@ pub fn answer(outcome: &Outcome) -> Answer {
     Answer {
         verdict: outcome.verdict,
         reason: outcome.reason.clone(),
-        named: outcome.findings.iter().map(named).collect(),
+        named: outcome.effects.findings.iter().map(named).collect(),
         alternatives: outcome
+            .effects
             .alternatives
             .iter()
             .map(|alternative| set(&alternative.effects))
             .collect(),
         declared: outcome
+            .models
             .parameters
             .iter()
             .filter(is_declared)
             .map(|parameter| estimate(&parameter.name, parameter))
             .collect(),
-        left: outcome.unexplained.fraction,
-        left_p_value: outcome.unexplained.p_value,
-        left_where: outcome.unexplained.place.clone(),
+        left: outcome.remainder.unexplained.fraction,
+        left_p_value: outcome.remainder.unexplained.p_value,
+        left_where: outcome.remainder.unexplained.place.clone(),
     }
 }
 

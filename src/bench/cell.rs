@@ -118,13 +118,6 @@ fn close(
     split: Split,
     seed: u64,
 ) -> Result<Outcome, StudyError> {
-    let request = Request {
-        system,
-        library,
-        split,
-        horizons_s: HORIZONS_S,
-        against: Vec::new(),
-        backend: None,
-    };
+    let request = Request::new(system, library, split);
     close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &mut |_| ())
 }

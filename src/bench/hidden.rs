@@ -6,10 +6,19 @@ use serde::{Deserialize, Serialize};
 
 use super::force::Force;
 use super::friction::{DryFriction, Presliding};
-use super::judge::{Label, label};
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use super::transmission::Transmission;
+
+/// `coulomb_friction@1`, the joint counted from 1; of a shift `parameter_shift(m1)`.
+pub type Label = String;
+
+pub fn label(name: &str, joint: usize, parameter: &str) -> Label {
+    match name {
+        "parameter_shift" => format!("{name}({parameter})"),
+        _ => format!("{name}@{joint}"),
+    }
+}
 
 /// One effect that a rig has and its model does not declare.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

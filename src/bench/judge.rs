@@ -6,20 +6,10 @@ use std::f64::consts::{PI, TAU};
 use serde::{Deserialize, Serialize};
 
 use super::grid::Group;
-use super::hidden::Hidden;
+use super::hidden::{Hidden, Label};
 use super::mechanics::Pair;
 use super::recording::log_name;
 use crate::closeloop::Verdict;
-
-/// `coulomb_friction@1`, the joint counted from 1; of a shift `parameter_shift(m1)`.
-pub type Label = String;
-
-pub fn label(name: &str, joint: usize, parameter: &str) -> Label {
-    match name {
-        "parameter_shift" => format!("{name}({parameter})"),
-        _ => format!("{name}@{joint}"),
-    }
-}
 
 /// What the rig hides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -9,6 +9,7 @@ use super::cell::Findings;
 use super::grid::{Cell, Group};
 use super::judge::{Coverage, Judgement};
 use crate::closeloop::Verdict;
+use crate::data::statistics::{rank_quantile, wilson};
 
 /// One cell and what came of it; one line of `cells.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,9 +31,6 @@ pub struct Rate {
     pub of: usize,
 }
 
-/// Normal quantile of a two-sided 95 % interval.
-const NORMAL_95: f64 = 1.959_963_984_540_054;
-
 impl Rate {
     fn count(all: impl Iterator<Item = bool>) -> Self {
         all.fold(Self { hits: 0, of: 0 }, |rate, hit| Self {
@@ -48,15 +46,8 @@ impl Rate {
     }
 
     /// 95 % interval of the share (Wilson 1927).
-    #[allow(clippy::cast_precision_loss)] // counts are small
     pub fn wilson(self) -> [f64; 2] {
-        if self.of == 0 {
-            return [0.0, 1.0];
-        }
-        let (n, p, z2) = (self.of as f64, self.share(), NORMAL_95 * NORMAL_95);
-        let middle = (p + 0.5 * z2 / n) / (1.0 + z2 / n);
-        let half = NORMAL_95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + 0.25 * z2 / (n * n)).sqrt();
-        [(middle - half).max(0.0), (middle + half).min(1.0)]
+        wilson(self.hits, self.of)
     }
 }
 
@@ -165,7 +156,8 @@ pub fn summarise(lines: &[Line]) -> Summary {
         errors: failed.collect(),
         rows: rows(&done, &ratios),
         not_told: known.len() - ratios.len(),
-        held_out_ratio: (!ratios.is_empty()).then(|| [0.5, 0.9, 1.0].map(|q| quantile(&ratios, q))),
+        held_out_ratio: (!ratios.is_empty())
+            .then(|| [0.5, 0.9, 1.0].map(|q| rank_quantile(&ratios, q))),
         by_effect: by(&done, |d| {
             d.cell.effects.iter().map(|e| e.name.clone()).collect()
         }),
@@ -282,23 +274,10 @@ fn failure(d: &Done<'_>) -> Option<Failure> {
 fn seconds(lines: &[Line]) -> Seconds {
     let all: Vec<f64> = lines.iter().map(|line| line.seconds).collect();
     Seconds {
-        median: quantile(&all, 0.5),
-        longest: quantile(&all, 1.0),
+        median: rank_quantile(&all, 0.5),
+        longest: rank_quantile(&all, 1.0),
         total: all.iter().sum(),
     }
-}
-
-/// Nearest rank; zero of nothing.
-fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    #[allow(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss
-    )] // an index
-    let rank = (share * sorted.len() as f64).ceil() as usize;
-    sorted.get(rank.max(1) - 1).copied().unwrap_or(0.0)
 }
 
 /// The summary as Markdown.
@@ -371,29 +350,5 @@ fn push_failures(text: &mut String, summary: &Summary) {
     }
     for (cell, error) in &summary.errors {
         let _ = writeln!(text, "\n{cell}: {error}");
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Rate, quantile};
-
-    #[test]
-    fn wilson_intervals_are_those_of_the_formula() {
-        // Newcombe 1998, table I: 81 of 263 and 0 of 20.
-        let [low, high] = Rate { hits: 81, of: 263 }.wilson();
-        assert!((low - 0.2553).abs() < 5e-5 && (high - 0.3662).abs() < 5e-5);
-        let [low, high] = Rate { hits: 0, of: 20 }.wilson();
-        assert!(low == 0.0 && (high - 0.1611).abs() < 5e-5);
-    }
-
-    #[test]
-    fn quantiles_are_values_that_occur() {
-        let values = [3.0, 1.0, 2.0, 4.0];
-        assert_eq!(
-            [0.0, 0.5, 0.9, 1.0].map(|q| quantile(&values, q)),
-            [1.0, 2.0, 4.0, 4.0]
-        );
-        assert_eq!(quantile(&[], 0.5), 0.0);
     }
 }

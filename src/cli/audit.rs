@@ -7,14 +7,14 @@ use super::{Answer, Common, inputs};
 use crate::data::{Audit, audit};
 use crate::model::Library;
 
-/// What logs are good for: sampling, noise, spikes, lags, excitation, and what cannot be told from them
+/// Audit logs: sampling, noise, spikes, lags, excitation, and what they cannot show
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn audit --model pendulum run1.csv run2.csv")]
 pub(super) struct Arguments {
-    /// Model file, or the name of a built-in system: says how many joints there are and what columns are called
+    /// Model file, or the name of a built-in system: number of joints and names of columns
     #[arg(long)]
     model: PathBuf,
-    /// Logs to look at
+    /// Logs to audit
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     #[command(flatten)]

@@ -10,7 +10,7 @@ use super::{Answer, Common, inputs, progress, told};
 use crate::bench::{Cell, Line, Source, hash, markdown, read, recorded, summarise};
 use crate::model::Library;
 
-/// Measure the program itself on simulated rigs
+/// Measure the program on simulated rigs
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]
@@ -22,16 +22,16 @@ enum What {
     Effects(Effects),
 }
 
-/// Whether closing the loop names hidden effects: a grid of rigs that no part of the program knows
+/// Measure how often closing the loop names hidden effects, on a grid of rigs coded independently of the models
 ///
-/// Each cell is one line of DIR/cells.jsonl; a run that is broken off goes on where it was. DIR/summary.json and
-/// DIR/table.md say how often the answer was right.
+/// Each cell is one line of DIR/cells.jsonl; an interrupted run is resumed. DIR/summary.json and DIR/table.md say how
+/// often the answer was right.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn bench effects --only pendulum/coulomb --out bench-effects"
 )]
 struct Effects {
-    /// Grid file; the full one has some hundred cells, which take hours
+    /// Grid file; the full one has hundreds of cells and takes hours
     #[arg(
         long,
         default_value = "configs/bench/effects.toml",
@@ -88,10 +88,10 @@ fn wanted(arguments: &Effects) -> Result<Vec<Cell>> {
     Ok(all)
 }
 
-/// The results that are there, and where new ones go.
+/// Stored results.
 struct Store {
     path: PathBuf,
-    /// Of this build of the program: another one gives other results.
+    /// Hash of this build of the program: another build may give other results.
     program: String,
     known: Vec<Line>,
 }
@@ -104,7 +104,7 @@ impl Store {
         let mut known = Vec::new();
         if path.is_file() {
             let lines = BufReader::new(File::open(&path)?).lines();
-            // A line that was broken off, or that another version wrote, is no result.
+            // A truncated line, or one of another version, is not a result.
             known.extend(lines.filter_map(|line| serde_json::from_str(&line.ok()?).ok()));
         }
         Ok(Self {
@@ -114,7 +114,7 @@ impl Store {
         })
     }
 
-    /// Results of all cells, those that are there taken as they are.
+    /// Results of all cells; stored ones are not computed again.
     fn run(&self, cells: &[Cell]) -> Result<Vec<Line>> {
         let bar = progress::bar(cells.len());
         let library = Library::built_in();
@@ -140,7 +140,7 @@ impl Store {
 
     fn add(&self, cell: &Cell, library: &Library) -> Result<Line> {
         let begun = Instant::now();
-        // A panic is a failure of what is measured: one more line, and the run of hours goes on.
+        // A panic is a result of the bench: it is recorded, and the run continues.
         let run = std::panic::AssertUnwindSafe(|| cell.run(library));
         let findings = match std::panic::catch_unwind(run) {
             Ok(findings) => findings.map_err(|error| told(&error)),
@@ -158,13 +158,13 @@ impl Store {
             .append(true)
             .open(&self.path)
             .with_context(|| format!("{} cannot be written", self.path.display()))?;
-        // A line break before as well: the line before may have been broken off.
+        // Begin with a line break too: the line before may be truncated.
         file.write_all(format!("\n{}\n", serde_json::to_string(&line)?).as_bytes())?;
         Ok(line)
     }
 }
 
-/// Of the cell and of the files that it uses, which may change without the grid.
+/// Hash of the cell and of the files it uses, which may change while the grid does not.
 fn configuration(cell: &Cell) -> Result<String> {
     let mut bytes = serde_json::to_vec(cell)?;
     if cell.model.is_file() {

@@ -7,13 +7,12 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Answer, Common, inputs, progress};
-use crate::closeloop::{
-    Contender, Outcome, Request, STAGES, Split, Verdict, calibrate, close_loop,
-};
+use crate::closeloop::{Outcome, Reference, Request, Split, Stage, Verdict, calibrate, close_loop};
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Origin, System};
 use crate::plant::Plant;
 use crate::report;
+use crate::train::ResidualTrainer;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
 ///
@@ -53,7 +52,6 @@ pub(super) struct Arguments {
 
 /// The demo rig: its plant file is embedded, so that the program needs nothing but itself.
 const DEMO: &str = include_str!("../../configs/demo.toml");
-const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
@@ -62,23 +60,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         Some(model) => measured(arguments, model, &library)?,
         None => demo(&library, &mut rng)?,
     };
-    let against = contenders(&arguments.against, &system, &library)?;
+    let against = references(&arguments.against, &system, &library)?;
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
     inputs::check_writable(&arguments.out)?;
-    let bar = progress::bar(STAGES);
-    let request = Request {
-        system: &system,
-        library: &library,
-        split,
-        against,
-        horizons_s: HORIZONS_S,
-        backend: Some(arguments.common.device),
+    let bar = progress::bar(Stage::ALL.len());
+    let learner = ResidualTrainer {
+        backend: arguments.common.device,
     };
-    let mut outcome = close_loop(request, &mut rng, &mut |stage| {
-        bar.set_position(stage.number as u64);
-        bar.set_message(stage.text.to_owned());
+    let mut request = Request::new(&system, &library, split);
+    request.against = against;
+    request.learner = Some(&learner);
+    let mut outcome = close_loop(request, &mut rng, &mut |now| {
+        bar.set_position(now.stage.number() as u64);
+        bar.set_message(now.text.to_owned());
     })?;
     bar.finish_and_clear();
     let origin = origin(arguments, &system);
@@ -89,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         let study = outcome.study(&system);
         let calibration = calibrate(
             &study,
-            &outcome.after,
+            &outcome.models.after,
             &library,
             runs.get(),
             &mut rng,
@@ -135,13 +131,13 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
     let logs = (0..plant.recording.logs)
         .map(record)
         .collect::<Result<Vec<_>>>()?;
-    // What the plant knows stays with the plant: the loop gets the declared model and the logs.
-    Ok((library.system(Path::new("pendulum"))?, Split::of(logs)))
+    // What the plant hides stays with the plant: the loop gets the declared model and the logs.
+    Ok((plant.declared(), Split::of(logs)))
 }
 
 /// Models that predict the same joints, in the same units.
-fn contenders(paths: &[PathBuf], system: &System, library: &Library) -> Result<Vec<Contender>> {
-    let contender = |path: &PathBuf| {
+fn references(paths: &[PathBuf], system: &System, library: &Library) -> Result<Vec<Reference>> {
+    let reference = |path: &PathBuf| {
         let other = library.system(path)?;
         if other.prismatic != system.prismatic {
             bail!(
@@ -152,12 +148,12 @@ fn contenders(paths: &[PathBuf], system: &System, library: &Library) -> Result<V
                 joints(system)
             );
         }
-        Ok(Contender {
+        Ok(Reference {
             name: path.display().to_string(),
             system: other,
         })
     };
-    paths.iter().map(contender).collect()
+    paths.iter().map(reference).collect()
 }
 
 /// `2 joint(s) (slide, turn)`

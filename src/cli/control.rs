@@ -12,13 +12,13 @@ use super::{Answer, Common, progress};
 use crate::control::{
     Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
 };
-use crate::experiment::statistics::{deviation, mean};
+use crate::data::statistics::{mean, sample_deviation};
 use crate::model::Library;
 use crate::plan::Method;
 use crate::plant::{Noise, Plant};
 use crate::report::{film, write_whole};
 
-/// Model-predictive control of a simulated plant by any model
+/// Control a simulated plant by model-predictive control with any model
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  residyn control --model pendulum --plant pendulum-real --episodes 3 --out episodes\n  \
@@ -35,10 +35,10 @@ pub(super) struct Arguments {
     task: Option<PathBuf>,
     #[arg(long, default_value = "1")]
     episodes: NonZeroUsize,
-    /// Steps of a plan that are carried out before the next, instead of the task's
+    /// Steps of a plan that are executed before the next, instead of the task's
     #[arg(long, value_name = "STEPS")]
     replan: Option<usize>,
-    /// How plans are searched for, instead of the task's method; with that method's usual settings
+    /// Planner, instead of the task's; with that planner's default settings
     #[arg(long, value_name = "METHOD", value_parser = Method::NAMES)]
     method: Option<String>,
     /// Positions, then velocities at the start, instead of the task's
@@ -130,7 +130,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(Answer::Yes)
 }
 
-/// The task, with what the command line says of it.
+/// The task, with the settings of the command line.
 fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
     let system = &plant.system.name;
     let mut task = match &arguments.task {
@@ -231,7 +231,7 @@ fn one(
     })
 }
 
-/// Write the episode where it is asked for; the names of its files.
+/// Write the episode if an output folder is given; returns the names of its files.
 fn written(
     arguments: &Arguments,
     task: &Task,
@@ -258,7 +258,7 @@ fn written(
     Ok((Some(log), Some(film)))
 }
 
-/// A controller and the time that its decisions take.
+/// A controller that measures the time of its decisions.
 struct Timed<'c, 'p, 'r> {
     controller: &'c mut Controller<'p, 'r>,
     deciding: Duration,
@@ -284,7 +284,7 @@ impl Printed {
             task_name: task.name(),
             task,
             return_mean: mean(&returns),
-            return_std: deviation(&returns),
+            return_std: sample_deviation(&returns),
             successes: episodes.iter().filter(|e| e.success).count(),
             episodes,
         }

@@ -43,7 +43,7 @@ struct Printed {
     #[serde(flatten)]
     summary: Summary,
     logs: Vec<LogEntry>,
-    /// Sensor offsets that were estimated, one list a log.
+    /// Estimated sensor offsets (rad or m), one list a log.
     #[serde(skip_serializing_if = "Option::is_none")]
     offsets: Option<Vec<Vec<f64>>>,
     integrator_step_s: f64,
@@ -111,7 +111,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(Answer::Yes)
 }
 
-/// The system, for its columns, and what is integrated.
+/// The system, for its columns, and the dynamics to integrate.
 fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
     let library = arguments.effects.library()?;
     match arguments.model.source() {

@@ -13,7 +13,7 @@ use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
 use crate::model::{Integrator, Library};
 use crate::train::Manifest;
 
-/// Write a model for other programs, and measure how far what they predict is from here
+/// Write a model for other programs, and compare their predictions with its own
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     residyn export --checkpoint closeloop-report/checkpoint --format onnx --out pendulum.onnx\n  \
@@ -21,16 +21,16 @@ use crate::train::Manifest;
 pub(super) struct Arguments {
     #[command(flatten)]
     model: inputs::Model,
-    /// What to write; `residyn list formats` shows all
+    /// Format; `residyn list formats` shows all
     #[arg(long, value_parser = find)]
     format: &'static Format,
-    /// Where to write it
+    /// Output path
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
-    /// How long a torque is held, in s; a checkpoint's own without it, else 0.01
+    /// How long a torque is held, in s; by default the checkpoint's own, else 0.01
     #[arg(long, value_name = "S")]
     step: Option<f64>,
-    /// How a step is integrated: semi_implicit_euler, rk4 or fine:N; a checkpoint's own without it, else rk4
+    /// Integrator: semi_implicit_euler, rk4 or fine:N; by default the checkpoint's own, else rk4
     #[arg(long)]
     integrator: Option<Integrator>,
     #[command(flatten)]
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     common: Common,
 }
 
-/// The step where neither the user nor a recipe says one, in s.
+/// The default step, in s.
 const STEP_S: f64 = 0.01;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
@@ -106,7 +106,7 @@ fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result
     ))
 }
 
-/// The step of what a checkpoint was trained on.
+/// The step (s) of the data that a checkpoint was trained on.
 fn step_of(config: &Value) -> Option<f64> {
     let places = ["/recipe/data/step_s", "/step_s"];
     let mut steps = places.iter().map(|place| config.pointer(place));
@@ -162,13 +162,13 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, ClientErr
                 .collect();
             let _ = writeln!(
                 out,
-                "largest difference to the prediction here, as a share of each state's largest value: {}",
+                "largest difference from the program's own prediction, relative to each state's largest value: {}",
                 parts.join(", ")
             );
             if difference.pointwise() > format.tolerance {
                 let _ = writeln!(
                     out,
-                    "this is more than the {:.0e} it should be",
+                    "this exceeds the tolerance of {:.0e}",
                     format.tolerance
                 );
             }
@@ -176,14 +176,14 @@ fn text(format: &Format, files: &[File], measured: &Result<Difference, ClientErr
         Err(reason) => {
             let _ = writeln!(
                 out,
-                "difference to the prediction here not measured: {reason}"
+                "difference from the program's own prediction not measured: {reason}"
             );
         }
     }
     out
 }
 
-/// Two digits are enough to compare.
+/// To two digits.
 fn share(difference: f64) -> String {
     if difference == 0.0 {
         return "0".to_owned();

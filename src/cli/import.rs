@@ -8,11 +8,11 @@ use super::{Answer, Common, inputs};
 use crate::formats::Imported;
 use crate::train::save_imported;
 
-/// Make a checkpoint of a model that was exported as JSON and safetensors
+/// Make a checkpoint from a model that was exported as JSON and safetensors
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn import --file pendulum.json --out pendulum")]
 pub(super) struct Arguments {
-    /// The JSON file; the weights that it names lie beside it
+    /// The JSON file; the weights that it names are beside it
     #[arg(long, value_name = "JSON")]
     file: PathBuf,
     /// Folder of the checkpoint

@@ -1,4 +1,4 @@
-//! What several commands read: libraries, systems, logs.
+//! Inputs that several commands share: libraries, models, logs.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ impl Effects {
     }
 }
 
-/// The model that a command works with.
+/// The model of a command.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub(super) struct Model {
@@ -40,7 +40,7 @@ pub(super) struct Model {
     model: Option<PathBuf>,
 }
 
-/// Where a model is read from.
+/// The source of a model.
 pub(super) enum Source<'a> {
     Checkpoint(&'a Path),
     File(&'a Path),
@@ -56,7 +56,7 @@ impl Model {
     }
 }
 
-/// A checkpoint, the system that it belongs to, and its model.
+/// A checkpoint, its system, and its model.
 pub(super) fn checkpoint(
     dir: &Path,
     library: &Library,
@@ -70,7 +70,7 @@ pub(super) fn checkpoint(
     Ok((checkpoint, system, model))
 }
 
-/// Read logs for a system and leave out what the user asks for; notes go to standard error.
+/// Read logs for a system and leave out the given intervals; notes go to standard error.
 pub(super) fn logs(paths: &[PathBuf], system: &System) -> Result<Vec<Log>> {
     let read = |path: &PathBuf| Ok(Log::read(path, system.joints, &system.columns)?);
     paths.iter().map(read).collect()
@@ -90,7 +90,7 @@ pub(super) fn leave_out(
     Ok(())
 }
 
-/// Say on standard error what a reader of the logs should know.
+/// Print the notes of logs on standard error.
 pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     for log in logs {
         for note in &log.notes {
@@ -99,7 +99,7 @@ pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     }
 }
 
-/// Print to standard output; a reader that has gone away is no error.
+/// Print to standard output; a closed pipe is not an error.
 pub(super) fn print(text: &str) -> Result<()> {
     match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -109,7 +109,7 @@ pub(super) fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Check early that results can be written, before long work is done for nothing.
+/// Check that results can be written before long work begins.
 pub(super) fn check_writable(folder: &Path) -> Result<()> {
     let parent = folder
         .parent()

@@ -11,7 +11,7 @@ use crate::formats::FORMATS;
 use crate::model::{Effect, Library, System};
 use crate::plant::Plant;
 
-/// What there is: systems, effects, plants, tasks or formats
+/// List systems, effects, plants, tasks or formats
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn list effects")]
 pub(super) struct Arguments {

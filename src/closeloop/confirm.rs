@@ -1,8 +1,9 @@
 use rayon::prelude::*;
 
-use super::evidence::{PLAIN, gain, p_of_gains};
+use super::fitted::Fitted;
 use super::per_log::values_on;
-use super::study::{Fitted, Study};
+use super::select::{PLAIN, gain, p_of_gains};
+use super::study::Study;
 use crate::identify::{blocks, fit};
 use crate::model::FittedEffect;
 

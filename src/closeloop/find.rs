@@ -1,13 +1,13 @@
 use rand::Rng;
 
 use super::confirm::{Confirmed, TakenBack, confirm};
-use super::folds::{folds, left_out_losses};
-use super::outcome::Alternative;
-use super::run::Stage;
-use super::search::{Round, Search};
+use super::error::StudyError;
+use super::fitted::Fitted;
+use super::remainder::{Unexplained, unexplained};
+use super::select::{Rival, Round, Search, folds, left_out_losses};
 use super::split::set_aside;
-use super::study::{Fitted, Study, StudyError};
-use super::unexplained::{Unexplained, unexplained};
+use super::stage::{Progress, Stage};
+use super::study::Study;
 use crate::model::Library;
 
 /// What the logs say about what the declared model lacks.
@@ -17,7 +17,8 @@ pub struct Found {
     /// With the effects that stood, fitted.
     pub after: Fitted,
     pub rounds: Vec<Round>,
-    pub alternatives: Vec<Alternative>,
+    /// Effects that explain the logs as well as one that was selected.
+    pub rivals: Vec<Rival>,
     pub taken_back: Vec<TakenBack>,
     /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
     pub confirmed_on: usize,
@@ -25,11 +26,11 @@ pub struct Found {
 }
 
 /// Where something is left that no effect explains, effects that leave more than this share of the loss do not
-/// explain it either: they stand in for what is missing.
+/// explain it either: they mask the real cause.
 const HALF: f64 = 0.5;
 
-/// Fit the declared model, choose effects on a part of the logs, confirm them on the rest, fit what stood to
-/// all of them and ask what is left.
+/// Stages 3 to 5: fit the declared model, choose effects on a part of the logs, confirm them on the rest, fit what
+/// stood to all of them and test what is left.
 ///
 /// # Errors
 /// As [`Study::fit_declared`].
@@ -37,42 +38,61 @@ pub fn find(
     study: &mut Study<'_>,
     library: &Library,
     rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Stage<'_>),
+    progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Found, StudyError> {
-    let mut stage = |number: usize, text: &str| progress(Stage { number, text });
-    stage(0, "fitting the declared model");
+    progress(Stage::Fit.into());
     let before = study.fit_declared()?;
-    let (chosen_by, aside) = set_aside(study.logs);
-    let mut chosen_by = study.on(&chosen_by);
-    let aside = study.on(&aside);
-    let declared = chosen_by.fit_declared()?;
-    let mut tell = |text: &str| stage(1, text);
-    let mut search = Search::new(&chosen_by, library.effects(), &mut tell);
-    let model = search.select(declared);
-    let Confirmed {
-        model,
-        mut taken_back,
-        stretches,
-    } = confirm(&chosen_by, &aside, model);
-    let rivals = search.rivals(&model);
-    let rounds = search.rounds;
-    let mut after = on_all(study, &before, &model);
-    stage(2, "asking what is left");
+    let mut chosen = choose(study, library, progress)?;
+    let mut after = on_all(study, &before, &chosen.model);
+    progress(Stage::Remainder.into());
     let mut left = unexplained(study, library.probes(), &before, &after, rng);
     if left.is_significant() && share_left(study, &before, &after) > HALF {
-        taken_back.extend(stand_ins(study, &after));
+        chosen.taken_back.extend(masking(study, &after));
         after = before.clone();
         left = unexplained(study, library.probes(), &before, &after, rng);
     }
-    let alternatives = Alternative::of_rivals(study, rivals, &after, &mut |text| stage(3, text));
     Ok(Found {
-        alternatives,
         before,
         after,
-        rounds,
+        rounds: chosen.rounds,
+        rivals: chosen.rivals,
+        taken_back: chosen.taken_back,
+        confirmed_on: chosen.confirmed_on,
+        unexplained: left,
+    })
+}
+
+/// What was selected on a part of the logs and confirmed on the rest.
+struct Chosen {
+    model: Fitted,
+    rounds: Vec<Round>,
+    rivals: Vec<Rival>,
+    taken_back: Vec<TakenBack>,
+    confirmed_on: usize,
+}
+
+fn choose(
+    study: &Study<'_>,
+    library: &Library,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Result<Chosen, StudyError> {
+    let (kept, aside) = set_aside(study.logs);
+    let (mut kept, aside) = (study.on(&kept), study.on(&aside));
+    let declared = kept.fit_declared()?;
+    let mut search = Search::new(&kept, library.effects(), progress);
+    let selected = search.select(declared);
+    search.tell(Stage::Confirm.into());
+    let Confirmed {
+        model,
+        taken_back,
+        stretches,
+    } = confirm(&kept, &aside, selected);
+    Ok(Chosen {
+        rivals: search.rivals(&model),
+        rounds: search.rounds,
+        model,
         taken_back,
         confirmed_on: stretches,
-        unexplained: left,
     })
 }
 
@@ -97,9 +117,10 @@ fn share_left(study: &Study<'_>, before: &Fitted, after: &Fitted) -> f64 {
     loss(after) / loss(before).max(f64::MIN_POSITIVE)
 }
 
-fn stand_ins(study: &Study<'_>, model: &Fitted) -> Vec<TakenBack> {
-    let reason = "something is left that it does not explain, and all effects together cut the loss by less \
-                  than half: it would stand in for what is missing";
+/// All added effects of a model, taken back.
+fn masking(study: &Study<'_>, model: &Fitted) -> Vec<TakenBack> {
+    let reason = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
+                  mask the real cause";
     model.effects[study.system.effects.len()..]
         .iter()
         .map(|effect| TakenBack {

@@ -1,120 +1,153 @@
-use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
+//! Stage 8: train a small network on what the refined model leaves. Whoever carries out tensors trains it: see
+//! [`ResidualLearner`].
 
-use rand_chacha::ChaCha8Rng;
+use std::error::Error;
+use std::fmt::Debug;
+use std::path::Path;
 
-use super::study::{Fitted, Study, joined};
+use rand::Rng;
+
+use super::fitted::Fitted;
+use super::per_log::joined;
+use super::refine::Refined;
+use super::stage::{Progress, Stage};
+use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{
-    Dynamics, Integrator, LastLayer, MlpSettings, MlpWeights, ResidualOn, absorbed, as_modelled,
-};
-use crate::train::{
-    Backend, FitSettings, HybridModel, LearningRates, Penalty, Segments, TrainError, Training,
-};
+use crate::model::{Dynamics, Origin, absorbed, as_modelled};
 
-/// Rows nearer than this (s) are put together: the network is to learn a force, not the encoder's noise.
-const STEP_S: f64 = 0.01;
-/// Steps that a segment unrolls.
-const STEPS: usize = 8;
-/// About as many segments are enough for a network of some hundred weights.
-const SEGMENTS: usize = 1200;
-/// One stretch of this length (s) in every [`EVERY`] is kept to choose the epoch.
-const STRETCH_S: f64 = 2.0;
-const EVERY: usize = 5;
-const EPOCHS: usize = 250;
-/// The penalty on the network's size: it takes over only what pays for it.
-const ALPHA: f64 = 1e-3;
-
-/// A run that trained the residual network, for its checkpoint, and the hybrid that came of it.
-pub struct Learned {
-    pub training: Training,
-    pub hybrid: Dynamics,
+/// How the residual network is trained.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct LearnSettings {
+    /// Rows nearer than this are averaged, s: the network is to learn a force, not the encoder's noise.
+    pub step_s: f64,
+    /// Length of the stretches that the logs are cut into, s.
+    pub stretch_s: f64,
+    /// One stretch in so many is kept for validation, which chooses the epoch.
+    pub validate_every: usize,
+    /// Steps that the loss unrolls from each start state.
+    pub steps: usize,
+    /// About so many start states are enough for a network of some hundred weights.
+    pub segments: usize,
+    pub epochs: usize,
+    /// Of Adam, for the network; the physical parameters are held.
+    pub learning_rate: f64,
+    /// Penalty on the network's size: it takes over only what pays for it.
+    pub alpha: f64,
 }
 
-/// Train the residual MLP on what the fitted model leaves, with the physics held, and return the hybrid of the
-/// epoch that predicts stretches best that it was not trained on; the untrained one is among them.
-pub fn learn_residual(
-    study: &Study<'_>,
-    model: &Fitted,
-    backend: Backend,
-    rng: &mut ChaCha8Rng,
-    progress: &mut dyn FnMut(&str),
-) -> Result<Option<Learned>, TrainError> {
-    let Some((training, validation)) = segments(study, model) else {
-        return Ok(None);
-    };
-    // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
-    let (declared, effects) = absorbed(&model.declared, &model.effects);
-    let dynamics = (study.system.dynamics_with(&effects, &study.sign))
-        .with_values(joined(&declared, &effects));
-    let settings = MlpSettings {
-        hidden: study.system.hidden.clone(),
-        on: ResidualOn::Accelerations,
-        ..MlpSettings::for_joints(study.system.joints)
-    };
-    let scaling = training.scaling(settings.angles);
-    let weights = MlpWeights::new(
-        study.system.joints,
-        &settings,
-        scaling,
-        LastLayer::Zero,
-        rng,
-    );
-    let hybrid = HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?;
-    let mut run = Training::new(hybrid, fit_settings(), rng.clone())?;
-    run.run(&training, Some(&validation), &mut |at| {
-        progress(&format!(
-            "training the residual network, epoch {} of {}",
-            at.epoch, at.epochs
-        ));
-        ControlFlow::Continue(())
-    })?;
-    let hybrid = run.result()?.to_dynamics()?;
-    Ok(Some(Learned {
-        training: run,
-        hybrid,
-    }))
-}
-
-fn fit_settings() -> FitSettings {
-    FitSettings {
-        epochs: EPOCHS,
-        learning_rates: LearningRates {
-            physics: 0.0,
-            residual: 0.003,
-            ..LearningRates::default()
-        },
-        penalty: Penalty::Fixed { alpha: ALPHA },
-        integrator: Integrator::Rk4,
-        record_every: NonZeroUsize::new(10).expect("not zero"),
-        ..FitSettings::default()
+impl Default for LearnSettings {
+    fn default() -> Self {
+        Self {
+            step_s: 0.01,
+            stretch_s: 2.0,
+            validate_every: 5,
+            steps: 8,
+            segments: 1200,
+            epochs: 250,
+            learning_rate: 0.003,
+            alpha: 1e-3,
+        }
     }
 }
 
-/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network sees what
-/// the model does.
-fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
+/// What a residual network is trained on.
+#[derive(Debug)]
+pub struct ResidualTask {
+    /// The refined model, which is held.
+    pub equations: Dynamics,
+    /// Neurons of each hidden layer.
+    pub hidden: Vec<usize>,
+    /// Motion as the model sees it.
+    pub training: Vec<Trajectory>,
+    /// The same, to choose the epoch by.
+    pub validation: Vec<Trajectory>,
+    pub settings: LearnSettings,
+}
+
+/// Trains residual networks.
+pub trait ResidualLearner: Debug + Sync {
+    /// Train a network on what the equations leave and keep the epoch that predicts the validation stretches best; the
+    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` is told the
+    /// epoch.
+    ///
+    /// # Errors
+    /// A loss that is no longer finite.
+    fn learn(
+        &self,
+        task: &ResidualTask,
+        rng: &mut dyn Rng,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Option<Box<dyn LearnedResidual>>, LearnError>;
+}
+
+/// A residual network that was trained.
+pub trait LearnedResidual: Send {
+    /// The equations with the network, as one program.
+    fn hybrid(&self) -> &Dynamics;
+
+    /// Write the trained model as a checkpoint.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, or that holds something other than a checkpoint.
+    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), LearnError>;
+}
+
+/// Why a residual network could not be trained or saved.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct LearnError(Box<dyn Error + Send + Sync>);
+
+impl LearnError {
+    pub fn new(error: impl Error + Send + Sync + 'static) -> Self {
+        Self(Box::new(error))
+    }
+}
+
+/// Train the residual network on what the refined model leaves. `None` where no network is asked for or the logs are
+/// too few to train it.
+pub(super) fn learn(
+    refined: &Refined<'_>,
+    learner: Option<&dyn ResidualLearner>,
+    rng: &mut impl Rng,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> {
+    let Some(learner) = learner else {
+        return Ok(None);
+    };
+    let task = task(&refined.study, &refined.model, LearnSettings::default());
+    learner.learn(&task, rng, &mut |text| {
+        let text = format!("{}, {text}", Stage::Learn.text());
+        progress(Progress::within(Stage::Learn, &text));
+    })
+}
+
+fn task(study: &Study<'_>, model: &Fitted, settings: LearnSettings) -> ResidualTask {
+    // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
+    let (declared, effects) = absorbed(&model.declared, &model.effects);
+    let equations = (study.system.dynamics_with(&effects, &study.sign))
+        .with_values(joined(&declared, &effects));
     let thinning = Thinning {
-        step_s: STEP_S,
-        length_s: STRETCH_S,
+        step_s: settings.step_s,
+        length_s: settings.stretch_s,
     };
     let of_log = |(k, log): (usize, &Log)| {
         let values = model.fit.values_of_log(k);
         trajectories(&as_modelled(&model.dynamics, &values, log), thinning)
     };
-    let logs = study.logs.iter().enumerate();
-    let stretches: Vec<Trajectory> = logs.flat_map(of_log).collect();
-    let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
-    let stride = (rows / SEGMENTS).max(1);
-    let mut sets = [
-        Segments::new(study.system.joints, STEPS),
-        Segments::new(study.system.joints, STEPS),
-    ];
-    for (index, stretch) in stretches.iter().enumerate() {
-        let set = &mut sets[usize::from(index % EVERY == EVERY - 1)];
-        // A stretch that is too short holds no segment; that is no error here.
-        let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
+    let stretches = (study.logs.iter().enumerate()).flat_map(of_log);
+    let (mut training, mut validation) = (Vec::new(), Vec::new());
+    for (k, stretch) in stretches.enumerate() {
+        match (k + 1).is_multiple_of(settings.validate_every) {
+            true => validation.push(stretch),
+            false => training.push(stretch),
+        }
     }
-    let [training, validation] = sets;
-    (!training.is_empty() && !validation.is_empty()).then_some((training, validation))
+    ResidualTask {
+        equations,
+        hidden: study.system.hidden.clone(),
+        training,
+        validation,
+        settings,
+    }
 }

@@ -1,43 +1,48 @@
 //! Closing the loop: from logs and a declared model to the effects that the model lacks.
+//!
+//! Stages in the order of `docs/method.md`, one file or folder each: [`split`](Split) and audit, fit, select and
+//! confirm, test what remains, tell alternatives apart, refine, learn, score, calibrate. [`close_loop`] goes
+//! through all of them.
 
-mod bootstrap;
 mod calibrate;
-mod candidate;
 mod confirm;
-mod contradicted;
-mod curve;
-mod evidence;
-mod experiment;
+mod discriminate;
+mod error;
 mod find;
-mod folds;
+mod fit;
+mod fitted;
 mod learn;
-mod omnibus;
 mod outcome;
 mod per_log;
-mod proposal;
-mod residual;
+mod refine;
+mod remainder;
+mod request;
 mod run;
-mod search;
-mod simpler;
+mod score;
+mod select;
 mod split;
+mod stage;
 mod study;
-mod unexplained;
+mod verdict;
 
-pub use calibrate::{Calibration, HIDDEN, Limit, Size, Step, calibrate};
+pub use calibrate::{Calibration, DetectionLimit, HIDDEN, Repetition, Smallest, calibrate};
 pub use confirm::TakenBack;
-pub use contradicted::Contradicted;
-pub use curve::{Curve, curves};
-pub use evidence::{Evidence, p_value};
-pub use experiment::Separation;
+pub use discriminate::{Alternative, Separation};
+pub use error::StudyError;
 pub use find::{Found, find};
-pub use learn::Learned;
-pub use omnibus::Omnibus;
-pub use outcome::{Alternative, Contender, Errors, Finding, Outcome, Verdict};
-pub use per_log::values_on;
-pub use proposal::{Proposal, proposal};
-pub use residual::{ForceSample, norm, residual_force};
-pub use run::{Request, STAGES, Stage, close_loop};
-pub use search::{MOST_EFFECTS, Rival, Round, Search};
-pub use split::{How, Split};
-pub use study::{Fitted, Study, StudyError, joined};
-pub use unexplained::{NOTEWORTHY, Probed, SIGNIFICANT, UNKNOWN, Unexplained, unexplained};
+pub use fitted::Fitted;
+pub use learn::{LearnError, LearnSettings, LearnedResidual, ResidualLearner, ResidualTask};
+pub use outcome::{Effects, Given, Models, Outcome, Remainder};
+pub use per_log::joined;
+pub use remainder::{
+    Curve, ForceSample, NOTEWORTHY, Omnibus, Probed, Proposal, ResidualForce, SIGNIFICANT, UNKNOWN,
+    Unexplained, proposal, unexplained,
+};
+pub use request::{Reference, Request};
+pub use run::close_loop;
+pub use score::{Contradicted, Errors, Finding};
+pub use select::{Evidence, MOST_EFFECTS, Rival, Round};
+pub use split::{Split, SplitMethod};
+pub use stage::{Progress, Stage};
+pub use study::Study;
+pub use verdict::Verdict;

@@ -3,10 +3,18 @@
 
 use std::ops::Range;
 
-use super::study::joined;
 use crate::data::Log;
 use crate::identify::{Fit, Own, Uncertainty, Values};
 use crate::model::{FittedEffect, OwnValue};
+
+/// Declared values, then those of the effects: all parameters of the model, in its order, as they are in a log
+/// without values of its own.
+pub fn joined(declared: &[f64], effects: &[FittedEffect]) -> Vec<f64> {
+    let of_effects = effects
+        .iter()
+        .flat_map(|effect| effect.values.iter().map(|(value, _)| *value));
+    declared.iter().copied().chain(of_effects).collect()
+}
 
 /// Declared values and those of the effects, as a fit to `logs` takes them.
 pub fn values_on(logs: &[Log], declared: &[f64], effects: &[FittedEffect]) -> Values {

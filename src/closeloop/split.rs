@@ -1,3 +1,5 @@
+//! Stage 1: set apart the logs that models are scored on.
+
 use serde::Serialize;
 
 use crate::data::Log;
@@ -7,13 +9,13 @@ use crate::data::Log;
 pub struct Split {
     pub train: Vec<Log>,
     pub test: Vec<Log>,
-    pub how: How,
+    pub method: SplitMethod,
 }
 
-/// How the test logs were set apart.
+/// SplitMethod the test logs were set apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum How {
+pub enum SplitMethod {
     /// The user named them.
     Given,
     /// The last logs of those given.
@@ -35,7 +37,7 @@ impl Split {
         Self {
             train,
             test,
-            how: How::Given,
+            method: SplitMethod::Given,
         }
     }
 
@@ -47,7 +49,7 @@ impl Split {
             return Self {
                 train: logs,
                 test,
-                how: How::LastLogs { count },
+                method: SplitMethod::LastLogs { count },
             };
         }
         Self::ends_of(logs)
@@ -66,7 +68,7 @@ impl Split {
         Self {
             train,
             test,
-            how: How::EndOfEachLog {
+            method: SplitMethod::EndOfEachLog {
                 share: TEST_SHARE,
                 gap_s: GAP_S,
             },
@@ -112,7 +114,7 @@ fn speed(log: &Log) -> f64 {
     log.q.iter().map(travelled).sum::<f64>() / log.duration().max(f64::MIN_POSITIVE)
 }
 
-/// How many of so many logs are set apart.
+/// SplitMethod many of so many logs are set apart.
 #[allow(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,

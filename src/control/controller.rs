@@ -6,19 +6,20 @@ use super::Task;
 use crate::batch::Block;
 use crate::plan::{Planner, Start};
 
-/// What decides the torque of each step.
+/// Decides the torque of each step.
 pub trait Policy {
-    /// The torque to be held from `time_s` on, when the sensors show `measured` (positions, then velocities).
+    /// The torque (N m or N, one a joint) to hold from `time_s` on, given the sensor readings `measured` (positions, then
+    /// velocities).
     fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
 }
 
-/// Model-predictive control with a receding horizon: the first steps of the best plan are carried out, then the rest of
-/// it starts the search for the next.
+/// Model-predictive control with a receding horizon: the first steps of the best plan are executed; the rest of it
+/// initialises the search for the next.
 pub struct Controller<'p, 'r> {
     planner: &'p Planner<Block<'r>>,
     replan: usize,
     plan: VecDeque<Vec<f64>>,
-    /// The torques held so far, as many as the model remembers.
+    /// The last torques, as many as the model's delays need.
     past: VecDeque<Vec<f64>>,
     memory: usize,
     decisions: usize,
@@ -26,7 +27,7 @@ pub struct Controller<'p, 'r> {
 }
 
 impl<'p, 'r> Controller<'p, 'r> {
-    /// With the first `replan` steps of each plan; the model remembers `memory` torques.
+    /// Executes `replan` steps of each plan; `memory` is the number of past torques that the model needs.
     pub fn new(planner: &'p Planner<Block<'r>>, replan: usize, memory: usize) -> Self {
         planner.forget();
         Self {
@@ -40,12 +41,12 @@ impl<'p, 'r> Controller<'p, 'r> {
         }
     }
 
-    /// Plans made.
+    /// Number of plans made.
     pub fn decisions(&self) -> usize {
         self.decisions
     }
 
-    /// Candidates of all plans whose rollout diverged.
+    /// Number of candidates, over all plans, whose rollout diverged.
     pub fn diverged(&self) -> usize {
         self.diverged
     }
@@ -76,7 +77,7 @@ impl Policy for Controller<'_, '_> {
     }
 }
 
-/// Torques drawn from their ranges, a new one for each step.
+/// Uniformly random torques, new in each step.
 pub struct RandomTorque<'t, R> {
     ranges: &'t [[f64; 2]],
     rng: R,

@@ -4,10 +4,10 @@ use super::{Meter, Policy, Task};
 use crate::data::Log;
 use crate::plant::{PlantError, Rig};
 
-/// Some steps of a rig under a policy.
+/// A stretch of steps of a rig under a policy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
-    /// What the sensors gave and what was commanded: one row a step, and one for where the last step led.
+    /// Sensor readings and commands: one row a step, and one for the state after the last step.
     pub log: Log,
     /// The true state of each row: positions, then velocities.
     pub states: Vec<Vec<f64>>,
@@ -19,11 +19,11 @@ pub struct Episode {
     pub stretch: Stretch,
     /// Of each step.
     pub rewards: Vec<f64>,
-    /// Whether the goal held until the end.
+    /// Whether the goal held to the end.
     pub success: bool,
 }
 
-/// Let `policy` drive the rig for `steps` steps.
+/// Drive the rig by `policy` for `steps` steps.
 ///
 /// # Errors
 /// A rig that diverges.
@@ -43,13 +43,13 @@ pub fn drive(
         stretch.push(rig, &measured, &tau);
         rig.step(&tau)?;
     }
-    // Nothing is commanded any more at the last row.
+    // No command in the last row.
     let (measured, idle) = (rig.measure(rng), vec![0.0; stretch.log.joints()]);
     stretch.push(rig, &measured, &idle);
     Ok(stretch)
 }
 
-/// A whole episode of `task` from where the rig is.
+/// A whole episode of `task` from the rig's current state.
 ///
 /// # Errors
 /// A rig that diverges.

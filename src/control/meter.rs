@@ -1,17 +1,17 @@
 use crate::expr::{FormulaError, Program};
 use crate::plan::Objective;
 
-/// A formula of state, torque and time, read off one point after the other in f64.
+/// A formula of state, torque and time, evaluated point by point in f64.
 #[derive(Debug, Clone)]
 pub struct Meter {
     program: Program,
 }
 
 impl Meter {
-    /// The names that it knows are those of an [`Objective`] of so many joints.
+    /// Its inputs are named as in an [`Objective`] of as many joints.
     ///
     /// # Errors
-    /// What is no formula, or a name that it does not know.
+    /// An invalid formula, or an unknown name.
     pub fn new(formula: &str, joints: usize) -> Result<Self, FormulaError> {
         Ok(Self::of(&Objective::new(formula, joints)?))
     }

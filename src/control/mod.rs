@@ -1,5 +1,4 @@
-//! Model-predictive control of a simulated plant: what it is to do, the controller that plans with a model, and the
-//! episodes that come of it.
+//! Model-predictive control of a simulated plant: tasks, the controller that plans with a model, and episodes.
 
 mod controller;
 mod episode;

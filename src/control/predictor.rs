@@ -2,8 +2,8 @@ use crate::batch::Rollouts;
 use crate::model::{Dynamics, Integrator, MlpWeights};
 use crate::plan::Objective;
 
-/// A model as a planner takes it: equations with their values, networks whose outputs are added to their derivative,
-/// and how both become steps.
+/// A model as the planner uses it: equations with their values, networks whose outputs are added to their derivative,
+/// and the integrator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictor {
     equations: Dynamics,
@@ -37,7 +37,7 @@ impl Predictor {
         self.equations.joints
     }
 
-    /// The model under this objective, in steps of `step_s` seconds.
+    /// Rollouts of the model under this objective, in steps of `step_s` seconds.
     ///
     /// # Panics
     /// When the objective is of another number of joints.

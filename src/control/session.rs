@@ -3,11 +3,11 @@ use rand_chacha::ChaCha8Rng;
 use super::{Controller, Predictor, Task};
 use crate::plan::Planner;
 
-/// Let `lead` act through a controller that plans with `predictor` for `task`, new after `replan` steps, with all cores
-/// ready for it. `rng` draws the candidates.
+/// Run `lead` with a controller that plans with `predictor` for `task`, anew after `replan` steps, on all cores. `rng`
+/// draws the candidates.
 ///
 /// # Panics
-/// When `predictor` has not the joints of the task.
+/// When `predictor` has another number of joints than the task.
 pub fn with_controller<R>(
     predictor: &Predictor,
     task: &Task,

@@ -10,7 +10,7 @@ use crate::model::{Dynamics, Integrator};
 use crate::plan::{Objective, Settings};
 use crate::plant::{Noise, Plant, Rig};
 
-/// What a plant is to do, and how is planned for it.
+/// What a plant is to do, and how to plan for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Task {
@@ -30,17 +30,17 @@ pub struct Task {
     pub start_spread: Vec<f64>,
     /// Lowest and highest torque of each joint, in N m (or N).
     pub torque: Vec<[f64; 2]>,
-    /// Steps of a plan that are carried out before the next: the receding horizon RH.
+    /// Steps of a plan that are executed before the next: the receding horizon RH.
     pub replan: usize,
-    /// How models that are equations are integrated, one step of it a step of the task. A checkpoint keeps the
-    /// integrator that it was trained through.
+    /// Integrator of models that are equations, one of its steps for each step of the task. A checkpoint keeps the
+    /// integrator that it was trained with.
     #[serde(default)]
     pub integrator: Integrator,
     pub planner: Settings,
     pub goal: Goal,
     #[serde(default)]
     pub plant: PlantSettings,
-    /// What is drawn of the mechanism: lines through points x, y in m, each a formula of the state.
+    /// Drawing of the mechanism: lines through points x, y in m, each a formula of the state.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub figure: Vec<Vec<[String; 2]>>,
     /// Where it was read from.
@@ -48,13 +48,13 @@ pub struct Task {
     pub path: PathBuf,
 }
 
-/// When an episode is a success: a formula of the state stays above a bound until the end.
+/// The criterion of success: a formula of the state stays above a bound to the end of the episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Goal {
     pub formula: String,
     pub at_least: f64,
-    /// Length of the last part of an episode in which it is asked, in s.
+    /// Length of the last part of an episode over which it must hold, in s.
     pub hold_s: f64,
 }
 
@@ -66,7 +66,7 @@ pub struct PlantSettings {
     pub noise: Noise,
 }
 
-/// A task that cannot be used: which file, what is wrong, and the remedy.
+/// An invalid task: which file, what is wrong, and the remedy.
 #[derive(Debug, Error)]
 #[error("{path}: {message}", path = .path.display())]
 pub struct TaskError {
@@ -78,10 +78,10 @@ pub struct TaskError {
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/configs/tasks");
 
 impl Task {
-    /// Read a task file or, where there is no such file, take the embedded task of that name.
+    /// Read a task file or, where there is no such file, the embedded task of that name.
     ///
     /// # Errors
-    /// Unreadable file, unknown key, formula or number that makes no sense: with place and remedy.
+    /// Unreadable file, unknown key, invalid formula or number: with place and remedy.
     pub fn read(path: &Path) -> Result<Self, TaskError> {
         let embedded = path.to_str().filter(|_| !path.is_file()).and_then(text_of);
         if let Some(text) = embedded {
@@ -112,7 +112,7 @@ impl Task {
         Ok(task)
     }
 
-    /// Names of the embedded tasks, in the order of the alphabet.
+    /// Names of the embedded tasks, in alphabetical order.
     pub fn names() -> Vec<&'static str> {
         let stem = |file: &include_dir::File<'static>| file.path().file_stem()?.to_str();
         let mut names: Vec<_> = BUILT_IN.files().filter_map(stem).collect();
@@ -120,7 +120,7 @@ impl Task {
         names
     }
 
-    /// The embedded task of a system; where there are several, the one that looks farthest ahead.
+    /// The embedded task of a system; of several, the one with the longest planning horizon.
     pub fn of_system(system: &str) -> Option<Self> {
         let tasks = Self::names()
             .into_iter()
@@ -142,17 +142,17 @@ impl Task {
         self.torque.len()
     }
 
-    /// What a planner maximises.
+    /// The objective that a planner maximises.
     pub fn objective(&self) -> Objective {
         Objective::new(&self.objective, self.joints()).expect("checked when it was read")
     }
 
-    /// What shows whether the goal is reached.
+    /// The formula of the goal.
     pub fn goal_meter(&self) -> Meter {
         Meter::new(&self.goal.formula, self.joints()).expect("checked when it was read")
     }
 
-    /// Draw a true start.
+    /// Draw a true start state.
     pub fn draw_start(&self, rng: &mut impl Rng) -> Vec<f64> {
         let spread = self
             .start_spread
@@ -164,7 +164,8 @@ impl Task {
             .collect()
     }
 
-    /// `plant` at a true start, moving and measured as the task says; `dynamics` and `values` are its own.
+    /// `plant` at a true start state, with the integrator and sensor noise of the task; `dynamics` and `values` are the
+    /// plant's own.
     ///
     /// # Panics
     /// When one of them is of another system.
@@ -180,10 +181,10 @@ impl Task {
         Rig::new(dynamics, values, &start, integrator, self.step_s, noise)
     }
 
-    /// Whether it makes sense, for a plant of `joints` joints.
+    /// Check the task for a plant of `joints` joints.
     ///
     /// # Errors
-    /// What does not, and the remedy.
+    /// What is wrong, and the remedy.
     pub fn check_for(&self, joints: usize) -> Result<(), TaskError> {
         let sizes = match self.joints() {
             found if found == joints => Ok(()),

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::Columns;
 use super::error::{CellFault, LogError};
-use super::signal::{differences, median};
+use super::signal::differences;
+use super::statistics::median;
 
 /// A span of a log's own time, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -18,6 +18,7 @@ mod log;
 mod projection;
 mod read;
 mod signal;
+pub(crate) mod statistics;
 mod trajectory;
 
 pub use audit::{

@@ -3,8 +3,7 @@
 //! Medians rather than means throughout: logs of real rigs carry spikes, and a statistic that a
 //! single row can move measures that row.
 
-/// Standard deviation of a normal distribution per median absolute deviation.
-pub(super) const SIGMA_PER_MAD: f64 = 1.4826;
+use super::statistics::{SIGMA_PER_MAD, mad, quantile};
 
 /// Fewer rows than this show no quantisation that could be told from chance.
 const MIN_ROWS_FOR_RESOLUTION: usize = 20;
@@ -15,38 +14,6 @@ const MAX_FILL: f64 = 10.0;
 /// Differences of neighbours; one fewer than the values.
 pub(super) fn differences(values: &[f64]) -> Vec<f64> {
     values.windows(2).map(|pair| pair[1] - pair[0]).collect()
-}
-
-/// The value below which a `share` (0 to 1) of the values lies; 0 for no values.
-pub(super) fn quantile(values: &[f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let mut values = values.to_vec();
-    let place = (share * (values.len() - 1) as f64).round() as usize;
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
-}
-
-/// The middle value, or the mean of the two middle ones; 0 for no values.
-pub(super) fn median(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
-    let half = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    let even = values.len().is_multiple_of(2);
-    let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
-    match below.iter().copied().max_by(f64::total_cmp) {
-        Some(lower) if even => (lower + upper) / 2.0,
-        _ => upper,
-    }
-}
-
-/// Median absolute deviation from the median; 0 for no values.
-pub(super) fn mad(values: &[f64]) -> f64 {
-    let centre = median(values);
-    let deviations: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
-    median(&deviations)
 }
 
 /// Standard deviation of white noise on a smooth channel, in the channel's unit.
@@ -160,15 +127,6 @@ mod tests {
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         (0..count).map(|_| next()).collect()
-    }
-
-    #[test]
-    fn medians_and_quantiles() {
-        assert_eq!(median(&[]), 0.0);
-        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
-        assert_eq!(quantile(&[5.0, 1.0, 3.0], 1.0), 5.0);
-        assert_eq!(mad(&[1.0, 1.0, 2.0, 100.0, 1.0]), 0.0);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 use serde::Serialize;
 
-use super::open_loop::{OpenLoop, WindowError};
+use super::assessment::{OpenLoop, WindowError};
+use crate::data::statistics::median;
 
 /// The numbers of an assessment; one inner list a horizon, one number a joint.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -29,12 +30,8 @@ pub fn summarise(horizons: &[OpenLoop], joints: usize) -> Summary {
         horizons_s: horizons.iter().map(|horizon| horizon.horizon_s).collect(),
         position_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| w.position[j])),
         position_median: per_joint(&|horizon, j| {
-            median(
-                horizon
-                    .windows
-                    .iter()
-                    .map(|w| root_mean(std::slice::from_ref(w), |w| w.position[j])),
-            )
+            let of_window = |w| root_mean(std::slice::from_ref(w), |w| w.position[j]);
+            median(&horizon.windows.iter().map(of_window).collect::<Vec<_>>())
         }),
         velocity_rmse: per_joint(&|horizon, j| root_mean(&horizon.windows, |w| w.velocity[j])),
         windows: horizons
@@ -53,14 +50,4 @@ fn root_mean(windows: &[WindowError], squares: impl Fn(&WindowError) -> f64) -> 
     #[allow(clippy::cast_precision_loss)] // rows are far fewer than 2^52
     let rows = rows.max(1) as f64;
     (windows.iter().map(squares).sum::<f64>() / rows).sqrt()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => values[n / 2],
-        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
-    }
 }

@@ -10,7 +10,6 @@ mod picture;
 mod receding_horizon;
 mod results;
 mod session;
-pub(crate) mod statistics;
 pub mod undeclared_effect;
 
 pub use config::{Config, MethodConfig};
@@ -19,4 +18,3 @@ pub use learning::Step;
 pub use picture::picture;
 pub use results::{Course, PERFECT, PRIOR, Reached, Results};
 pub use session::{Experiment, Observer, Session};
-pub use statistics::Interval;

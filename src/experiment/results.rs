@@ -4,7 +4,7 @@ use std::fmt::Write;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::statistics::{deviation, mean};
+use crate::data::statistics::{mean, sample_deviation};
 use crate::mbrl::Judged;
 
 /// The name of the plant's own equations among the methods.
@@ -181,7 +181,7 @@ impl FromIterator<(usize, Vec<Judged>)> for Course {
             let returns: Vec<f64> = judged.iter().map(|judged| judged.total).collect();
             course.transitions.push(transitions);
             course.return_mean.push(mean(&returns));
-            course.return_std.push(deviation(&returns));
+            course.return_std.push(sample_deviation(&returns));
             course.returns.push(returns);
             course
                 .success

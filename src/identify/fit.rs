@@ -4,6 +4,7 @@ use thiserror::Error;
 use super::sensitivity::{Local, Tangent};
 use super::shooting::{Shooting, WindowTerms};
 use super::values::{Column, Layout, Own, Values, value_of};
+use crate::data::statistics::{SIGMA_PER_MAD, upper_median};
 use crate::model::Dynamics;
 
 /// Why parameters could not be fitted.
@@ -452,8 +453,6 @@ fn solve_with_held(matrix: &DMatrix<f64>, right: &DVector<f64>, held: &[bool]) -
 
 /// Standard deviation of a normal sample with the same median absolute value; never zero.
 fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes: Vec<f64> = residuals.map(f64::abs).collect();
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-    (1.4826 * *median).max(1e-6)
+    let sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    (SIGMA_PER_MAD * upper_median(&sizes)).max(1e-6)
 }

@@ -23,6 +23,18 @@ pub struct Parameter {
     pub scale: f64,
 }
 
+impl Parameter {
+    /// The same parameter, declared with another value.
+    #[must_use]
+    pub fn with_value(&self, value: f64) -> Self {
+        Self {
+            value,
+            scale: if value == 0.0 { 1.0 } else { value.abs() },
+            ..self.clone()
+        }
+    }
+}
+
 /// A model ready to run: first-order differential equations as one program, and its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`

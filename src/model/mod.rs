@@ -7,6 +7,7 @@ mod command;
 mod dynamics;
 mod effect;
 mod effects_in_file;
+mod file;
 mod integrator;
 mod library;
 mod network;

@@ -103,7 +103,7 @@ fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError
         );
         return Err(section.error_at("value", message));
     }
-    Ok(Parameter {
+    let parameter = Parameter {
         name,
         value,
         unit: section.text_or_empty("unit")?,
@@ -111,8 +111,9 @@ fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError
         fixed: section.flag("fixed")?,
         per_log: false,
         ci95: interval(section, "ci95")?,
-        scale: if value == 0.0 { 1.0 } else { value.abs() },
-    })
+        scale: 1.0,
+    };
+    Ok(parameter.with_value(value))
 }
 
 /// A list of two numbers, where it is given.

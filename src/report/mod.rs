@@ -10,6 +10,7 @@ pub mod plot;
 mod summary;
 mod tensorboard;
 mod text;
+mod wording;
 
 pub use film::film;
 pub use folder::{WriteError, write, write_whole};
@@ -17,5 +18,5 @@ pub use json::Report;
 pub use model_file::model_file;
 pub use summary::summary;
 pub use tensorboard::EventFile;
-pub(crate) use text::digits;
 pub use text::text;
+pub(crate) use wording::digits;

@@ -6,16 +6,17 @@ use crate::model::{FittedEffect, OwnValue, Parameter, System};
 /// The declared model with fitted values and the effects that were found, as a model file. What the user
 /// wrote stays as it is, comments included; only numbers of `[parameters]` change.
 pub fn model_file(system: &System, outcome: &Outcome) -> String {
-    let declared = &outcome.parameters[..outcome.before.declared.len()];
+    let declared = &outcome.models.parameters[..outcome.models.before.declared.len()];
     let mut text = format!(
         "# Fitted by residyn {}; the declared equations, then the effects that were found.\n\n",
         env!("CARGO_PKG_VERSION")
     );
-    text += &with_values(&system.declaration, declared, &outcome.sign_widths);
+    text += &with_values(&system.declaration, declared, &outcome.models.sign_widths);
     // Shifted parameters stand among the declared ones.
-    let effects = outcome.after.effects.iter();
+    let effects = outcome.models.after.effects.iter();
     for effect in effects.filter(|effect| effect.shifted().is_none()) {
-        let finding = (outcome.findings.iter()).find(|f| f.effect.label() == effect.label());
+        let finding =
+            (outcome.effects.findings.iter()).find(|f| f.effect.label() == effect.label());
         let effect = finding.map_or(effect, |finding| &finding.effect);
         let _ = write!(
             text,

@@ -1,11 +1,14 @@
 //! The report's plots: what of an outcome goes into which chart.
 
 use super::plot::{
-    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapePanel, ShapeSample, Track,
+    Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
+    ShapeSample, Track,
 };
-use crate::closeloop::{Curve, ForceSample, Outcome};
+use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
+use crate::closeloop::{ForceSample, Outcome, ResidualForce};
 use crate::data::Log;
-use crate::evaluate::{Assessment, summarise, traces};
+use crate::evaluate::{Assessment, Trace, summarise, traces};
+use crate::identify::FitError;
 use crate::model::Dynamics;
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
@@ -13,7 +16,7 @@ const SHOWN_S: f64 = 8.0;
 
 /// Measured motion and open-loop predictions on the beginning of the first test log.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
-    let Some(log) = outcome.test.first() else {
+    let Some(log) = outcome.given.test.first() else {
         return Err(PlotError::Empty {
             title: "predictions".into(),
         });
@@ -24,23 +27,23 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let mut models: Vec<(Role, &str, &Dynamics, Vec<f64>)> = vec![
         (
             Role::Before,
-            "declared model",
-            &outcome.before.dynamics,
-            outcome.before.values_in(log),
+            FITTED,
+            &outcome.models.before.dynamics,
+            outcome.models.before.values_in(log),
         ),
         (
             Role::After,
-            "with effects",
-            &outcome.after.dynamics,
-            outcome.after.values_in(log),
+            WITH_EFFECTS,
+            &outcome.models.after.dynamics,
+            outcome.models.after.values_in(log),
         ),
     ];
     if let Some(learned) = &outcome.learned {
         models.push((
             Role::Hybrid,
-            "with effects and network",
-            &learned.hybrid,
-            learned.hybrid.values(),
+            WITH_NETWORK,
+            learned.hybrid(),
+            learned.hybrid().values(),
         ));
     }
     let panel = |joint: usize| Panel {
@@ -54,7 +57,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = (0..outcome.after.dynamics.joints).map(panel).collect();
+    let panels: Vec<Panel> = (0..outcome.models.after.dynamics.joints)
+        .map(panel)
+        .collect();
     let title = format!(
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
@@ -63,7 +68,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
 }
 
 fn kind(outcome: &Outcome, joint: usize) -> JointKind {
-    if outcome.prismatic[joint] {
+    if outcome.given.prismatic[joint] {
         JointKind::Prismatic
     } else {
         JointKind::Revolute
@@ -90,77 +95,83 @@ fn predicted(
     joint: usize,
     horizon: f64,
 ) -> Vec<Vec<(f64, f64)>> {
-    traces(dynamics, values, log, horizon)
+    let shown = |trace: Trace| -> Vec<(f64, f64)> {
+        let points = trace.time.into_iter().zip(trace.q[joint].iter().copied());
+        points.take_while(|(t, _)| *t <= end(log)).collect()
+    };
+    let pieces = traces(dynamics, values, log, horizon)
         .into_iter()
-        .take_while(|trace| trace.time.last().is_some_and(|t| *t <= end(log)))
-        .map(|trace| {
-            trace
-                .time
-                .into_iter()
-                .zip(trace.q[joint].iter().copied())
-                .collect()
-        })
-        .collect()
+        .map(shown);
+    pieces.filter(|piece| piece.len() > 1).collect()
 }
 
-/// The residual generalised force over angle, speed, torque and time, before and after.
+/// The residual generalised force over angle, speed, torque and time, without and with the effects.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
-    let samples = |all: &[ForceSample], joint: usize| {
-        all.iter()
-            .map(|s| ShapeSample {
-                values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
-                residual: s.force[joint],
-            })
-            .collect()
-    };
-    let names = |joint: usize| {
-        [
-            format!("q{joint}"),
-            format!("qd{joint}"),
-            format!("tau{joint}"),
-            "t".to_owned(),
-        ]
-    };
-    let curves = |all: &[Curve], joint: usize| {
-        names(joint + 1).map(|name| {
-            let found = all
-                .iter()
-                .find(|c| c.joint == joint + 1 && c.variable == name);
-            found.map(|c| ShapeCurve {
-                x: c.x.clone(),
-                force: c.force.clone(),
-                low: c.low.clone(),
-                high: c.high.clone(),
-            })
-        })
-    };
+    let (fitted, with_effects) = (&outcome.remainder.before, &outcome.remainder.after);
     let panel = |joint: usize| ShapePanel {
         joint: joint + 1,
         kind: kind(outcome, joint),
-        before: samples(&outcome.residual_before, joint),
-        after: samples(&outcome.residual_after, joint),
-        curves_before: curves(&outcome.curves_before, joint),
-        curves_after: curves(&outcome.curves_after, joint),
+        models: vec![
+            shape(Role::Before, FITTED, joint, fitted),
+            shape(Role::After, WITH_EFFECTS, joint, with_effects),
+        ],
     };
-    let panels: Vec<ShapePanel> = (0..outcome.after.dynamics.joints).map(panel).collect();
-    super::plot::residual_shape(&panels, "What the model lacks, before and after")
+    let panels: Vec<ShapePanel> = (0..outcome.models.after.dynamics.joints)
+        .map(panel)
+        .collect();
+    super::plot::residual_shape(
+        &panels,
+        "Residual force: what each model leaves unexplained",
+    )
+}
+
+fn shape(
+    role: Role,
+    label: &str,
+    joint: usize,
+    force: &Result<ResidualForce, FitError>,
+) -> ShapeModel {
+    let sample = |s: &ForceSample| ShapeSample {
+        values: [s.q[joint], s.qd[joint], s.tau[joint], s.time_s],
+        residual: s.force[joint],
+    };
+    let curve = |name: String| {
+        let curves = force.iter().flat_map(|force| &force.curves);
+        let mut of_joint = curves.filter(|c| c.joint == joint + 1);
+        of_joint.find(|c| c.variable == name).map(|c| ShapeCurve {
+            x: c.x.clone(),
+            force: c.force.clone(),
+            low: c.low.clone(),
+            high: c.high.clone(),
+        })
+    };
+    let samples = force.iter().flat_map(|force| &force.samples);
+    let number = joint + 1;
+    let names = ["q", "qd", "tau"].map(|stem| format!("{stem}{number}"));
+    let [q, qd, tau] = names.map(curve);
+    ShapeModel {
+        role,
+        label: label.to_owned(),
+        samples: samples.map(sample).collect(),
+        curves: [q, qd, tau, curve("t".to_owned())],
+    }
 }
 
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
 /// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let errors = &outcome.errors;
     let named = |role: Role, label: &str, model: &Assessment| {
         let rmse = summarise(&model.horizons, joints).position_rmse;
         (role, label.to_owned(), rmse)
     };
     let mut models = vec![
-        named(Role::Before, "before: declared model", &errors.before),
-        named(Role::After, "after: with the effects found", &errors.after),
+        named(Role::Before, FITTED, &errors.before),
+        named(Role::After, WITH_EFFECTS, &errors.after),
     ];
     let hybrid = errors.hybrid.iter();
-    models.extend(hybrid.map(|m| named(Role::Hybrid, "hybrid: with a network for the rest", m)));
+    models.extend(hybrid.map(|m| named(Role::Hybrid, WITH_NETWORK, m)));
     let others = errors.against.iter().enumerate();
     models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
     let row = |joint: usize, h: usize| ErrorRow {

@@ -1,7 +1,8 @@
 use std::fmt::Write;
 
 use super::calibration::line;
-use super::text::{headline, proposal_line, small, values};
+use super::text::{headline, proposal_line};
+use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
 use crate::evaluate::{Assessment, Summary, summarise};
 
@@ -12,7 +13,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         headline(outcome).replace("**", ""),
         outcome.reason
     );
-    for finding in &outcome.findings {
+    for finding in &outcome.effects.findings {
         let (name, joint) = (finding.effect.title(), finding.effect.joint + 1);
         let _ = writeln!(
             out,
@@ -21,35 +22,40 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             values(finding).join("\n    ")
         );
     }
-    if let Some(proposal) = &outcome.proposal {
+    if let Some(proposal) = &outcome.remainder.proposal {
         let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
-    for &k in &outcome.identifiability.hold {
-        let name = &outcome.before.dynamics.parameters[k].name;
+    for &k in &outcome.models.identifiability.hold {
+        let name = &outcome.models.before.dynamics.parameters[k].name;
         let _ = writeln!(
             out,
-            "  {name} is held, the logs do not determine it: the other values are relative to it"
+            "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
     let (before, after) = (
         numbers(&outcome.errors.before),
         numbers(&outcome.errors.after),
     );
+    out += "  open-loop position error on the test logs, root mean square:\n";
     for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
         for j in 0..joints {
-            let unit = if outcome.prismatic[j] { "m" } else { "rad" };
+            let unit = if outcome.given.prismatic[j] {
+                "m"
+            } else {
+                "rad"
+            };
             let (before, after) = (small(before[h][j]), small(after[h][j]));
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: open-loop error on the test logs {before} {unit} before, {after} {unit} after",
+                "  joint {}, {seconds} s ahead: {before} {unit} {FITTED}; {after} {unit} {WITH_EFFECTS}",
                 j + 1
             );
         }
     }
-    let declared = ("declared model as written", &outcome.errors.declared);
+    let declared = (AS_WRITTEN, &outcome.errors.declared);
     let against = outcome.errors.against.iter();
     let as_they_are = std::iter::once(declared).chain(against.map(|(name, m)| (name.as_str(), m)));
     for (name, model) in as_they_are {
@@ -62,7 +68,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
 
 /// `joint 1 0.00942, 0.157, 0.375 rad at 0.1, 0.5, 1 s`
 fn errors(outcome: &Outcome, model: &Assessment) -> String {
-    let joints = outcome.after.dynamics.joints;
+    let joints = outcome.models.after.dynamics.joints;
     let Summary {
         horizons_s,
         position_rmse,
@@ -70,7 +76,11 @@ fn errors(outcome: &Outcome, model: &Assessment) -> String {
     } = summarise(&model.horizons, joints);
     let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(", ");
     let joint = |j: usize| {
-        let unit = if outcome.prismatic[j] { "m" } else { "rad" };
+        let unit = if outcome.given.prismatic[j] {
+            "m"
+        } else {
+            "rad"
+        };
         let errors = list(&mut position_rmse.iter().map(|row| small(row[j])));
         format!("joint {} {errors} {unit}", j + 1)
     };

@@ -1,20 +1,23 @@
-//! What some logs could show: how often the search names an effect where there is none, and how small an effect
+//! Stage 10: what some logs could show: how often the search names an effect where there is none, and how small an effect
 //! it would name.
 
-mod limit;
-mod null;
+mod detection_limit;
+mod simulated_logs;
 #[cfg(test)]
 mod tests;
 
-pub use limit::Size;
+pub use self::detection_limit::{DetectionLimit, Smallest};
 
 use rand::Rng;
 
-use self::limit::limits;
-use self::null::Null;
+use self::detection_limit::detection_limits;
+use self::simulated_logs::SimulatedLogs;
+use super::error::StudyError;
 use super::find::{Found, find};
-use super::study::{Fitted, Study, StudyError};
+use super::fitted::Fitted;
+use super::study::Study;
 use crate::data::Log;
+use crate::data::statistics::wilson;
 use crate::model::{FittedEffect, Library, System};
 
 /// What the search makes of logs simulated from the accepted model, with the torques and the noise of the user's.
@@ -24,19 +27,9 @@ pub struct Calibration {
     pub named: Vec<Vec<FittedEffect>>,
     /// In how many of them something was left that nothing explains.
     pub unexplained: usize,
-    pub limits: Vec<Limit>,
+    pub limits: Vec<DetectionLimit>,
     /// Of each joint in the training logs.
     pub top_torque: Vec<f64>,
-}
-
-/// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Limit {
-    /// The effect, absent.
-    pub effect: FittedEffect,
-    pub smallest: Size,
-    /// What was named with the effect at [`HIDDEN`] times that size; `None` where it was not tried.
-    pub named: Option<Vec<FittedEffect>>,
 }
 
 /// Effects are hidden at this multiple of their smallest size.
@@ -67,30 +60,22 @@ impl Calibration {
     }
 }
 
-impl Limit {
-    /// The effect to hide, if it is one of those that are.
-    fn hidden(&self) -> Option<FittedEffect> {
-        let Size::Named { switch, values } = &self.smallest else {
-            return None;
-        };
-        let mut hidden = self.effect.clone();
-        hidden.values = values.iter().map(|value| (*value, None)).collect();
-        hidden.values[*switch].0 *= HIDDEN;
-        COMMON
-            .contains(&hidden.effect.name.as_str())
-            .then_some(hidden)
-    }
-
-    /// Whether the hidden effect was named; `None` where it was not tried.
-    pub fn verified(&self) -> Option<bool> {
-        let is_this = |named: &FittedEffect| named.label() == self.effect.label();
-        self.named.as_ref().map(|named| named.iter().any(is_this))
-    }
+/// The effect to hide, if it is one of those that are.
+fn hidden(limit: &DetectionLimit) -> Option<FittedEffect> {
+    let Smallest::Detectable { switch, values } = &limit.smallest else {
+        return None;
+    };
+    let mut hidden = limit.effect.clone();
+    hidden.values = values.iter().map(|value| (*value, None)).collect();
+    hidden.values[*switch].0 *= HIDDEN;
+    COMMON
+        .contains(&hidden.effect.name.as_str())
+        .then_some(hidden)
 }
 
 /// Where the work stands, for a progress display.
 #[derive(Debug, Clone, Copy)]
-pub struct Step<'s> {
+pub struct Repetition<'s> {
     pub number: usize,
     pub of: usize,
     pub text: &'s str,
@@ -107,22 +92,22 @@ pub fn calibrate(
     library: &Library,
     runs: usize,
     rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Step<'_>),
+    progress: &mut dyn FnMut(Repetition<'_>),
 ) -> Result<Calibration, StudyError> {
-    let null = Null::new(study, accepted)?;
-    let mut limits = limits(study, accepted, library.effects())?;
-    let hidden = limits.iter().filter(|limit| limit.hidden().is_some());
+    let simulated = SimulatedLogs::new(study, accepted)?;
+    let mut limits = detection_limits(study, accepted, library.effects())?;
+    let tried = limits.iter().filter(|limit| hidden(limit).is_some());
     let mut repeat = Repeat {
         study,
         library,
         declared: declared(study.system, accepted),
         done: 0,
-        of: runs + hidden.count(),
+        of: runs + tried.count(),
         progress,
     };
     let (mut named, mut unexplained) = (Vec::new(), 0);
     for run in 1..=runs {
-        let logs = null
+        let logs = simulated
             .draw(&[], rng)
             .expect("the accepted model was fitted to these windows");
         let found = repeat.find(
@@ -134,8 +119,8 @@ pub fn calibrate(
         named.push(repeat.named(&found));
     }
     for limit in &mut limits {
-        if let Some(effect) = limit.hidden()
-            && let Some(logs) = null.draw(&[effect], rng)
+        if let Some(effect) = hidden(limit)
+            && let Some(logs) = simulated.draw(&[effect], rng)
         {
             let text = format!("simulation with {}", limit.effect.label());
             let found = repeat.find(&logs, rng, &text)?;
@@ -167,7 +152,7 @@ struct Repeat<'a> {
     declared: System,
     done: usize,
     of: usize,
-    progress: &'a mut dyn FnMut(Step<'_>),
+    progress: &'a mut dyn FnMut(Repetition<'_>),
 }
 
 impl Repeat<'_> {
@@ -177,9 +162,9 @@ impl Repeat<'_> {
             ..self.study.on(logs)
         };
         let (number, of) = (self.done, self.of);
-        let found = find(&mut study, self.library, rng, &mut |stage| {
-            let text = format!("{text}: {}", stage.text);
-            (self.progress)(Step {
+        let found = find(&mut study, self.library, rng, &mut |within| {
+            let text = format!("{text}: {}", within.text);
+            (self.progress)(Repetition {
                 number,
                 of,
                 text: &text,
@@ -192,19 +177,4 @@ impl Repeat<'_> {
     fn named(&self, found: &Found) -> Vec<FittedEffect> {
         found.after.effects[self.declared.effects.len()..].to_vec()
     }
-}
-
-/// 95 % interval of a probability of which `hits` of `trials` are seen (Wilson 1927).
-#[allow(clippy::cast_precision_loss)] // few trials
-fn wilson(hits: usize, trials: usize) -> [f64; 2] {
-    const QUANTILE: f64 = 1.959_964;
-    let (n, z) = (trials.max(1) as f64, QUANTILE);
-    let share = hits as f64 / n;
-    let middle = share + z * z / (2.0 * n);
-    let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
-    let norm = 1.0 + z * z / n;
-    [
-        ((middle - half) / norm).max(0.0),
-        ((middle + half) / norm).min(1.0),
-    ]
 }

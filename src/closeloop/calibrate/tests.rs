@@ -53,8 +53,10 @@ fn the_windows_of_the_logs_are_found_again() {
     let (system, logs) = (pendulum(), logs("", 0));
     let mut study = Study::new(&system, &logs);
     let accepted = study.fit_declared().unwrap();
-    let null = Null::new(&study, &accepted).unwrap();
-    let drawn = null.draw(&[], &mut ChaCha8Rng::seed_from_u64(0)).unwrap();
+    let simulated = SimulatedLogs::new(&study, &accepted).unwrap();
+    let drawn = simulated
+        .draw(&[], &mut ChaCha8Rng::seed_from_u64(0))
+        .unwrap();
     let again = study.on(&drawn);
     let (before, after) = (&study.shooting, &again.shooting);
     assert_eq!(before.windows.len(), after.windows.len());
@@ -97,12 +99,16 @@ fn nothing_is_named_where_nothing_is_missing_and_the_hidden_is() {
     let found = repeat(8);
     // At the nominal 5 % two of eight have a chance of 6 %, three one of 0.6 %.
     assert!(found.alarms() <= 2, "{:?}", found.named);
-    let tried: Vec<_> = found.limits.iter().filter_map(Limit::verified).collect();
+    let tried: Vec<_> = found
+        .limits
+        .iter()
+        .filter_map(DetectionLimit::verified)
+        .collect();
     // The gain of the drive is one with the pendulum's own constants.
     assert_eq!(tried, [true; 3]);
-    let gain = |limit: &&Limit| limit.effect.effect.name == "actuator_gain";
+    let gain = |limit: &&DetectionLimit| limit.effect.effect.name == "actuator_gain";
     let gain = found.limits.iter().find(gain).unwrap();
-    assert_eq!(gain.smallest, Size::NeverTold);
+    assert_eq!(gain.smallest, Smallest::Indistinguishable);
 }
 
 #[test]
@@ -112,9 +118,10 @@ fn friction_is_named_from_about_its_smallest_size_on() {
     let bare = logs("", 0);
     let mut study = Study::new(&system, &bare);
     let accepted = study.fit_declared().unwrap();
-    let limits = limits(&study, &accepted, library.effects()).unwrap();
-    let friction = |limit: &&Limit| limit.effect.effect.name == "coulomb_friction";
-    let Size::Named { values, .. } = &limits.iter().find(friction).unwrap().smallest else {
+    let limits = detection_limits(&study, &accepted, library.effects()).unwrap();
+    let friction = |limit: &&DetectionLimit| limit.effect.effect.name == "coulomb_friction";
+    let Smallest::Detectable { values, .. } = &limits.iter().find(friction).unwrap().smallest
+    else {
         panic!("friction shows in any motion");
     };
     let smallest = values[0];
@@ -131,13 +138,4 @@ fn friction_is_named_from_about_its_smallest_size_on() {
     };
     assert!(named(0.5 * smallest) <= 1, "half of {smallest}");
     assert!(named(2.0 * smallest) >= 3, "twice {smallest}");
-}
-
-#[test]
-fn the_interval_of_a_share_is_wilsons() {
-    // 0 of 20: z^2 / (20 + z^2). 5 of 10: 0.2366 to 0.7634, as printed in textbooks.
-    let [low, high] = wilson(0, 20);
-    assert!(low == 0.0 && (high - 0.16113).abs() < 1e-5, "{high}");
-    let [low, high] = wilson(5, 10);
-    assert!((low - 0.2366).abs() < 1e-4 && (high - 0.7634).abs() < 1e-4);
 }

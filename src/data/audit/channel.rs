@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use crate::data::signal::{mad, noise_std, quantile, resolution};
+use crate::data::signal::{noise_std, resolution};
+use crate::data::statistics::{mad, quantile};
 
 /// A jump counts as a spike beyond this many median absolute deviations (four standard deviations of
 /// normal noise).

@@ -7,7 +7,8 @@ use super::motion::Motion;
 use super::regressors::regressors;
 use crate::data::lag::{Lag, lag};
 use crate::data::projection::{explained_by, orthonormal};
-use crate::data::signal::{SIGMA_PER_MAD, interpolate, mad, median, resample};
+use crate::data::signal::{interpolate, resample};
+use crate::data::statistics::{SIGMA_PER_MAD, mad, median};
 
 /// The longest lag looked for \[s\]. Filters and buses of real rigs stay below 40 ms; a longer search
 /// would find chance agreements.

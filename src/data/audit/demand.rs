@@ -6,6 +6,7 @@ use super::motion::Motion;
 use super::regressors::regressors;
 use crate::data::local_cubic::LocalCubic;
 use crate::data::projection::{explained_by, orthonormal};
+use crate::data::statistics::{deviation, rms};
 
 /// Rows beyond this many times what the motion needs at most count as far off.
 const FAR_OFF: f64 = 2.0;
@@ -71,15 +72,6 @@ pub(super) fn torque_demand(
 
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-fn rms(series: &[f64]) -> f64 {
-    (series.iter().map(|x| x * x).sum::<f64>() / series.len() as f64).sqrt()
-}
-
-fn deviation(series: &[f64]) -> f64 {
-    let mean = series.iter().sum::<f64>() / series.len() as f64;
-    rms(&series.iter().map(|x| x - mean).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

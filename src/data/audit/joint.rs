@@ -8,7 +8,7 @@ use super::demand::{TorqueDemand, torque_demand};
 use super::motion::Motion;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
 use crate::data::log::Log;
-use crate::data::signal::quantile;
+use crate::data::statistics::quantile;
 
 /// Slower than this share of the fast speed counts as rest.
 const REST_SHARE_OF_FAST: f64 = 0.01;

@@ -9,68 +9,23 @@ mod demand;
 mod findings;
 mod joint;
 mod motion;
+mod quality;
 mod regressors;
 mod table;
-
-use serde::Serialize;
 
 pub use channel::Channel;
 pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
 pub use demand::TorqueDemand;
 pub use joint::JointAudit;
+pub use quality::{Audit, Finding, Severity};
 
 use super::log::{Interval, Log};
-use super::signal::{differences, median};
+use super::signal::differences;
+use super::statistics::{deviation, median};
 
 /// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
 /// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
 const GAP_STEPS: f64 = 5.0;
-
-/// The quality of one log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Audit {
-    /// The log's file name.
-    pub log: String,
-    /// Number of rows.
-    pub rows: usize,
-    /// Time from the first to the last row \[s\].
-    pub duration_s: f64,
-    /// Median time between neighbouring rows \[s\].
-    pub median_step_s: f64,
-    /// Shortest time between neighbouring rows \[s\].
-    pub min_step_s: f64,
-    /// Longest time between neighbouring rows \[s\].
-    pub max_step_s: f64,
-    /// Standard deviation of the steps over the median step, gaps not counted.
-    pub jitter: f64,
-    /// Steps longer than five median steps.
-    pub gaps: Vec<Interval>,
-    /// One entry a joint.
-    pub joints: Vec<JointAudit>,
-    /// What an engineer should know before fitting, the most serious first.
-    pub findings: Vec<Finding>,
-}
-
-/// How much a finding matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Severity {
-    /// Results will be wrong or cannot be had from this log unless something is done.
-    Serious,
-    /// Results will be poorer, or some effects cannot be told apart.
-    Warning,
-    /// Good to know.
-    Info,
-}
-
-/// One plain sentence about a log, with its evidence and, where there is one, its remedy.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
-    /// How much it matters.
-    pub severity: Severity,
-    /// The sentence.
-    pub text: String,
-}
 
 /// Measures the quality of a log.
 ///
@@ -110,10 +65,7 @@ fn relative_deviation(steps: &[f64], median_step_s: f64) -> f64 {
     if steps.is_empty() {
         return 0.0;
     }
-    let count = steps.len() as f64;
-    let mean = steps.iter().sum::<f64>() / count;
-    let variance = steps.iter().map(|step| (step - mean).powi(2)).sum::<f64>() / count;
-    variance.sqrt() / median_step_s
+    deviation(steps) / median_step_s
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use super::{Audit, Channel, Severity};
+use super::channel::Channel;
+use super::quality::{Audit, Severity};
 
 /// Widest line \[characters\].
 const WIDTH: usize = 100;

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
 use crate::control::{Purpose, stream};
-use crate::experiment::statistics::{Interval, bootstrap, deviation, mean};
+use crate::data::statistics::{bootstrap, mean, sample_deviation};
 
 /// Of the return that the declared model loses, this share is to come back after the first number of episodes.
 pub const TARGET: f64 = 0.9;
@@ -28,7 +28,7 @@ pub struct OutcomeOfCase {
     pub case: Case,
     /// What the true model returns more than the declared one, mean over the seeds.
     pub loss: f64,
-    pub loss_ci95: Interval,
+    pub loss_ci95: [f64; 2],
     /// Whether the loss stands out of its scatter. Where it does not, there is nothing to win back.
     pub is_lost: bool,
     pub models: Vec<Compared>,
@@ -57,7 +57,7 @@ pub struct Compared {
 pub struct WonBack {
     /// Of the mean returns; 1 where all of it does.
     pub share: f64,
-    pub ci95: Interval,
+    pub ci95: [f64; 2],
 }
 
 impl Outcome {
@@ -177,7 +177,7 @@ impl Compared {
             model: first.model,
             episodes: first.episodes,
             mean: mean(&returns),
-            deviation: deviation(&returns),
+            deviation: sample_deviation(&returns),
             successes: scores().filter(|score| score.judged.success).count(),
             won_back: None,
             returns,

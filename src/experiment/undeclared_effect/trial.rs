@@ -63,9 +63,6 @@ pub struct Named {
     pub parameters: Vec<(String, f64)>,
 }
 
-/// The windows of a second fit into the end of a log of a few seconds.
-const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
-
 impl Contestant {
     /// The name in results.
     pub fn name(self) -> &'static str {
@@ -86,12 +83,12 @@ impl Closed {
             joint: finding.effect.joint + 1,
             parameters: finding.parameters.iter().map(parameter).collect(),
         };
-        let declared = outcome.after.declared.len();
+        let declared = outcome.models.after.declared.len();
         Self {
             episodes,
             verdict: outcome.verdict,
-            effects: outcome.findings.iter().map(named).collect(),
-            parameters: outcome.parameters[..declared]
+            effects: outcome.effects.findings.iter().map(named).collect(),
+            parameters: outcome.models.parameters[..declared]
                 .iter()
                 .map(parameter)
                 .collect(),
@@ -191,14 +188,8 @@ impl Lab {
     }
 
     fn close(&self, logs: &[Log], seed: u64) -> Result<Outcome, StudyError> {
-        let request = Request {
-            system: &self.declared,
-            library: &self.library,
-            split: Split::of(logs.to_vec()),
-            against: Vec::new(),
-            horizons_s: HORIZONS_S,
-            backend: None,
-        };
+        let split = Split::of(logs.to_vec());
+        let request = Request::new(&self.declared, &self.library, split);
         let mut rng = stream(seed, Purpose::Other, logs.len());
         close_loop(request, &mut rng, &mut |_| {})
     }
@@ -216,6 +207,6 @@ impl Lab {
 
 /// What closing the loop ended with.
 fn fitted(outcome: &Outcome) -> Dynamics {
-    let values = outcome.after.fit.values.iter().copied();
-    outcome.after.dynamics.clone().with_values(values)
+    let values = outcome.models.after.fit.values.iter().copied();
+    outcome.models.after.dynamics.clone().with_values(values)
 }

@@ -86,7 +86,7 @@ fn run(mut program: Command, input: &str) -> std::io::Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// A line for each point, then one for each step of the rollout.
+/// One line a point, then one a step of the rollout.
 fn parsed(printed: &str, samples: &Samples) -> Option<Predictions> {
     let row = |line: &str| -> Option<Vec<f64>> {
         line.split_whitespace()

@@ -2,7 +2,7 @@ use std::process::Command;
 
 use crate::formats::ClientError;
 
-/// The C compiler: `$CC`, which may bring arguments, else `cc`.
+/// The C compiler: `$CC`, which may contain arguments, else `cc`.
 pub(in crate::formats) fn compiler() -> Command {
     let named = std::env::var("CC").unwrap_or_default();
     let mut words = named.split_whitespace();
@@ -11,10 +11,10 @@ pub(in crate::formats) fn compiler() -> Command {
     command
 }
 
-/// Run it.
+/// Run a compiler.
 ///
 /// # Errors
-/// No compiler, or one that refuses; in its words.
+/// No compiler, or the compiler's own message.
 pub(in crate::formats) fn compile(mut command: Command) -> Result<(), ClientError> {
     let name = command.get_program().to_string_lossy().into_owned();
     let run = command.output().map_err(|error| {

@@ -33,7 +33,7 @@ pub(super) const FORMAT: Format = Format {
 
 /// The text of the header.
 pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
-    // Networks that do not belong to the model are refused first.
+    // Refuses networks that do not fit the model.
     model.reference()?;
     let names = Names::new(model);
     let code = [

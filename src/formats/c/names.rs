@@ -156,7 +156,7 @@ impl Names {
         filled.replace("model_", &format!("{}_", self.lower))
     }
 
-    /// The member of the parameters.
+    /// The member of the parameter struct.
     pub fn field(&self, parameter: &str) -> String {
         variable(parameter)
     }
@@ -177,7 +177,7 @@ impl Notation for Names {
     fn name(&self, name: &str) -> String {
         match self.inputs.get(name) {
             Some(input) => input.clone(),
-            // An element of a result.
+            // An element of an output array.
             None if name.ends_with(']') => name.to_owned(),
             None => variable(name),
         }

@@ -20,9 +20,9 @@ use crate::model::CommandFilter;
 
 /// What is specific to one version of the standard.
 struct Standard {
-    /// The name of its source file, and what that holds.
+    /// Name and contents of its source file.
     source: (&'static str, &'static str),
-    /// The folder of libraries for this machine.
+    /// The folder of libraries for this platform.
     platform: fn() -> String,
     /// Files that describe the unit.
     descriptions: fn(&Fmu) -> Vec<(&'static str, String)>,
@@ -174,7 +174,7 @@ fn code(model: &ExportModel, names: &Names, token: &str) -> String {
     names.fill(&filled)
 }
 
-/// The shared library of sources, the first of which includes the others, where there is a compiler.
+/// The shared library, compiled from the first source, which includes the others; none without a compiler.
 fn library(
     model: &ExportModel,
     sources: &[(&str, String)],

@@ -16,14 +16,14 @@ const DERIVED: [(&str, [i32; 4]); 9] = [
     ("1", [0, 0, 0, 0]),
 ];
 
-/// What a unit such as `N m s^2/rad` or `1/(kg m^2)` is of the base units; none for one that is not SI.
+/// Exponents of a unit such as `N m s^2/rad` or `1/(kg m^2)`; none for one that is not SI.
 pub(super) fn exponents(unit: &str) -> Option<Exponents> {
     let mut rest = unit;
     let exponents = product(&mut rest)?;
     rest.is_empty().then_some(exponents)
 }
 
-/// Factors one after the other, each with a slash before it where it divides.
+/// Factors in order, with a slash before each that divides.
 fn product(rest: &mut &str) -> Option<Exponents> {
     let mut sum = power(rest)?;
     loop {

@@ -2,7 +2,7 @@ use crate::formats::ExportModel;
 use crate::formats::c::Names;
 use crate::model::CommandFilter;
 
-/// A variable of the model description; its value reference is its place.
+/// A variable of the model description; its value reference is its position.
 pub(super) struct Variable {
     pub name: String,
     pub about: String,
@@ -18,7 +18,7 @@ pub(super) enum Role {
     State {
         output: bool,
     },
-    /// The derivative of the state in this place.
+    /// The derivative of the state at this position.
     Rate {
         state: usize,
     },
@@ -101,7 +101,7 @@ fn rate(state: &Variable, place: usize) -> Variable {
     }
 }
 
-/// Those of an effect stand below their joint and its name.
+/// Parameters of an effect are named below its joint.
 fn parameters(model: &ExportModel, names: &Names) -> impl Iterator<Item = Variable> {
     let place = |name: &str| {
         let mut effects = model.effects.iter();

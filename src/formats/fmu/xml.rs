@@ -4,7 +4,7 @@ use std::fmt::Write;
 use super::unit::{BASE, exponents};
 use super::variables::{Role, Variable};
 
-/// `Unit` elements of all units that variables have; alike in both standards.
+/// `Unit` elements of all units of the variables; the same in both versions.
 pub(super) fn units(variables: &[Variable]) -> String {
     let used = variables.iter().map(|variable| variable.unit.as_str());
     let used: BTreeSet<&str> = used.filter(|unit| !unit.is_empty()).collect();
@@ -25,7 +25,7 @@ fn unit(name: &str) -> String {
     format!("    <Unit name=\"{}\">{base}</Unit>\n", escaped(name))
 }
 
-/// Attributes that say what a variable is.
+/// Attributes of causality and variability.
 pub(super) fn kind(role: &Role) -> &'static str {
     match role {
         Role::Time => r#"causality="independent" variability="continuous""#,
@@ -37,7 +37,7 @@ pub(super) fn kind(role: &Role) -> &'static str {
     }
 }
 
-/// Attributes of its value, each with a space before it; variables are counted from `first`.
+/// Attributes of its value, each preceded by a space; variables are counted from `first`.
 pub(super) fn value(variable: &Variable, first: usize) -> String {
     let mut text = match &variable.role {
         Role::Time => String::new(),
@@ -61,14 +61,14 @@ pub(super) fn value(variable: &Variable, first: usize) -> String {
     text
 }
 
-/// Places of the variables that are outputs.
+/// Positions of the outputs.
 pub(super) fn outputs(variables: &[Variable]) -> Vec<usize> {
     places(variables, |role| {
         matches!(role, Role::State { output: true })
     })
 }
 
-/// Places of the derivatives, in the order of the states. They alone are unknown at the start.
+/// Positions of the derivatives, in the order of the states. They alone are unknown at the start.
 pub(super) fn rates(variables: &[Variable]) -> Vec<usize> {
     places(variables, |role| matches!(role, Role::Rate { .. }))
 }

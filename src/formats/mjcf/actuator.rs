@@ -1,4 +1,4 @@
-//! What drives give at most, and which of them are no plain torque.
+//! Effort limits of drives, and notes on drives that are more than a torque source.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,7 @@ use super::element::{Classes, Element};
 use crate::formats::robot::xml::{Source, elements, named};
 use crate::model::FileError;
 
-/// The largest torque or force of the drive of each joint that has one.
+/// The effort limit (N m or N) of each joint whose drive has one.
 pub(super) fn efforts<'s, 'x>(
     source: &'s Source<'x>,
     root: Node<'s, 'x>,
@@ -45,7 +45,7 @@ pub(super) fn efforts<'s, 'x>(
     Ok(efforts)
 }
 
-/// Whether the drive gives what it is told, at once.
+/// Whether the drive is a pure torque source: no dynamics, no bias, fixed gain.
 fn is_plain(drive: &Element<'_, '_>, kind: &str) -> bool {
     let plain = |key: &str, value: &str| drive.text(key).is_none_or(|text| text == value);
     let gain = drive
@@ -69,7 +69,7 @@ fn limit(drive: &Element<'_, '_>, autolimits: bool) -> Result<Option<f64>, FileE
     Ok(limit)
 }
 
-/// The bound of a range about zero; others are noted.
+/// The bound of a range that is symmetric about zero; others are noted.
 pub(super) fn symmetric(
     element: &Element<'_, '_>,
     [low, high]: [f64; 2],

@@ -1,4 +1,4 @@
-//! An element with the default classes that stand behind it.
+//! Elements with their default classes.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -12,7 +12,7 @@ use crate::model::FileError;
 /// The default classes of a file.
 pub(super) struct Classes<'s, 'x> {
     source: &'s Source<'x>,
-    /// For each class its own `<default>` and those that it stands in, from within.
+    /// For each class its own `<default>` and the enclosing ones, innermost first.
     classes: HashMap<&'s str, Vec<Node<'s, 'x>>>,
     outermost: &'s str,
 }
@@ -24,7 +24,7 @@ impl<'s, 'x> Classes<'s, 'x> {
             classes: HashMap::new(),
             outermost: "main",
         };
-        // Of several on top, later ones prevail; all are one class.
+        // Several top-level ones are one class, in which later ones prevail.
         let mut top: Vec<Node<'s, 'x>> = named(root, "default").collect();
         top.reverse();
         if let Some(name) = top.iter().find_map(|node| node.attribute("class")) {
@@ -46,12 +46,12 @@ impl<'s, 'x> Classes<'s, 'x> {
         }
     }
 
-    /// The name of the class that holds where no other does.
+    /// The name of the class that applies where none is named.
     pub fn outermost(&self) -> &'s str {
         self.outermost
     }
 
-    /// An element with its defaults, which are called by any of `tags`; `class` holds where it names none itself.
+    /// An element with its defaults, under any of `tags`; `class` applies where it names none itself.
     pub fn element(
         &self,
         node: Node<'s, 'x>,
@@ -81,12 +81,12 @@ impl<'s, 'x> Classes<'s, 'x> {
 /// An element: its own attributes, then those of its defaults.
 pub(super) struct Element<'s, 'x> {
     pub source: &'s Source<'x>,
-    /// The first that has an attribute prevails.
+    /// The first with an attribute prevails.
     nodes: Vec<Node<'s, 'x>>,
 }
 
 impl<'s, 'x> Element<'s, 'x> {
-    /// An element that has no defaults.
+    /// An element without defaults.
     pub fn alone(source: &'s Source<'x>, node: Node<'s, 'x>) -> Self {
         Self {
             source,
@@ -98,12 +98,12 @@ impl<'s, 'x> Element<'s, 'x> {
     pub fn of_section(source: &'s Source<'x>, root: Node<'s, 'x>, name: &'static str) -> Self {
         let mut nodes: Vec<Node<'s, 'x>> = named(root, name).collect();
         nodes.reverse();
-        // There is one even where the section is missing.
+        // Messages point at the root where the section is missing.
         nodes.push(root);
         Self { source, nodes }
     }
 
-    /// The element itself, and one that has none of the attributes for what is not given.
+    /// The element that gives an attribute: itself or one of its defaults; itself where none does.
     fn node(&self, key: &str) -> Node<'s, 'x> {
         let mut nodes = self.nodes.iter().copied();
         nodes
@@ -111,7 +111,7 @@ impl<'s, 'x> Element<'s, 'x> {
             .unwrap_or(self.nodes[0])
     }
 
-    /// The element and its defaults, the first one first.
+    /// The element and its defaults one by one, in order of precedence.
     pub fn parts(&self) -> impl Iterator<Item = Self> {
         self.nodes
             .iter()
@@ -134,7 +134,7 @@ impl<'s, 'x> Element<'s, 'x> {
         self.source.numbers(self.node(key), key)
     }
 
-    /// Angles in rad as they are meant.
+    /// Angles in rad; see [`Source::angles`].
     pub fn angles<const N: usize>(&self, key: &str) -> Result<Option<[f64; N]>, FileError> {
         self.source.angles(self.node(key), key)
     }
@@ -159,7 +159,7 @@ impl<'s, 'x> Element<'s, 'x> {
         self.source.direction(self.node(key), key, default)
     }
 
-    /// A range that holds: `switch` says so, or is left to the range being given.
+    /// A range in force: `switch` says so, or, where it is automatic, the range is given.
     pub fn limits(
         &self,
         range: &str,
@@ -187,7 +187,7 @@ impl<'s, 'x> Element<'s, 'x> {
         self.source.note(self.nodes[0], message);
     }
 
-    /// Complain about an attribute that is given and not zero.
+    /// Refuse an attribute that is given and not zero.
     pub fn refuse(&self, key: &str, remedy: &str) -> Result<(), FileError> {
         match self.text(key) {
             None | Some("0") => Ok(()),
@@ -197,7 +197,7 @@ impl<'s, 'x> Element<'s, 'x> {
         }
     }
 
-    /// Say which attributes are none of those known.
+    /// Note attributes other than the known ones.
     pub fn note_others(&self, known: &[&str]) {
         let given = self
             .nodes

@@ -9,7 +9,7 @@ use super::orientation::{Angles, from_z_to};
 use crate::model::FileError;
 use crate::model::chain::{Inertia, Pose};
 
-/// kg/m^3, where a file gives neither mass nor density.
+/// Default density, kg/m^3.
 const DENSITY: f64 = 1000.0;
 
 /// The inertia of a geom in the frame of its body.
@@ -49,7 +49,7 @@ pub(super) fn inertia(
             ))
         })
     };
-    // Between two points, what is across is round or square, and the length is theirs.
+    // Between two points the cross-section is round or square, and the points give the length.
     let sides = || match half_length {
         Some(half) => Ok([side(0)?, side(0)?, half]),
         None => Ok([side(0)?, side(1)?, side(2)?]),
@@ -76,7 +76,7 @@ pub(super) fn inertia(
     ))
 }
 
-/// The frame in the middle of two points, its z along them, and half of their distance.
+/// The frame midway between two points, z along their line, and half their distance.
 fn between([a, b, c, d, e, f]: [f64; 6]) -> (Pose, Option<f64>) {
     let (from, to) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
     let along = from - to;
@@ -88,10 +88,10 @@ fn between([a, b, c, d, e, f]: [f64; 6]) -> (Pose, Option<f64>) {
     (pose, Some(0.5 * along.norm()))
 }
 
-/// Volume, and principal moments per mass.
+/// Volume (m^3), and principal moments per mass (m^2).
 type Solid = (f64, Vector3<f64>);
 
-/// Moments of a solid whose squares of the coordinates have these means.
+/// Principal moments per mass from the mean squares of the coordinates.
 fn moments(squares: Vector3<f64>) -> Vector3<f64> {
     Vector3::repeat(squares.sum()) - squares
 }
@@ -120,11 +120,11 @@ fn cylinder(radius: f64, half: f64) -> Solid {
     )
 }
 
-/// A cylinder with a half of a sphere on each end.
+/// A cylinder with a hemisphere on each end.
 fn capsule(radius: f64, half: f64) -> Solid {
     let (tube, across) = cylinder(radius, half);
     let (ball, of_ball) = ellipsoid([radius; 3]);
-    // Each half of the sphere has its centre of mass 3/8 of the radius beyond the cylinder's end.
+    // The centre of mass of a hemisphere is 3/8 of the radius beyond the cylinder's end.
     let farther = half * half + 0.75 * half * radius;
     let caps = of_ball + Vector3::new(farther, farther, 0.0);
     let volume = tube + ball;

@@ -1,4 +1,4 @@
-//! The ways in which an orientation can be given.
+//! Orientations in all notations of the format.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -6,10 +6,10 @@ use super::element::Element;
 use crate::model::FileError;
 use crate::model::chain::turn;
 
-/// How angles are written.
+/// Conventions for angles.
 pub(super) struct Angles {
     in_degrees: bool,
-    /// Three of `xyzXYZ`: about axes that turn along, or about fixed ones.
+    /// Three of `xyzXYZ`: lower case for intrinsic, upper case for extrinsic rotations.
     sequence: String,
 }
 
@@ -38,7 +38,7 @@ impl Angles {
         })
     }
 
-    /// The axes of an element's frame, in whatever way they are given.
+    /// The rotation of an element's frame, in whichever notation it is given.
     pub fn orientation(&self, element: &Element<'_, '_>) -> Result<Matrix3<f64>, FileError> {
         for part in element.parts() {
             let given: Vec<&str> = WAYS
@@ -86,7 +86,7 @@ impl Angles {
         }
     }
 
-    /// The numbers of an attribute whose angles come last, or are all.
+    /// The numbers of an attribute, of which the last, or all, are angles.
     fn in_rad<const N: usize>(
         &self,
         element: &Element<'_, '_>,
@@ -128,14 +128,14 @@ impl Angles {
     }
 }
 
-/// The frame whose x is along `x` and whose y is as near to `y` as it can be.
+/// The frame with x along `x` and y as close to `y` as possible.
 fn frame(x: Vector3<f64>, y: Vector3<f64>) -> Option<Matrix3<f64>> {
     let x = x.try_normalize(1e-10)?;
     let y = (y - x * x.dot(&y)).try_normalize(1e-10)?;
     Some(Matrix3::from_columns(&[x, y, x.cross(&y)]))
 }
 
-/// The smallest turn that takes z to a direction of length 1.
+/// The smallest rotation that takes z to a unit vector.
 pub(super) fn from_z_to(direction: Vector3<f64>) -> Matrix3<f64> {
     let axis = Vector3::z().cross(&direction);
     match axis.try_normalize(1e-10) {

@@ -1,4 +1,4 @@
-//! MJCF, the format of MuJoCo.
+//! Reads a serial mechanism.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -17,8 +17,8 @@ use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, Spring};
 /// Read a serial mechanism from an MJCF file.
 ///
 /// # Errors
-/// An unreadable file, XML that is none, and what is no serial chain of hinge and slide joints, or needs what is not
-/// in the file, such as meshes: with line, column and remedy.
+/// An unreadable file, invalid XML, anything but a serial chain of hinge and slide joints, or data outside of the file,
+/// such as meshes: with line, column and remedy.
 pub fn read_mjcf(path: &Path) -> Result<Chain, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;
@@ -38,7 +38,7 @@ pub fn read_mjcf(path: &Path) -> Result<Chain, FileError> {
     })
 }
 
-/// What the compiler section may say that changes nothing that is read here.
+/// Attributes of the compiler section without influence on what is read here.
 const COMPILER: &[&str] = &[
     "angle",
     "eulerseq",
@@ -58,7 +58,7 @@ const COMPILER: &[&str] = &[
     "alignfree",
     "saveinertial",
 ];
-/// What a joint may say that is read here or changes no motion away from its limits.
+/// Attributes of a joint that are read here or have no influence within its range.
 const JOINT: &[&str] = &[
     "name",
     "class",
@@ -84,7 +84,7 @@ const JOINT: &[&str] = &[
     "frictionloss",
     "user",
 ];
-/// What a body may say.
+/// Attributes of a body that are read here or have no influence.
 const BODY: &[&str] = &[
     "name",
     "childclass",
@@ -98,7 +98,7 @@ const BODY: &[&str] = &[
     "user",
     "sleep",
 ];
-/// Switches of forces that the joints carry.
+/// Flags that switch forces of the joints off.
 const FORCES: &[&str] = &["passive", "spring", "damper", "frictionloss"];
 
 struct Reader<'s, 'x> {
@@ -109,7 +109,7 @@ struct Reader<'s, 'x> {
     autolimits: bool,
     /// `auto`, `true` or `false`.
     inertia_from_geom: String,
-    /// The limit of the drive, by joint.
+    /// Effort limit of the drive (N m or N), by joint.
     efforts: HashMap<String, f64>,
 }
 
@@ -178,7 +178,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         Ok(Vector3::from(given.unwrap_or([0.0, 0.0, -9.81])))
     }
 
-    /// All bodies, hung to one without joints.
+    /// All bodies, attached to one without joints.
     fn world(&self) -> Result<Body, FileError> {
         let mut children = Vec::new();
         for world in named(self.root, "worldbody") {
@@ -200,7 +200,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             .collect()
     }
 
-    /// A body and all that it carries; `class` is the default class that its parent hands down.
+    /// A body with all its descendants; `class` is the default class of its parent.
     fn body(&self, node: Node<'s, 'x>, class: &str) -> Result<Body, FileError> {
         let class = node.attribute("childclass").unwrap_or(class);
         self.check_parts(node)?;
@@ -282,7 +282,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         })
     }
 
-    /// The smaller of the limits of the joint and of its drive.
+    /// The smaller of the effort limits of the joint and of its drive.
     fn effort(&self, joint: &Element<'s, 'x>, name: &str) -> Result<Option<f64>, FileError> {
         let range = joint.limits("actuatorfrcrange", "actuatorfrclimited", self.autolimits)?;
         let own = range.and_then(|range| actuator::symmetric(joint, range, "actuatorfrcrange"));
@@ -327,7 +327,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         Ok(Inertia::central(mass, tensor, &pose))
     }
 
-    /// What else the file has that acts on the motion.
+    /// Note everything else in the file that acts on the motion.
     fn note_the_rest(&self) -> Result<(), FileError> {
         let section = |name| named(self.root, name).flat_map(elements);
         if let Some(closed) = section("equality").find(|e| e.attribute("active") != Some("false")) {
@@ -357,7 +357,7 @@ fn is_of_body(node: Node<'_, '_>) -> bool {
             .is_some_and(|p| p.has_tag_name("body"))
 }
 
-/// A coefficient whose force is linear; others, of a polynomial, must be zero.
+/// A linear coefficient; higher ones, of a polynomial, must be zero.
 fn linear(joint: &Element<'_, '_>, key: &str) -> Result<f64, FileError> {
     let all = joint.list(key)?;
     if all.iter().skip(1).any(|higher| *higher != 0.0)

@@ -1,4 +1,4 @@
-//! MJCF, for MuJoCo.
+//! Writes the mechanism of a model.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -44,7 +44,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     }
     if mechanism.drives.iter().any(|drive| drive.lag.is_some()) {
         lost.push(
-            "the lag within a step: MuJoCo holds over each step what it has come to; only the derivative is compared"
+            "the lag within a step: MuJoCo holds the lagged torque over each step; only the derivative is compared"
                 .into(),
         );
     }
@@ -62,7 +62,7 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     let _ = write!(
         text,
         "<mujoco model=\"{}\">\n  <compiler angle=\"radian\"/>\n  {}\n  <custom>\n    \
-         <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n    \
+         <!-- Velocities over which dry friction reverses in the exported model. -->\n    \
          <numeric name=\"dry_friction_width\" data=\"{}\"/>\n  </custom>\n  <worldbody>\n",
         escaped(model.name()),
         option(model, mechanism),
@@ -82,7 +82,7 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     text + "  </actuator>\n</mujoco>\n"
 }
 
-/// Gravity, and steps as the model makes them.
+/// Gravity, step and integrator of the model.
 pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
     let integrator = match model.integrator {
         Integrator::SemiImplicitEuler => "Euler",
@@ -95,7 +95,7 @@ pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> 
     )
 }
 
-/// A body, left open for the next.
+/// A body, its element left open for the next.
 fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String {
     let rotation = link.pose.rotation;
     let axes = rotation
@@ -142,7 +142,7 @@ fn body(joint: &Joint, link: &Link, next: Option<&Link>, indent: &str) -> String
     )
 }
 
-/// What the joint has beside its axis.
+/// Attributes of the joint's drivetrain.
 fn of_joint(joint: &Joint) -> String {
     let spring = joint
         .drivetrain
@@ -157,7 +157,7 @@ fn of_joint(joint: &Joint) -> String {
     ])
 }
 
-/// Attributes whose values are not the format's own.
+/// Attributes whose values differ from the format's defaults.
 fn attributes(values: &[(&str, f64, f64)]) -> String {
     #[allow(clippy::float_cmp)] // as set
     let given = values.iter().filter(|(_, value, default)| value != default);

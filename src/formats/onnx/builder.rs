@@ -1,11 +1,11 @@
-//! A graph of ONNX operators while it grows.
+//! Builds a graph of ONNX operators.
 
 use super::proto::{
     Attribute, Dimension, FLOAT, Graph, INT, INT64, Node, Shape, Size, Tensor, TensorType,
     ValueInfo, ValueType,
 };
 
-/// A value in the graph: a column `[batch, 1]`, a matrix `[batch, k]`, or a number where it does not depend on the batch.
+/// A value in the graph: a column `[batch, 1]`, a matrix `[batch, k]`, or a scalar that does not depend on the batch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Value {
     pub name: String,
@@ -28,25 +28,25 @@ impl Builder {
         }
     }
 
-    /// Name a matrix `[batch, width]` as an output.
+    /// Make a matrix `[batch, width]` an output of this name.
     pub fn output(&mut self, name: &str, value: &Value, width: usize, about: &str) {
         let node = node("Identity", &[&value.name], &[name]);
         self.graph.node.push(node);
         self.graph.output.push(info(name, width, about));
     }
 
-    /// A named number.
+    /// A constant.
     pub fn parameter(&mut self, name: &str, value: f64, about: &str) -> Value {
         self.initializer(name, vec![], &[value], about)
     }
 
     pub fn constant(&mut self, value: f64) -> Value {
-        // By value: no two of the same number.
+        // Named by value: each number is stored once.
         let name = format!("{value:e}");
         self.initializer(&name, vec![], &[value], "")
     }
 
-    /// Numbers under a name; the same name again is the same numbers.
+    /// Named numbers; the same name again returns the same tensor.
     #[allow(clippy::cast_possible_truncation)] // the graph is in single precision
     pub fn initializer(
         &mut self,
@@ -126,7 +126,7 @@ impl Builder {
         columns
     }
 
-    /// A matrix of these columns; `like` is a column of the batch, for those that do not depend on it.
+    /// A matrix of these columns. Scalars are expanded to the batch size of `like`.
     pub fn concat(&mut self, columns: &[Value], like: &Value) -> Value {
         let columns: Vec<Value> = columns.iter().map(|c| self.spread(c, like)).collect();
         let columns: Vec<&Value> = columns.iter().collect();
@@ -155,7 +155,7 @@ impl Builder {
     }
 }
 
-/// An attribute that is a whole number.
+/// An integer attribute.
 pub fn whole(name: &str, value: i64) -> Attribute {
     Attribute {
         name: name.to_owned(),

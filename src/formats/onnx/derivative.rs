@@ -1,4 +1,4 @@
-//! ds/dt as operators: equations on columns, networks on matrices.
+//! ds/dt as operators: equations work on columns, networks on matrices.
 
 use super::builder::{Builder, Value, whole};
 use super::proto::FLOAT;
@@ -6,14 +6,14 @@ use crate::expr::{Binary, Op, Unary};
 use crate::formats::ExportModel;
 use crate::model::{Angles, MlpWeights};
 
-/// The right-hand side, to be written as often as an integrator evaluates it.
+/// The right-hand side, written once for each evaluation by the integrator.
 pub struct Derivative<'m> {
     model: &'m ExportModel,
     parameters: Vec<Value>,
 }
 
 impl<'m> Derivative<'m> {
-    /// Parameters become named numbers, once.
+    /// Writes the parameters as named numbers.
     pub fn new(builder: &mut Builder, model: &'m ExportModel) -> Self {
         let parameters = model.equations.parameters.iter();
         let parameters = parameters
@@ -101,13 +101,13 @@ fn binary(builder: &mut Builder, function: Binary, a: &Value, b: &Value) -> Valu
     builder.apply(operator, &[a, b])
 }
 
-/// ONNX knows the angle of a slope only: half a turn is added on the left, towards the sign of `y`.
+/// ONNX has atan alone: for negative `x`, half a turn with the sign of `y` is added.
 fn atan2(builder: &mut Builder, y: &Value, x: &Value) -> Value {
     let half = std::f64::consts::PI;
     let [zero, up, down] = [0.0, half, -half].map(|value| builder.constant(value));
     let slope = builder.apply("Div", &[y, x]);
     let angle = builder.apply("Atan", &[&slope]);
-    // On the axis itself, where the slope may be 0 / 0.
+    // On the x axis, where the slope may be 0 / 0.
     let level = builder.apply("Equal", &[y, &zero]);
     let angle = builder.apply("Where", &[&level, &zero, &angle]);
     let (below, left) = (

@@ -62,12 +62,12 @@ pub struct Node {
     pub attribute: Vec<Attribute>,
 }
 
-/// A whole number: no other attributes are needed.
+/// An integer: no other attributes are needed.
 #[derive(Clone, PartialEq, Message)]
 pub struct Attribute {
     #[prost(string, tag = "1")]
     pub name: String,
-    /// Optional in name only: zero too has to be written.
+    /// Always present: zero has to be written too.
     #[prost(int64, optional, tag = "3")]
     pub i: Option<i64>,
     #[prost(int32, tag = "20")]
@@ -118,7 +118,7 @@ pub struct Shape {
     pub dim: Vec<Dimension>,
 }
 
-/// A size, or the name of one that is free.
+/// A size, or the name of a free one.
 #[derive(Clone, PartialEq, Message)]
 pub struct Dimension {
     #[prost(oneof = "Size", tags = "1, 2")]

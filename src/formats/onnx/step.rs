@@ -1,4 +1,4 @@
-//! One step of the integrator, written out.
+//! One step of the integrator as a graph.
 
 use super::builder::{Builder, Value};
 use super::derivative::Derivative;
@@ -7,11 +7,11 @@ use crate::formats::ExportModel;
 use crate::formats::discrete_filter::{Combination, DiscreteFilter};
 use crate::model::Integrator;
 
-/// What a graph is given, as columns.
+/// Inputs of a graph, as columns.
 pub struct Inputs {
     pub state: Vec<Value>,
     pub torque: Vec<Value>,
-    /// Where the motion depends on it.
+    /// Where the equations depend on it.
     pub time: Option<Value>,
 }
 
@@ -61,8 +61,7 @@ pub fn graph(model: &ExportModel) -> Graph {
     builder.finish("step")
 }
 
-/// The torque that acts over each part of the step. Where filters stand before it, their memory is one more input and
-/// output.
+/// The torque that acts over each substep. The memory of delays and lags is one more input and output.
 fn act(builder: &mut Builder, model: &ExportModel, inputs: &Inputs) -> Vec<Vec<Value>> {
     let filters = DiscreteFilter::all(model);
     let mut acting = vec![inputs.torque.clone(); model.integrator.parts()];

@@ -1,5 +1,5 @@
-//! What simulators of rigid bodies can carry of a model: a mechanism with the same equations, and of the effects those
-//! that a joint or a drive has there.
+//! A model as simulators of rigid bodies can represent it: a mechanism with the same equations, and those effects that
+//! joints and drives have there.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -16,11 +16,11 @@ pub(in crate::formats) struct Mechanism {
     pub drives: Vec<Drive>,
     /// m/s^2, against z
     pub gravity: f64,
-    /// What is not carried.
+    /// What of the model it does not carry.
     pub not_carried: Vec<String>,
 }
 
-/// What a drive makes of its command: `gear * clamp(gain * command + constant)`.
+/// A drive: torque = gear * clamp(gain * command + constant, -limit, limit).
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::formats) struct Drive {
     pub gain: f64,
@@ -33,7 +33,7 @@ pub(in crate::formats) struct Drive {
     pub lag: Option<f64>,
 }
 
-/// A body as files give it: in the frame of its parent at q = 0.
+/// A body in the frame of its parent at q = 0.
 pub(in crate::formats) struct Link {
     pub pose: Pose,
     pub axis: Vector3<f64>,
@@ -47,13 +47,13 @@ impl Mechanism {
     /// The mechanism of a model.
     ///
     /// # Errors
-    /// Equations of none that is known, or a network in their place.
+    /// Equations of no known mechanism, equations with time, or a network in their place.
     pub fn of(model: &ExportModel) -> Result<Self, String> {
         if model.prior.is_some() {
-            return Err("a network stands in place of its equations".into());
+            return Err("a network replaces its equations".into());
         }
         if model.depends_on_time() {
-            return Err("its motion depends on time".into());
+            return Err("its equations depend on time".into());
         }
         let found = recover(&model.declared(), &model.system.prismatic)?;
         let still = Drive {
@@ -104,7 +104,7 @@ impl Mechanism {
                 });
             }
             ("gravity_tilt", [angle]) => joint.reference -= angle,
-            // What is after the limit is a gear.
+            // A gain behind the limit is a gear.
             ("actuator_gain", [excess]) if drive.limit.is_some() => drive.gear *= 1.0 + excess,
             ("actuator_gain", [excess]) => drive.gain *= 1.0 + excess,
             ("actuator_saturation", [limit]) => drive.limit = Some(*limit),
@@ -117,7 +117,7 @@ impl Mechanism {
         }
     }
 
-    /// What is added to a torque is added before its limit there, and after it here.
+    /// Refuse a constant torque beside a limit: there it is added before the limit, in the model after it.
     fn note_conflicts(&mut self) {
         for (k, drive) in self.drives.iter_mut().enumerate() {
             if drive.limit.is_some() && drive.constant != 0.0 {
@@ -130,7 +130,7 @@ impl Mechanism {
         }
     }
 
-    /// The bodies from the base outwards.
+    /// The bodies, from the base outwards.
     pub fn links(&self) -> Vec<Link> {
         let mut parent = Pose::identity();
         let link = |joint: &Joint| {
@@ -160,7 +160,7 @@ fn central(inertia: &Inertia, back: &Pose) -> Matrix3<f64> {
     (tensor + tensor.transpose()) * 0.5
 }
 
-/// A joint's frame in that of its body.
+/// The joint's frame in the frame of its body.
 fn frame(joint: &Joint) -> Pose {
     Pose {
         rotation: Matrix3::from_columns(&[
@@ -172,7 +172,7 @@ fn frame(joint: &Joint) -> Pose {
     }
 }
 
-/// The joint's frame while its coordinate is zero.
+/// The joint's frame where its coordinate is zero.
 fn at_zero(joint: &Joint) -> Pose {
     let (sin, cos) = joint.reference.sin_cos();
     let back = if joint.slides {
@@ -191,7 +191,7 @@ fn at_zero(joint: &Joint) -> Pose {
     joint.pose.then(&back)
 }
 
-/// For each joint the speed over which dry friction reverses; 0 where it does so at once.
+/// For each joint the velocity (rad/s or m/s) over which dry friction reverses; 0 where it jumps.
 pub(in crate::formats) fn friction_widths(model: &ExportModel) -> String {
     let widths = model.system.sign().into_iter().map(|sign| match sign {
         SignForm::Exact => 0.0,
@@ -200,7 +200,7 @@ pub(in crate::formats) fn friction_widths(model: &ExportModel) -> String {
     numbers(widths)
 }
 
-/// Numbers of 15 digits with blanks between them; what rounding left of zero is zero.
+/// Numbers to 15 digits, separated by blanks; rounding errors about zero become zero.
 pub(in crate::formats) fn numbers(numbers: impl IntoIterator<Item = f64>) -> String {
     let mut text = String::new();
     for number in numbers {
@@ -214,7 +214,7 @@ pub(in crate::formats) fn numbers(numbers: impl IntoIterator<Item = f64>) -> Str
     text
 }
 
-/// What can stand in an attribute.
+/// Text that can stand in an attribute.
 pub(in crate::formats) fn escaped(text: &str) -> String {
     let pairs = [
         ('&', "&amp;"),
@@ -227,14 +227,14 @@ pub(in crate::formats) fn escaped(text: &str) -> String {
         .fold(text.to_owned(), |text, (from, to)| text.replace(*from, to))
 }
 
-/// Where the file is from, as a comment.
+/// XML declaration and provenance.
 pub(in crate::formats) fn head(model: &ExportModel) -> String {
     // Two hyphens end a comment.
     let origin = model.provenance().to_string().replace("--", "- -");
     format!("<?xml version=\"1.0\"?>\n<!-- {origin} -->\n")
 }
 
-/// The one file of a format, from what it writes of the mechanism.
+/// The one file of a format, whose contents `text` writes.
 pub(in crate::formats) fn file(
     model: &ExportModel,
     path: &Path,

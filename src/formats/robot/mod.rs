@@ -1,5 +1,5 @@
-//! What formats that describe robots have in common: XML with places, a tree of bodies, and the mechanism that has a
-//! model's equations.
+//! Shared by the formats of robot descriptions: XML with positions in the file, the tree of bodies, and the mechanism
+//! with a model's equations.
 
 pub(super) mod mechanism;
 pub(super) mod tree;

@@ -1,4 +1,4 @@
-//! What both file formats describe: bodies, each fixed to its parent or held by joints.
+//! A tree of bodies, each welded to its parent or attached by joints, and the chain that it amounts to.
 
 use nalgebra::Vector3;
 
@@ -8,11 +8,11 @@ use crate::model::chain::{
     Drivetrain, Inertia, Joint, MOST_JOINTS, Pose, fault, with_z_along, without_inertia,
 };
 
-/// A joint as a file gives it, in the frame of the body that it moves.
+/// A joint in the frame of the body that it moves.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::formats) struct Hinge {
     pub name: String,
-    /// Where the file speaks of it.
+    /// Position in the file, bytes.
     pub at: usize,
     pub slides: bool,
     /// A unit vector.
@@ -23,12 +23,12 @@ pub(in crate::formats) struct Hinge {
     pub drivetrain: Drivetrain,
 }
 
-/// A body with everything that it carries.
+/// A body with its descendants.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::formats) struct Body {
     pub name: String,
     pub at: usize,
-    /// In the frame of the parent, at the joints' references.
+    /// In the frame of the parent, joints at their references.
     pub pose: Pose,
     /// From the parent outwards; none where it is welded to the parent.
     pub joints: Vec<Hinge>,
@@ -42,16 +42,16 @@ impl Body {
         !self.joints.is_empty() || self.children.iter().any(Self::moves)
     }
 
-    /// Whether this is the body of that name, or carries it.
+    /// Whether this is the body of that name, or an ancestor of it.
     pub fn holds(&self, name: &str) -> bool {
         self.name == name || self.children.iter().any(|child| child.holds(name))
     }
 }
 
-/// The joints of a tree without branches, with what is welded together made one.
+/// The joints of a tree without branches, welded bodies lumped together.
 ///
 /// # Errors
-/// Branches, no joint or too many, friction below zero, joints that move nothing.
+/// Branches, no joint or too many, joints that move no inertia.
 pub(in crate::formats) fn chain(source: &Source<'_>, base: &Body) -> Result<Vec<Joint>, FileError> {
     let mut joints = Vec::new();
     let mut places = Vec::new();
@@ -62,7 +62,7 @@ pub(in crate::formats) fn chain(source: &Source<'_>, base: &Body) -> Result<Vec<
     }
     if let Some(light) = without_inertia(&joints) {
         let message = format!(
-            "joint `{}` moves nothing that has inertia; give <inertial> of `{}` or of what it carries",
+            "joint `{}` moves nothing that has inertia; give <inertial> of `{}` or of its descendants",
             joints[light].name, joints[light].body
         );
         return Err(source.error_at(places[light], message));
@@ -70,7 +70,7 @@ pub(in crate::formats) fn chain(source: &Source<'_>, base: &Body) -> Result<Vec<
     Ok(joints)
 }
 
-/// A name without what a file name or a column could not have.
+/// A name with characters of file names and columns alone.
 pub(in crate::formats) fn plain(name: &str) -> String {
     let plain = |c: char| {
         if c.is_alphanumeric() || c == '-' {
@@ -82,7 +82,7 @@ pub(in crate::formats) fn plain(name: &str) -> String {
     name.chars().map(plain).collect()
 }
 
-/// Add a body and what it carries; `parent` is its parent's frame in that of the last joint.
+/// Add a body and its descendants; `parent` is its parent's frame in that of the last joint.
 fn grow(
     source: &Source<'_>,
     joints: &mut Vec<Joint>,
@@ -119,7 +119,7 @@ fn grow(
         );
         return Err(source.error_at(branch.at, message));
     }
-    // What is fixed belongs to this joint, before there is a next one.
+    // Welded children belong to this joint: they come before the next joint.
     for child in fixed.into_iter().chain(moving) {
         grow(source, joints, places, child, &frame)?;
     }
@@ -140,7 +140,8 @@ fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Joint {
     }
 }
 
-/// Refuse a mass or a tensor (kg m^2, about the centre of mass) that no body can have; `at` is where it stands.
+/// Refuse a mass (kg) or an inertia tensor (kg m^2, about the centre of mass) that no body can have; `at` is its position
+/// in the file.
 pub(in crate::formats) fn check_inertia(
     source: &Source<'_>,
     at: usize,

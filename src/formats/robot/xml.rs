@@ -1,4 +1,4 @@
-//! Reading XML so that every complaint names file, line and column.
+//! XML whose every error names file, line and column.
 
 use std::cell::RefCell;
 use std::f64::consts::PI;
@@ -10,7 +10,7 @@ use roxmltree::{Document, Node};
 
 use crate::model::FileError;
 
-/// A file of XML, and what is to be said of it.
+/// An XML file, and notes about it.
 pub(in crate::formats) struct Source<'x> {
     path: PathBuf,
     document: Document<'x>,
@@ -22,7 +22,7 @@ pub(in crate::formats) fn text(path: &Path) -> Result<String, FileError> {
     std::fs::read_to_string(path).map_err(|error| FileError {
         path: path.to_owned(),
         place: None,
-        message: format!("cannot be read: {error}; give a file of XML"),
+        message: format!("cannot be read: {error}; give an XML file"),
     })
 }
 
@@ -31,7 +31,7 @@ impl<'x> Source<'x> {
         let document = Document::parse(text).map_err(|error| FileError {
             path: path.to_owned(),
             place: Some((error.pos().row as usize, error.pos().col as usize)),
-            message: format!("this is no XML: {error}"),
+            message: format!("this is not valid XML: {error}"),
         })?;
         Ok(Self {
             path: path.to_owned(),
@@ -40,7 +40,7 @@ impl<'x> Source<'x> {
         })
     }
 
-    /// Say something about an element that is no error.
+    /// Note something about an element that is not an error.
     pub fn note(&self, node: Node<'_, '_>, message: impl fmt::Display) {
         let place = self.document.text_pos_at(node.range().start);
         self.notes
@@ -48,7 +48,7 @@ impl<'x> Source<'x> {
             .push((place.row, message.to_string()));
     }
 
-    /// All that was said, in the order of the file.
+    /// All notes, in the order of the file.
     pub fn into_notes(self) -> Vec<String> {
         let mut notes = self.notes.into_inner();
         notes.sort();
@@ -75,18 +75,18 @@ impl<'x> Source<'x> {
         Err(self.error(root, message))
     }
 
-    /// The name of the file without folder and ending.
+    /// The file name without folder and extension.
     pub fn stem(&self) -> String {
         let stem = self.path.file_stem().unwrap_or_default();
         stem.to_string_lossy().into_owned()
     }
 
-    /// A complaint about an element.
+    /// An error at an element.
     pub fn error(&self, node: Node<'_, '_>, message: impl Into<String>) -> FileError {
         self.error_at(node.range().start, message)
     }
 
-    /// A complaint about a place, in bytes from the file's beginning.
+    /// An error at a position, in bytes from the beginning of the file.
     pub fn error_at(&self, at: usize, message: impl Into<String>) -> FileError {
         let place = self.document.text_pos_at(at);
         FileError {
@@ -96,7 +96,7 @@ impl<'x> Source<'x> {
         }
     }
 
-    /// A complaint about an attribute of an element.
+    /// An error at an attribute of an element.
     pub fn attribute_error(
         &self,
         node: Node<'_, '_>,
@@ -108,7 +108,7 @@ impl<'x> Source<'x> {
         self.error_at(at, message)
     }
 
-    /// The numbers of an attribute, if it is there.
+    /// The numbers of an attribute, if given.
     pub fn list(&self, node: Node<'_, '_>, key: &str) -> Result<Option<Vec<f64>>, FileError> {
         let Some(text) = node.attribute(key) else {
             return Ok(None);
@@ -131,7 +131,7 @@ impl<'x> Source<'x> {
             .map(Some)
     }
 
-    /// So many numbers of an attribute, if it is there.
+    /// Exactly `N` numbers of an attribute, if given.
     pub fn numbers<const N: usize>(
         &self,
         node: Node<'_, '_>,
@@ -146,8 +146,8 @@ impl<'x> Source<'x> {
         })
     }
 
-    /// Angles (rad) of an attribute, if it is there. One that is a usual fraction of a turn to many digits is taken as
-    /// that; one that was rounded to a few is taken as it is written, with a note: it fills equations with small terms.
+    /// Angles (rad) of an attribute, if given. A usual fraction of a turn to many digits is taken as exact. One rounded to
+    /// few digits is taken as written, with a note, since it fills the equations with small terms.
     pub fn angles<const N: usize>(
         &self,
         node: Node<'_, '_>,
@@ -177,7 +177,7 @@ impl<'x> Source<'x> {
         Ok(number.map_or(default, |[number]| number))
     }
 
-    /// One number, which must be there.
+    /// One number, which must be given.
     pub fn required(&self, node: Node<'_, '_>, key: &str) -> Result<f64, FileError> {
         let number = self.numbers::<1>(node, key)?;
         number.map(|[number]| number).ok_or_else(|| {
@@ -186,11 +186,11 @@ impl<'x> Source<'x> {
         })
     }
 
-    /// One number from zero on, or zero.
+    /// One number that is not negative, or zero.
     pub fn not_negative(&self, node: Node<'_, '_>, key: &str) -> Result<f64, FileError> {
         let number = self.number_or(node, key, 0.0)?;
         if number < 0.0 {
-            let message = format!("`{key}` is {number}; give a number from zero on");
+            let message = format!("`{key}` is {number}; give zero or a positive number");
             return Err(self.attribute_error(node, key, message));
         }
         Ok(number)
@@ -202,7 +202,7 @@ impl<'x> Source<'x> {
         Ok(numbers.map_or(Vector3::zeros(), Vector3::from))
     }
 
-    /// A vector of length 1, or `default`.
+    /// A unit vector, or `default`.
     pub fn direction(
         &self,
         node: Node<'_, '_>,
@@ -217,7 +217,7 @@ impl<'x> Source<'x> {
         Ok(given.normalize())
     }
 
-    /// A name that an attribute must give.
+    /// A name, which must be given.
     pub fn name<'a>(&self, node: Node<'a, '_>, key: &str) -> Result<&'a str, FileError> {
         node.attribute(key).ok_or_else(|| {
             let message = format!("`{key}` is missing in <{}>", node.tag_name().name());
@@ -226,14 +226,14 @@ impl<'x> Source<'x> {
     }
 }
 
-/// The elements right below one.
+/// The child elements.
 pub(in crate::formats) fn elements<'a, 'x>(
     node: Node<'a, 'x>,
 ) -> impl Iterator<Item = Node<'a, 'x>> {
     node.children().filter(Node::is_element)
 }
 
-/// The elements of one name right below one.
+/// The child elements of one name.
 pub(in crate::formats) fn named<'a, 'x>(
     node: Node<'a, 'x>,
     name: &'static str,
@@ -241,11 +241,10 @@ pub(in crate::formats) fn named<'a, 'x>(
     elements(node).filter(move |child| child.has_tag_name(name))
 }
 
-/// A difference (rad) that no use of the equations can show.
+/// A difference (rad) without influence on the equations.
 const ROUNDING: f64 = 1e-10;
 
-/// The fraction of a turn that an angle stands for, where it is one rounded to some digits: `1.5708` is a quarter turn.
-/// The angle itself elsewhere.
+/// The fraction of a turn that an angle is rounded from, such as a quarter turn for `1.5708`; else the angle itself.
 pub(in crate::formats) fn angle_meant(word: &str, value: f64) -> f64 {
     let digits = word.split_once('.').map_or(0, |(_, digits)| digits.len());
     let fraction = match digits {
@@ -255,7 +254,7 @@ pub(in crate::formats) fn angle_meant(word: &str, value: f64) -> f64 {
     };
     let near = (value / fraction).round() * fraction;
     let unit = 10f64.powi(-i32::try_from(digits).unwrap_or(i32::MAX));
-    // Rounded or cut off; never to zero.
+    // Rounded or truncated; never to zero.
     let lost = (near.abs() - value.abs()) / unit;
     if near != 0.0 && (-0.5..1.0).contains(&lost) {
         near

@@ -1,4 +1,4 @@
-//! URDF: links, each hung to its parent by one joint.
+//! Reads a serial mechanism: links, each attached to its parent by one joint.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -11,13 +11,13 @@ use crate::formats::robot::xml::{self, Source, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 
-/// Where the format says nothing of gravity: m/s^2, against z.
+/// The format does not contain gravity: m/s^2, against z.
 const GRAVITY: f64 = 9.81;
 
 /// Read a serial mechanism from a URDF file. Gravity acts against z of the root link.
 ///
 /// # Errors
-/// An unreadable file, XML that is none, and what is no serial chain of revolute, continuous or prismatic joints: with
+/// An unreadable file, invalid XML, or anything but a serial chain of revolute, continuous or prismatic joints: with
 /// line, column and remedy.
 pub fn read_urdf(path: &Path) -> Result<Chain, FileError> {
     let text = xml::text(path)?;
@@ -49,7 +49,7 @@ struct Robot<'s, 'x> {
 }
 
 impl<'s, 'x> Robot<'s, 'x> {
-    /// The link that is nobody's child.
+    /// The root link, which is the child of no joint.
     fn base(&self) -> Result<Node<'s, 'x>, FileError> {
         let mut children = HashSet::new();
         for joint in named(self.root, "joint") {
@@ -91,7 +91,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             })
     }
 
-    /// A link and all that it carries, held by `joint`.
+    /// A link with all its descendants, attached by `joint`.
     fn body(&self, link: Node<'s, 'x>, joint: Option<Node<'s, 'x>>) -> Result<Body, FileError> {
         let (pose, joints) = match joint {
             Some(joint) => (self.pose(joint)?, self.hinge(joint)?),
@@ -113,7 +113,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         })
     }
 
-    /// Links that carry each other in a ring hang on nothing.
+    /// Refuse links in a loop, which no path from the root reaches.
     fn check_all_hang_on(&self, tree: &Body) -> Result<(), FileError> {
         let hangs = |link: &Node<'s, 'x>| tree.holds(link.attribute("name").unwrap_or_default());
         named(self.root, "link")
@@ -125,7 +125,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             })
     }
 
-    /// `<origin>` of an element: turned about the fixed x, then y, then z.
+    /// `<origin>` of an element: rotations about the fixed x, then y, then z.
     fn pose(&self, of: Node<'s, 'x>) -> Result<Pose, FileError> {
         let Some(origin) = named(of, "origin").next() else {
             return Ok(Pose::identity());
@@ -165,7 +165,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         Ok(Inertia::central(mass, tensor, &self.pose(inertial)?))
     }
 
-    /// What a joint lets move; none where it is fixed.
+    /// A joint that moves; none where it is fixed.
     fn hinge(&self, joint: Node<'s, 'x>) -> Result<Option<Hinge>, FileError> {
         let (source, name) = (self.source, self.source.name(joint, "name")?);
         let slides = match source.name(joint, "type")? {
@@ -206,7 +206,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         }))
     }
 
-    /// The largest torque, if it is above zero; a range of positions is noted.
+    /// The effort limit, if above zero; a range of positions is noted.
     fn effort(&self, joint: Node<'s, 'x>) -> Result<Option<f64>, FileError> {
         let Some(limit) = named(joint, "limit").next() else {
             return Ok(None);
@@ -223,20 +223,20 @@ impl<'s, 'x> Robot<'s, 'x> {
         if limit.has_attribute("velocity") {
             self.source.note(
                 limit,
-                format!("the largest speed of `{name}` is not carried"),
+                format!("the velocity limit of `{name}` is not carried"),
             );
         }
         let effort = self.source.not_negative(limit, "effort")?;
         if limit.has_attribute("effort") && effort == 0.0 {
             self.source.note(
                 limit,
-                format!("the largest effort of `{name}` is given as 0 and is not carried"),
+                format!("the effort limit of `{name}` is 0 and is not carried"),
             );
         }
         Ok((effort > 0.0).then_some(effort))
     }
 
-    /// What else the file has that acts on the motion.
+    /// Note everything else in the file that acts on the motion.
     fn note_the_rest(&self) {
         let source = self.source;
         let all = || self.root.descendants();

@@ -1,4 +1,4 @@
-//! URDF, for ROS and simulators that read it.
+//! Writes the mechanism of a model.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -32,9 +32,9 @@ pub(in crate::formats) const FORMAT: Format = Format {
     }),
 };
 
-/// What readers take for gravity, m/s^2.
+/// Gravity that readers assume, m/s^2.
 const GRAVITY: f64 = 9.81;
-/// For sliding joints, whose limits the format demands: m, m/s and N.
+/// Limits that the format requires of sliding joints: m, m/s and N.
 const NO_LIMIT: f64 = 1e6;
 
 fn not_carried(model: &ExportModel) -> Vec<String> {
@@ -45,7 +45,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     #[allow(clippy::float_cmp)] // as written
     if mechanism.gravity != GRAVITY {
         lost.push(format!(
-            "gravity of {} m/s^2: only MuJoCo is told",
+            "gravity of {} m/s^2: only MuJoCo reads it",
             mechanism.gravity
         ));
     }
@@ -82,7 +82,7 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
     let _ = write!(
         text,
         "<robot name=\"{}\">\n  <mujoco>\n  {}\n  </mujoco>\n  \
-         <!-- Speeds over which dry friction reverses in the model that this is made from. -->\n  \
+         <!-- Velocities over which dry friction reverses in the exported model. -->\n  \
          <residyn dry_friction_width=\"{}\"/>\n  <link name=\"base\"/>\n",
         escaped(model.name()),
         option(model, mechanism),

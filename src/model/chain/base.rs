@@ -1,4 +1,4 @@
-//! The parameters that the motion shows on their own (base parameters), and what each is made of.
+//! Base parameters: the combinations of physical parameters that the motion determines, and what each consists of.
 
 use std::collections::BTreeMap;
 
@@ -7,22 +7,22 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{Column, Kind};
 use super::series::{Wave, rounded};
 
-/// How far a column must stand out of the others, relative to its length.
+/// Least part of a column that is independent of the others, relative to its length.
 const INDEPENDENT: f64 = 1e-10;
 
-/// A parameter that the motion shows, with those that it shows only together with this one.
+/// A base parameter: a physical parameter together with those that the motion determines only in combination with it.
 #[derive(Debug, Clone)]
 pub(super) struct Base {
-    /// Its own, and what a unit of the whole adds to the equations.
+    /// The physical parameter, and the contribution of a unit of the combination to the equations.
     pub column: Column,
-    /// Of the whole.
+    /// Of the combination.
     pub value: f64,
-    /// The others: a factor, and which parameter of which joint.
+    /// The other parameters: factor, kind and joint.
     pub others: Vec<(f64, Kind, usize)>,
 }
 
 impl Base {
-    /// Whether the whole is a sum of what no body has below zero.
+    /// Whether the combination is a sum of quantities that are never negative.
     pub fn is_positive(&self) -> bool {
         let positive = |kind: &Kind| match kind {
             Kind::Tensor(a, b) => a == b,
@@ -35,12 +35,12 @@ impl Base {
     }
 }
 
-/// Keep the first of each set of columns that depend on each other, and put the values of the rest into those kept.
+/// Keep the first of each set of linearly dependent columns, and add the values of the others to those kept.
 pub(super) fn base_parameters(columns: Vec<Column>) -> Vec<Base> {
     let vectors = vectors(&columns);
     let (mut base, mut kept, mut directions) = (Vec::<Base>::new(), Vec::new(), Vec::new());
     for (column, vector) in columns.into_iter().zip(vectors) {
-        // Twice is enough against rounding.
+        // Orthogonalising twice is enough against rounding.
         let beyond = without(&directions, &without(&directions, &vector));
         let stands_out = beyond.norm();
         if stands_out > INDEPENDENT * vector.norm() {
@@ -69,7 +69,7 @@ impl Base {
     }
 }
 
-/// The columns as vectors of numbers over all entries of the mass matrix, all of the potential, and all waves.
+/// The columns as vectors over all entries of the mass matrix and the potential, and all basis functions.
 fn vectors(columns: &[Column]) -> Vec<DVector<f64>> {
     let mut places = BTreeMap::<(usize, Wave), usize>::new();
     let entries: Vec<Vec<(usize, f64)>> = columns
@@ -99,7 +99,7 @@ fn vectors(columns: &[Column]) -> Vec<DVector<f64>> {
     entries.iter().map(vector).collect()
 }
 
-/// What is left of a vector beyond orthogonal directions of length 1.
+/// The part of a vector orthogonal to orthonormal directions.
 fn without(directions: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
     let rest = vector.clone();
     directions.iter().fold(rest, |rest, direction| {
@@ -108,9 +108,9 @@ fn without(directions: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
     })
 }
 
-/// The factors with which independent vectors add up to a dependent one.
+/// The coefficients of a dependent vector in terms of independent ones.
 fn factors(kept: &[DVector<f64>], vector: &DVector<f64>) -> Vec<f64> {
-    // In vectors of length 1, whatever the units.
+    // Normalised, so that units do not matter.
     let unit: Vec<DVector<f64>> = kept.iter().map(DVector::normalize).collect();
     let svd = DMatrix::from_columns(&unit).svd(true, true);
     let solution = svd.solve(vector, 0.0).expect("both factors were asked for");

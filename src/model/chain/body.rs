@@ -11,7 +11,7 @@ pub struct Spring {
     pub rest: f64,
 }
 
-/// What a joint has beside its axis and the bodies that it moves.
+/// What acts on a joint beside inertia and gravity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drivetrain {
     /// N m s/rad, or N s/m.
@@ -21,24 +21,24 @@ pub struct Drivetrain {
     /// Inertia of the rotor seen by the joint, kg m^2 or kg.
     pub armature: f64,
     pub spring: Option<Spring>,
-    /// The largest torque or force that the drive gives, N m or N.
+    /// Effort limit of the drive, N m or N.
     pub effort: Option<f64>,
 }
 
-/// One joint of a serial chain with all that moves with it up to the next joint.
+/// One joint of a serial chain, with everything that moves with it up to the next joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
     pub name: String,
-    /// The body that the joint moves.
+    /// Name of the body that the joint moves.
     pub body: String,
     /// Whether it slides along its axis rather than turning about it.
     pub slides: bool,
-    /// The joint's frame in that of the joint before (or the world), while the joint's coordinate is `reference`; its
-    /// z is the joint's axis.
+    /// The joint's frame in that of the previous joint (or the world) where the joint's coordinate is `reference`; z is
+    /// the joint's axis.
     pub pose: Pose,
     /// rad or m
     pub reference: f64,
-    /// The frame's x in that of the file's body, to tell a reader what first moments mean.
+    /// The frame's x axis in the frame of the file's body, which first moments refer to.
     pub across: Vector3<f64>,
     /// The axis in the frame of the file's body.
     pub axis: Vector3<f64>,
@@ -54,6 +54,6 @@ pub struct Chain {
     /// Acceleration, m/s^2, in the frame of the world.
     pub gravity: Vector3<f64>,
     pub joints: Vec<Joint>,
-    /// What the file says of the motion that no model file of ours can carry, or that is carried in another way.
+    /// Properties of the file that the model file does not carry, or carries in another form.
     pub notes: Vec<String>,
 }

@@ -1,7 +1,7 @@
 //! The equations of motion of a chain, M(q) qdd + h(q, qd) + g dV/dq = tau, linear in the physical parameters.
 //!
-//! Velocities go out along the chain, each joint's share on its own (a Jacobian), in the axes of each link. What one
-//! unit of a parameter adds to the mass matrix and to the potential is then a sum of products.
+//! Velocities are propagated along the chain as Jacobians (the share of each joint), in the axes of each link. The
+//! contribution of one unit of a parameter to the mass matrix and to the potential is then a sum of products.
 
 use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
 
@@ -11,8 +11,7 @@ use super::series::{Series, Wave};
 /// A vector of functions.
 type Vector = [Series; 3];
 
-/// What a physical parameter is. The order is the one in which parameters are preferred where the motion shows only
-/// combinations: those about the axis first.
+/// A kind of physical parameter. Where the motion determines only combinations, those about the axis are preferred.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Entries of the inertia tensor about the joint's frame.
@@ -20,11 +19,11 @@ pub(super) enum Kind {
     /// Mass times centre of mass, along an axis of the frame.
     Moment(usize),
     Mass,
-    /// Of the drive: it adds to the joint's own inertia.
+    /// Rotor inertia of the drive, added to the joint's own inertia.
     Rotor,
 }
 
-/// In order of preference for a link that turns.
+/// In order of preference, for a link that turns.
 const OF_TURNING: [Kind; 10] = [
     Kind::Tensor(2, 2),
     Kind::Moment(0),
@@ -38,7 +37,7 @@ const OF_TURNING: [Kind; 10] = [
     Kind::Mass,
 ];
 
-/// A physical parameter and what one unit of it adds to the equations.
+/// A physical parameter and the contribution of one unit of it to the equations.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
     pub kind: Kind,
@@ -46,7 +45,7 @@ pub(super) struct Column {
     pub joint: usize,
     pub value: f64,
     pub mass: Vec<Vec<Series>>,
-    /// Per m/s^2 of gravity, without its constant.
+    /// Potential energy per m/s^2 of gravity, without its constant.
     pub potential: Series,
 }
 
@@ -62,7 +61,7 @@ impl Kind {
         }
     }
 
-    /// Powers of length that its coefficients in the mass matrix have between joints that turn.
+    /// Exponent of length in the unit of its coefficients in the mass matrix between joints that turn.
     fn lengths(self) -> i32 {
         match self {
             Self::Tensor(..) | Self::Rotor => 0,
@@ -71,7 +70,7 @@ impl Kind {
         }
     }
 
-    /// The value of a joint's parameter; 0 where it is no more than rounding.
+    /// The value of a joint's parameter; 0 where it is rounding.
     fn value(self, joint: &Joint) -> f64 {
         let (inertia, size) = (&joint.inertia, joint.inertia.tensor.trace());
         let (value, size) = match self {
@@ -88,7 +87,7 @@ impl Kind {
     }
 }
 
-/// The parameters of a chain that are not zero, in order of preference; rotors come last.
+/// The non-zero parameters of a chain, in order of preference, rotors last.
 pub(super) fn columns(joints: &[Joint], gravity: &Vector3<f64>) -> Vec<Column> {
     let lengths = Lengths::of(joints);
     let mut frame = Frame::base(joints.len(), gravity);
@@ -119,7 +118,7 @@ fn rotor(joints: usize, joint: usize) -> Vec<Vec<Series>> {
     mass
 }
 
-/// The outermost joint that moves nothing with inertia in some position, if there is one.
+/// The outermost joint that moves no inertia in some position, if any.
 pub(crate) fn without_inertia(joints: &[Joint]) -> Option<usize> {
     let columns = columns(joints, &Vector3::zeros());
     let is_regular =
@@ -140,15 +139,15 @@ fn is_regular(columns: &[Column], joints: usize, first: usize, trial: u32) -> bo
     Cholesky::new(mass).is_some_and(|root| root.determinant() > 1e-12 * scale)
 }
 
-/// The frame of a link in motion, in its own axes.
+/// The motion of a link's frame, in its own axes.
 struct Frame {
-    /// For each joint the velocity of the origin per unit of the joint's speed.
+    /// For each joint the velocity of the origin per unit of joint velocity.
     linear: Vec<Vector>,
-    /// And the angular velocity.
+    /// The same for the angular velocity.
     angular: Vec<Vector>,
     /// The direction of gravity.
     down: Vector,
-    /// How far down the origin is.
+    /// Depth of the origin along gravity, m.
     depth: Series,
 }
 
@@ -163,7 +162,7 @@ impl Frame {
         }
     }
 
-    /// The frame of the link that joint `k` moves, this one being that of the link before.
+    /// The frame of the link that joint `k` moves, from that of the previous link (this one).
     fn beyond(&self, k: usize, joint: &Joint) -> Self {
         let step = origin(k, joint);
         let carried = |(v, w): (&Vector, &Vector)| inward(k, joint, &add(v, &cross(w, &step)));
@@ -200,7 +199,7 @@ impl Frame {
         }
     }
 
-    /// Kinetic energy is half of m v.v + w.I w + 2 mc.(v x w).
+    /// Kinetic energy is (m v.v + w.I w + 2 mc.(v x w)) / 2.
     fn entry(&self, kind: Kind, i: usize, j: usize) -> Series {
         let ([v, w], [v_j, w_j]) = (
             [&self.linear[i], &self.angular[i]],
@@ -216,7 +215,7 @@ impl Frame {
     }
 }
 
-/// Where the origin of the link's frame is in the frame of the link before.
+/// The origin of the link's frame in the frame of the previous link.
 fn origin(k: usize, joint: &Joint) -> Vector {
     let rest = constant(&joint.pose.origin);
     if !joint.slides {
@@ -227,7 +226,7 @@ fn origin(k: usize, joint: &Joint) -> Vector {
     add(&rest, &std::array::from_fn(|a| &moved * along[a]))
 }
 
-/// A vector of the link before in the axes of the link that joint `k` moves.
+/// A vector of the previous link in the axes of the link that joint `k` moves.
 fn inward(k: usize, joint: &Joint, vector: &Vector) -> Vector {
     let at_rest = turned(&joint.pose.rotation.transpose(), vector);
     if joint.slides {
@@ -267,7 +266,7 @@ fn turned(by: &Matrix3<f64>, vector: &Vector) -> Vector {
     })
 }
 
-/// What sizes coefficients have: a power of the chain's length, by their unit.
+/// Typical magnitudes of coefficients: a power of the chain's length, by unit.
 #[derive(Debug, Clone)]
 pub(super) struct Lengths {
     /// m
@@ -285,7 +284,7 @@ impl Lengths {
         }
     }
 
-    /// A coefficient of a parameter in an equation of these joints, without what rounding left over.
+    /// A coefficient of a parameter in an equation of these joints, without rounding errors.
     pub fn cleaned(&self, kind: Kind, of: &[usize], series: &Series) -> Series {
         let sliding = of.iter().filter(|joint| self.slides[**joint]).count();
         self.with_powers(kind.lengths() - small(sliding), series)

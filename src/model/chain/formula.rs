@@ -1,4 +1,4 @@
-//! Sums of parameters times functions as formulas of a model file.
+//! Sums of parameters times functions, as formulas of a model file.
 
 use super::series::{Series, Wave};
 
@@ -20,7 +20,7 @@ pub(super) fn factors(first: &str, second: &str) -> String {
     }
 }
 
-/// Whether there is a sign outside of all parentheses, other than in front.
+/// Whether there is a sign outside of all parentheses, other than a leading one.
 fn is_sum(formula: &str) -> bool {
     let mut depth = 0;
     formula.split(' ').any(|word| {
@@ -46,7 +46,7 @@ pub(super) fn join(text: &mut String, term: &str) {
     }
 }
 
-/// A number in the shortest form that reads as the same.
+/// A number in its shortest exact form.
 pub(super) fn number(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").unwrap_or(&text).into()

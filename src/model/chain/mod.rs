@@ -1,10 +1,9 @@
-//! Model files from robot descriptions: a serial mechanism is read from URDF or MJCF, and its equations of motion are
-//! derived in closed form.
+//! The mechanics of a serial chain of bodies: from a [`Chain`] to equations of motion in closed form ([`model_text`]), and
+//! back for a few kinds of mechanism ([`recover`]).
 //!
-//! A reader makes a tree of bodies of a file; lumping what is welded makes a [`Chain`] of it. Each entry of the
-//! mass matrix is linear in the physical parameters, with Fourier series in the angles as coefficients, which
-//! is a form in which equal functions look the same: so parameters that the motion shows only in combinations are
-//! found and put together.
+//! Each entry of the mass matrix is linear in the physical parameters, with Fourier series in the angles as
+//! coefficients. In this form equal functions look the same, so that parameters which the motion determines only in
+//! combination are found and lumped (base parameters).
 
 mod base;
 mod body;

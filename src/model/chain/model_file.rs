@@ -1,4 +1,4 @@
-//! The model file of a chain.
+//! Writes the model file of a chain.
 
 use std::fmt::Write;
 
@@ -13,8 +13,8 @@ const WIDTH: usize = 110;
 
 const ABOUT: &str = "equations derived from the description of a serial mechanism";
 
-/// The text of a model file for a chain: its equations in closed form with the parameters that the motion shows, and
-/// damping, dry friction, rotors, springs and limits of the drives as effects.
+/// The text of a model file for a chain: its equations in closed form with base parameters; damping, dry friction,
+/// rotors, springs and effort limits as effects.
 pub fn model_text(chain: &Chain) -> String {
     let base = base_parameters(columns(&chain.joints, &chain.gravity));
     let (of_drives, of_bodies): (Vec<Base>, Vec<Base>) = base
@@ -44,12 +44,12 @@ fn name(kind: Kind, joint: usize) -> String {
     format!("{}_{}", kind.stem(), joint + 1)
 }
 
-/// A text in quotes, as TOML wants it.
+/// A TOML string.
 fn quoted(text: &str) -> String {
     toml_edit::Value::from(text).to_string()
 }
 
-/// What the file is made from.
+/// The parts of the file.
 struct Equations<'c> {
     chain: &'c Chain,
     base: Vec<Base>,
@@ -203,7 +203,7 @@ impl Equations<'_> {
         if text.is_empty() { "0".into() } else { text }
     }
 
-    /// What a unit of a parameter adds in front of qd_j qd_k in equation i, for both orders of j and k together.
+    /// The coefficient of qd_j qd_k in equation i per unit of a parameter, both orders of j and k together.
     fn christoffel(&self, base: &Base, i: usize, j: usize, k: usize) -> Series {
         let mass = &base.column.mass;
         let slopes = &mass[i][j].derivative(k) + &mass[i][k].derivative(j);
@@ -261,7 +261,7 @@ fn entry_line(name: &str, formula: &str) -> String {
     format!("{name} = {}\n", formula_text(formula))
 }
 
-/// A formula in quotes, over several lines where it is long.
+/// A formula as a TOML string, over several lines if long.
 fn formula_text(formula: &str) -> String {
     if formula.len() <= WIDTH {
         return format!("\"{formula}\"");
@@ -278,7 +278,7 @@ fn formula_text(formula: &str) -> String {
     format!("\"\"\"\n    {}\"\"\"", lines.join("\n    "))
 }
 
-/// Whether a line may end here: not after a sign, nor within an angle.
+/// Whether a line may end here: not after a sign, and not within an angle.
 fn may_break(line: &str) -> bool {
     let angle = ["cos(", "sin("]
         .into_iter()
@@ -301,7 +301,7 @@ fn direction(vector: &nalgebra::Vector3<f64>) -> String {
     format!("({})", parts.join(", "))
 }
 
-/// To six digits, without a sign where that is zero.
+/// To six digits; zero has no sign.
 fn short(value: f64) -> f64 {
     let short: f64 = format!("{value:.5e}")
         .parse()
@@ -340,7 +340,7 @@ fn about(base: &Base, joint: &Joint) -> String {
     text
 }
 
-/// What the joints have beside their inertia.
+/// Drivetrains as effects.
 fn effects(chain: &Chain, rotors: &[Base]) -> String {
     let mut text = String::new();
     for (k, joint) in chain.joints.iter().enumerate() {

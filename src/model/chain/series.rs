@@ -1,12 +1,12 @@
-//! Functions of the joints' coordinates: polynomials in those that slide, Fourier series in those that turn.
+//! Functions of the joint coordinates: polynomials in those that slide, Fourier series in those that turn.
 //!
-//! Products of sines and cosines are written as sums at once, so that each function has one form only: equal ones look
-//! equal, and what cancels is gone.
+//! Products of sines and cosines are expanded into sums, so that each function has one form: equal functions compare
+//! equal, and terms that cancel vanish.
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// So many joints at most: the closed form of longer chains is too long to be read.
+/// Most joints of a chain: the closed form of longer chains is too long to read.
 pub const MOST_JOINTS: usize = 3;
 
 /// One function of the basis: a monomial times a cosine or a sine.
@@ -14,12 +14,12 @@ pub const MOST_JOINTS: usize = 3;
 pub(super) struct Wave {
     /// Powers of the coordinates.
     pub powers: [u8; MOST_JOINTS],
-    /// The angle is the sum of these multiples of the coordinates; the first that is not zero is above zero.
+    /// The angle is the sum of these multiples of the coordinates; the first non-zero one is positive.
     pub angle: [i8; MOST_JOINTS],
     pub is_sine: bool,
 }
 
-/// A sum of basis functions with numbers in front.
+/// A linear combination of basis functions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Series {
     terms: BTreeMap<Wave, f64>,
@@ -67,7 +67,7 @@ impl Series {
         self
     }
 
-    /// The derivative by the coordinate of a joint.
+    /// The derivative by a joint's coordinate.
     pub fn derivative(&self, joint: usize) -> Self {
         let mut slope = Self::default();
         for (wave, factor) in self.terms() {
@@ -89,8 +89,8 @@ impl Series {
         slope
     }
 
-    /// Without what rounding left over: terms below 1e-13 of the size that `scale` gives for terms of their kind.
-    /// Other factors are rounded to 15 digits, for readers.
+    /// Without rounding errors: terms below 1e-13 of the magnitude that `scale` gives for terms of their kind. Other
+    /// coefficients are rounded to 15 digits.
     pub fn cleaned(&self, scale: impl Fn(&Wave) -> f64) -> Self {
         let kept = self
             .terms()
@@ -109,7 +109,7 @@ impl Series {
             .sum()
     }
 
-    /// Add a term, brought into its one form.
+    /// Add a term in its normal form.
     fn plus(mut self, wave: Wave, factor: f64) -> Self {
         let (wave, sign) = wave.in_one_form();
         if sign * factor == 0.0 {

@@ -1,8 +1,8 @@
-//! Frames, and the inertia of rigid bodies seen from them.
+//! Frames, and the inertia of rigid bodies in them.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A frame seen from another: x in this frame is `rotation * x + origin` in the other.
+/// A frame relative to another: x in this frame is `rotation * x + origin` in the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     pub rotation: Matrix3<f64>,
@@ -11,7 +11,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The frame that it is seen from.
+    /// The reference frame itself.
     pub fn identity() -> Self {
         Self {
             rotation: Matrix3::identity(),
@@ -19,7 +19,7 @@ impl Pose {
         }
     }
 
-    /// A frame given in this one, seen from where this one is.
+    /// The frame `inner`, given in this frame, in the reference frame of this one.
     #[must_use]
     pub fn then(&self, inner: &Self) -> Self {
         Self {
@@ -28,7 +28,7 @@ impl Pose {
         }
     }
 
-    /// The other frame seen from this one.
+    /// The reference frame in this one.
     #[must_use]
     pub fn inverse(&self) -> Self {
         let back = self.rotation.transpose();
@@ -39,26 +39,26 @@ impl Pose {
     }
 }
 
-/// A rotation by `angle` (rad) about a unit vector. Quarter turns come out exact.
+/// The rotation by `angle` (rad) about a unit vector. Quarter turns are exact.
 pub(crate) fn turn(axis: Vector3<f64>, angle: f64) -> Matrix3<f64> {
     let (sin, cos) = (exact(angle.sin()), exact(angle.cos()));
     Matrix3::identity() * cos + axis.cross_matrix() * sin + axis * axis.transpose() * (1.0 - cos)
 }
 
-/// Sines of multiples of pi in floating point miss 0 by some 1e-16.
+/// In floating point, sines of multiples of pi differ from 0 by about 1e-16.
 fn exact(sine: f64) -> f64 {
     if sine.abs() < 1e-15 { 0.0 } else { sine }
 }
 
-/// The rotation of a frame that has `axis` (a unit vector) as its z: x is the next one of the outer axes, made
-/// perpendicular, so that an outer axis gives a permutation of the three.
+/// The rotation of a frame whose z is `axis` (a unit vector). Its x is the next coordinate axis, made perpendicular, so that
+/// a coordinate axis gives a permutation.
 pub(crate) fn with_z_along(axis: Vector3<f64>) -> Matrix3<f64> {
     let next = Vector3::ith((axis.iamax() + 1) % 3, 1.0);
     let x = (next - axis * axis.dot(&next)).normalize();
     Matrix3::from_columns(&[x, axis.cross(&x), axis])
 }
 
-/// What a rigid body weighs in the equations of motion, about the origin of a frame.
+/// Mass properties of a rigid body about the origin of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
     /// kg
@@ -89,7 +89,7 @@ impl Inertia {
         here.seen_from(pose)
     }
 
-    /// The same body in the frame that its own frame is seen from by `pose`.
+    /// The same body in the reference frame of `pose`, which is the body's frame there.
     #[must_use]
     pub fn seen_from(&self, pose: &Pose) -> Self {
         let (p, turned) = (pose.origin, pose.rotation * self.moment);
@@ -112,12 +112,12 @@ impl Inertia {
     }
 }
 
-/// a . b less the dyad of the two: the tensor of unit mass at a where b = a.
+/// (a . b) I - a b^T: the inertia tensor of a unit mass at a for b = a.
 fn spread(a: &Vector3<f64>, b: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() * a.dot(b) - a * b.transpose()
 }
 
-/// What is wrong with a tensor (kg m^2) about a centre of mass, if no body can have it.
+/// Why no body can have this inertia tensor (kg m^2) about its centre of mass, if so.
 pub(crate) fn fault(tensor: &Matrix3<f64>) -> Option<&'static str> {
     let mut principal: Vec<f64> = tensor.symmetric_eigenvalues().iter().copied().collect();
     principal.sort_by(f64::total_cmp);

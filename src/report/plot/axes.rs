@@ -7,9 +7,9 @@ use super::scale::{Range, Scale, Ticks, scaled_unit};
 use super::style::{FAINT_INK, GRID, INK, SMALL_SIZE, SPINE, TEXT_SIZE};
 
 /// Room below a frame for numbers and label.
-pub(super) const FOOT: f64 = 46.0;
+pub(in crate::report) const FOOT: f64 = 46.0;
 /// Room above a frame for its heading.
-pub(super) const HEAD: f64 = 24.0;
+pub(in crate::report) const HEAD: f64 = 24.0;
 
 const X_TICK_PX: f64 = 60.0;
 const Y_TICK_PX: f64 = 42.0;
@@ -35,7 +35,7 @@ impl Quantity {
 }
 
 /// A quantity along one side of a frame.
-pub(super) struct Axis {
+pub(in crate::report) struct Axis {
     pub range: Range,
     scale: Scale,
     ticks: Ticks,
@@ -122,7 +122,7 @@ fn widest(ticks: &Ticks) -> f64 {
 }
 
 /// An area with an axis along two sides.
-pub(super) struct Frame<'a> {
+pub(in crate::report) struct Frame<'a> {
     pub area: Area,
     pub x: &'a Axis,
     pub y: &'a Axis,
@@ -214,19 +214,19 @@ impl Frame<'_> {
 }
 
 /// What a frame shows, above its left corner.
-pub(super) fn heading(area: Area, content: &str) -> svg::node::element::Text {
+pub(in crate::report) fn heading(area: Area, content: &str) -> svg::node::element::Text {
     text(content, area.x, area.y - 8.0, Anchor::Start, TEXT_SIZE)
         .set("font-weight", "bold")
         .set("fill", INK)
 }
 
 /// A remark above a frame's right corner.
-pub(super) fn remark(area: Area, content: &str) -> svg::node::element::Text {
+pub(in crate::report) fn remark(area: Area, content: &str) -> svg::node::element::Text {
     text(content, area.right(), area.y - 8.0, Anchor::End, SMALL_SIZE).set("fill", FAINT_INK)
 }
 
 /// What stands in a frame without data.
-pub(super) fn no_data(area: Area) -> svg::node::element::Text {
+pub(in crate::report) fn no_data(area: Area) -> svg::node::element::Text {
     let (x, y) = (area.x + area.width / 2.0, area.y + area.height / 3.0);
     text("no data", x, y, Anchor::Middle, TEXT_SIZE).set("fill", FAINT_INK)
 }

@@ -15,7 +15,7 @@ const BOLD: f64 = 1.15;
 
 /// A rectangle in pixels.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Area {
+pub(in crate::report) struct Area {
     pub x: f64,
     pub y: f64,
     pub width: f64,
@@ -34,14 +34,14 @@ impl Area {
 
 /// Which point of a text its position names.
 #[derive(Clone, Copy)]
-pub(super) enum Anchor {
+pub(in crate::report) enum Anchor {
     Start,
     Middle,
     End,
 }
 
 /// A figure under construction: a white sheet with a title.
-pub(super) struct Canvas {
+pub(in crate::report) struct Canvas {
     title: String,
     marks: Group,
     /// Where the part below the title begins.
@@ -92,7 +92,7 @@ impl Canvas {
 
 /// An inner drawing that hides what lies outside of `area`; its origin is the area's upper left corner.
 /// A nested `svg` rather than a `clipPath`: that needs an identifier, and these collide between figures in a page.
-pub(super) fn clipped(area: Area) -> SVG {
+pub(in crate::report) fn clipped(area: Area) -> SVG {
     SVG::new()
         .set("x", px(area.x))
         .set("y", px(area.y))
@@ -101,7 +101,7 @@ pub(super) fn clipped(area: Area) -> SVG {
         .set("overflow", "hidden")
 }
 
-pub(super) fn text(content: &str, x: f64, y: f64, anchor: Anchor, size: f64) -> Text {
+pub(in crate::report) fn text(content: &str, x: f64, y: f64, anchor: Anchor, size: f64) -> Text {
     let anchor = match anchor {
         Anchor::Start => "start",
         Anchor::Middle => "middle",
@@ -114,7 +114,7 @@ pub(super) fn text(content: &str, x: f64, y: f64, anchor: Anchor, size: f64) -> 
         .set("font-size", size)
 }
 
-pub(super) fn rule(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
+pub(in crate::report) fn rule(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
     Line::new()
         .set("x1", px(from.0))
         .set("y1", px(from.1))
@@ -124,7 +124,7 @@ pub(super) fn rule(from: (f64, f64), to: (f64, f64), colour: &str) -> Line {
 }
 
 /// Path data of an open line.
-pub(super) fn line_data(points: &[(f64, f64)]) -> String {
+pub(in crate::report) fn line_data(points: &[(f64, f64)]) -> String {
     let mut data = String::new();
     for (index, point) in points.iter().enumerate() {
         push(&mut data, if index == 0 { 'M' } else { 'L' }, *point);
@@ -133,7 +133,7 @@ pub(super) fn line_data(points: &[(f64, f64)]) -> String {
 }
 
 /// Path data of zero-length strokes.
-pub(super) fn dots_data(points: impl IntoIterator<Item = (f64, f64)>) -> String {
+pub(in crate::report) fn dots_data(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let mut data = String::new();
     for point in points {
         push(&mut data, 'M', point);
@@ -143,7 +143,7 @@ pub(super) fn dots_data(points: impl IntoIterator<Item = (f64, f64)>) -> String 
 }
 
 /// Open curves in one style.
-pub(super) fn curves<'a>(
+pub(in crate::report) fn curves<'a>(
     lines: impl IntoIterator<Item = &'a [(f64, f64)]>,
     stroke: &Stroke,
 ) -> Path {
@@ -158,13 +158,13 @@ pub(super) fn curves<'a>(
 }
 
 /// The area within an outline.
-pub(super) fn filled(outline: &[(f64, f64)], colour: &str) -> Path {
+pub(in crate::report) fn filled(outline: &[(f64, f64)], colour: &str) -> Path {
     let data = line_data(outline) + "Z";
     Path::new().set("d", data).set("fill", colour)
 }
 
 /// Round dots as one path of zero-length strokes with round caps: a fifth of the text of as many circles.
-pub(super) fn dots(
+pub(in crate::report) fn dots(
     points: impl IntoIterator<Item = (f64, f64)>,
     diameter: f64,
     colour: &str,
@@ -178,7 +178,7 @@ pub(super) fn dots(
 }
 
 /// A dot with a white rim, to stand out from the lines around it.
-pub(super) fn marker((x, y): (f64, f64), radius: f64, colour: &str) -> Circle {
+pub(in crate::report) fn marker((x, y): (f64, f64), radius: f64, colour: &str) -> Circle {
     Circle::new()
         .set("cx", px(x))
         .set("cy", px(y))
@@ -188,7 +188,7 @@ pub(super) fn marker((x, y): (f64, f64), radius: f64, colour: &str) -> Circle {
 }
 
 /// Width that a text will about take, in a wide sans-serif font: digits are wider there than letters on average.
-pub(super) fn text_width(content: &str, size: f64) -> f64 {
+pub(in crate::report) fn text_width(content: &str, size: f64) -> f64 {
     let share = |letter: char| {
         if letter.is_alphabetic() || letter == ' ' {
             0.52
@@ -200,7 +200,7 @@ pub(super) fn text_width(content: &str, size: f64) -> f64 {
 }
 
 /// Vertical distance from the middle of a line of text to its baseline.
-pub(super) const TO_BASELINE: f64 = 0.35 * TEXT_SIZE;
+pub(in crate::report) const TO_BASELINE: f64 = 0.35 * TEXT_SIZE;
 
 fn wrapped(content: &str, width: f64, size: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
@@ -222,7 +222,7 @@ fn push(data: &mut String, command: char, (x, y): (f64, f64)) {
 }
 
 /// Tenths of a pixel: finer cannot be seen, and only makes the file longer.
-pub(super) fn px(value: f64) -> f64 {
+pub(in crate::report) fn px(value: f64) -> f64 {
     (value.clamp(-FARTHEST_PX, FARTHEST_PX) * 10.0).round() / 10.0
 }
 

@@ -32,7 +32,9 @@ fn extremes(run: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
 }
 
 /// The pieces of a curve between the points that are not finite.
-pub(super) fn drawable_pieces(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
+pub(in crate::report) fn drawable_pieces(
+    points: &[(f64, f64)],
+) -> impl Iterator<Item = &[(f64, f64)]> {
     let is_broken = |(x, y): &(f64, f64)| !x.is_finite() || !y.is_finite();
     points.split(is_broken).filter(|piece| !piece.is_empty())
 }

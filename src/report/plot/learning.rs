@@ -7,7 +7,7 @@ use super::axes::{Axis, FOOT, Frame, HEAD, Quantity, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, dots, filled};
 use super::legend::{Entry, Sample, begin};
 use super::scale::{Range, Scale};
-use super::style::{MARGIN, Method, Stroke, WIDTH};
+use super::style::{BLACK, BLUE, GREEN, MARGIN, OTHERS, Stroke, VERMILION, WIDTH};
 
 /// More columns than this leave no room for numbers.
 const MAX_COLUMNS: usize = 3;
@@ -17,6 +17,45 @@ const DOT_PX: f64 = 5.5;
 const MAX_DOTS: usize = 40;
 /// A band without a width still shows as a line of this width.
 const BAND_EDGE_PX: f64 = 0.8;
+
+/// Dashes beside those that carry a name.
+const OTHER_DASHES: [&str; 4] = ["8 3 2 3", "3 3", "12 4", "8 3 2 3 2 3"];
+
+/// How the model that a planner uses came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Method {
+    /// The declared equations, without learning.
+    Prior,
+    /// A network alone.
+    DataDriven,
+    /// The declared equations and a network for what they lack.
+    Hybrid,
+    /// The simulated plant itself.
+    Perfect,
+    /// A further one, counted from 0.
+    Other(usize),
+}
+
+impl Method {
+    /// The prior and the hybrid have the colours of their roles; the others are told apart by dashes too.
+    fn stroke(self) -> Stroke {
+        let (colour, width, dash) = match self {
+            Self::Prior => (VERMILION, 1.9, "6 3.5"),
+            Self::DataDriven => (BLUE, 1.9, "10 3 2 3"),
+            Self::Hybrid => (GREEN, 2.4, "none"),
+            Self::Perfect => (BLACK, 1.9, "2 3"),
+            Self::Other(k) => {
+                let k = k % OTHERS.len();
+                (OTHERS[k], 1.9, OTHER_DASHES[k])
+            }
+        };
+        Stroke {
+            colour,
+            width,
+            dash,
+        }
+    }
+}
 
 /// One quantity over repetitions of an experiment, such as seeds.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,7 +12,7 @@ const ENTRY_GAP_PX: f64 = 26.0;
 
 /// What stands beside a name.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Sample {
+pub(in crate::report) enum Sample {
     Line(Stroke),
     /// A faint point of a colour.
     Point(&'static str),
@@ -26,7 +26,7 @@ pub(super) enum Sample {
 
 /// An entry of a legend.
 #[derive(Clone, PartialEq)]
-pub(super) struct Entry {
+pub(in crate::report) struct Entry {
     pub sample: Sample,
     pub label: String,
 }
@@ -42,7 +42,7 @@ impl Entry {
 ///
 /// # Errors
 /// No panel.
-pub(super) fn begin<P>(
+pub(in crate::report) fn begin<P>(
     title: &str,
     panels: &[P],
     entries: impl Fn(&[P]) -> Vec<Entry>,
@@ -56,7 +56,7 @@ pub(super) fn begin<P>(
 }
 
 /// A canvas with a title and a key, each entry once, and where these end.
-pub(super) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
+pub(in crate::report) fn with_key(title: &str, entries: Vec<Entry>) -> (Canvas, f64) {
     let mut once: Vec<Entry> = Vec::new();
     for entry in entries {
         if !once.contains(&entry) {

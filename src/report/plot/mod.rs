@@ -2,33 +2,31 @@
 //!
 //! Four figures: what a model predicts against what was measured ([`predictions`]), the force it leaves
 //! unexplained ([`residual_shape`]), how far off it is ([`error_bars`]), and what a planner gains with it as it
-//! learns ([`learning_curves`]). And a film: an episode in motion ([`animation`](animation())). They take plain numbers and return a complete SVG document; the caller writes it.
-//! A [`Role`] or a [`Method`] has the same colour and line in every figure.
+//! learns ([`learning_curves`]). They take plain numbers and return a complete SVG document; the caller writes it. A
+//! [`Role`] or a [`Method`] has the same colour and line in every figure.
 //!
 //! The documents carry no identifiers and no style sheets, so that several can stand in one HTML page, and name
 //! only the generic font `sans-serif`.
 
-mod animation;
-mod axes;
-mod canvas;
-mod decimate;
+pub(super) mod axes;
+pub(super) mod canvas;
+pub(super) mod decimate;
 mod error_bars;
 mod learning;
-mod legend;
+pub(super) mod legend;
 mod predictions;
 mod residual_shape;
-mod scale;
-mod style;
+pub(super) mod scale;
+pub(super) mod style;
 
-pub use animation::{Animation, Chain, Strip, StripLine, animation};
 pub use axes::Quantity;
 pub use decimate::decimate;
 pub use error_bars::{Bar, ErrorRow, error_bars};
-pub use learning::{Course, LearningPanel, MethodCurve, Spread, learning_curves};
+pub use learning::{Course, LearningPanel, Method, MethodCurve, Spread, learning_curves};
 pub use predictions::{Panel, Track, predictions};
-pub use residual_shape::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
+pub use residual_shape::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
 pub use scale::Scale;
-pub use style::{Method, Role};
+pub use style::Role;
 
 /// A figure that cannot be drawn.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

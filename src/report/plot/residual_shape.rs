@@ -34,6 +34,19 @@ pub struct ShapeCurve {
     pub high: Vec<f64>,
 }
 
+/// What one model leaves of the force on a joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeModel {
+    /// Which model.
+    pub role: Role,
+    /// Name in the legend.
+    pub label: String,
+    /// One point a window.
+    pub samples: Vec<ShapeSample>,
+    /// In the order of the samples' values; none where a variable stays the same.
+    pub curves: [Option<ShapeCurve>; 4],
+}
+
 /// The residual forces of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapePanel {
@@ -41,13 +54,8 @@ pub struct ShapePanel {
     pub joint: usize,
     /// How the joint moves.
     pub kind: JointKind,
-    /// Left by the declared model.
-    pub before: Vec<ShapeSample>,
-    /// Left by the model with the effects; empty where there is none.
-    pub after: Vec<ShapeSample>,
-    /// In the order of the samples' values; none where a variable stays the same.
-    pub curves_before: [Option<ShapeCurve>; 4],
-    pub curves_after: [Option<ShapeCurve>; 4],
+    /// The models, from the back to the front.
+    pub models: Vec<ShapeModel>,
 }
 
 /// What one panel shows of one model.
@@ -77,15 +85,11 @@ pub fn residual_shape(panels: &[ShapePanel], title: &str) -> Result<String, Plot
 }
 
 fn entries(panels: &[ShapePanel]) -> Vec<Entry> {
-    let mut entries = vec![Entry::new(Sample::Point(Role::Before.colour()), "before")];
-    if panels.iter().any(|panel| !panel.after.is_empty()) {
-        entries.push(Entry::new(Sample::Point(Role::After.colour()), "after"));
-    }
-    entries.push(Entry::new(
-        Sample::Band(Role::After.stroke()),
-        "what this variable carries by itself, 95 % band",
-    ));
-    entries
+    let models = panels.iter().flat_map(|panel| &panel.models);
+    let points = models.map(|m| Entry::new(Sample::Point(m.role.colour()), &m.label));
+    let band = Sample::Band(Role::After.stroke());
+    let band = Entry::new(band, "fit over this variable alone, 95 % confidence band");
+    points.chain([band]).collect()
 }
 
 fn columns(panel: &ShapePanel) -> [Column; 4] {
@@ -116,15 +120,14 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
     };
     canvas.add(heading(area, &format!("Joint {}", panel.joint)));
     for (k, column) in columns(panel).into_iter().enumerate() {
-        let shown = [
-            (Role::Before, &panel.before, &panel.curves_before[k]),
-            (Role::After, &panel.after, &panel.curves_after[k]),
-        ]
-        .map(|(role, samples, curve)| Shown {
-            role,
-            cloud: samples.iter().map(|s| (s.values[k], s.residual)).collect(),
-            curve: curve.as_ref(),
+        let shown = panel.models.iter().map(|model| Shown {
+            role: model.role,
+            cloud: (model.samples.iter())
+                .map(|s| (s.values[k], s.residual))
+                .collect(),
+            curve: model.curves[k].as_ref(),
         });
+        let shown: Vec<Shown> = shown.collect();
         let range = state_range(&shown);
         let x = Axis::horizontal(range, width, &column.quantity, column.unit);
         let frame = Frame { area, x: &x, y: &y };
@@ -139,12 +142,10 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
 
 /// Of each set on its own, so that a large one does not push a small one off the axis; zero is always on it.
 fn force_range(panel: &ShapePanel) -> Range {
-    let ranges = [&panel.before, &panel.after]
-        .into_iter()
-        .filter_map(|samples| {
-            let forces = samples.iter().map(|sample| sample.residual);
-            Range::between_quantiles(forces, QUANTILES.0, QUANTILES.1)
-        });
+    let ranges = panel.models.iter().filter_map(|model| {
+        let forces = model.samples.iter().map(|sample| sample.residual);
+        Range::between_quantiles(forces, QUANTILES.0, QUANTILES.1)
+    });
     let zero = Range { lo: 0.0, hi: 0.0 };
     ranges.fold(zero, Range::union).drawable().widened(0.08)
 }
@@ -210,18 +211,19 @@ fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG 
 
 #[cfg(test)]
 mod tests {
-    use super::{ShapeCurve, ShapePanel, ShapeSample, residual_shape};
-    use crate::report::plot::{JointKind, PlotError};
+    use super::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
+    use crate::report::plot::{JointKind, PlotError, Role};
 
-    fn panel(before: Vec<ShapeSample>) -> ShapePanel {
-        let kind = JointKind::Revolute;
+    fn panel(samples: Vec<ShapeSample>) -> ShapePanel {
         ShapePanel {
             joint: 1,
-            kind,
-            before,
-            after: vec![],
-            curves_before: [const { None }; 4],
-            curves_after: [const { None }; 4],
+            kind: JointKind::Revolute,
+            models: vec![ShapeModel {
+                role: Role::Before,
+                label: "fitted".into(),
+                samples,
+                curves: [const { None }; 4],
+            }],
         }
     }
 
@@ -260,7 +262,7 @@ mod tests {
     fn a_curve_is_drawn_in_its_band() {
         let mut panel = panel((0..20).map(|i| sample(f64::from(i) - 10.0)).collect());
         let without = residual_shape(std::slice::from_ref(&panel), "curve").unwrap();
-        panel.curves_before[1] = Some(ShapeCurve {
+        panel.models[0].curves[1] = Some(ShapeCurve {
             x: vec![-9.0, 9.0],
             force: vec![-5.0, 5.0],
             low: vec![-6.0, 4.0],

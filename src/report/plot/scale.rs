@@ -1,5 +1,7 @@
 //! From numbers to pixels, and to the numbers on an axis.
 
+use crate::data::statistics::quantile;
+
 /// An axis ends here, so that its width is still a number.
 const FARTHEST: f64 = 1e300;
 /// A logarithmic axis spans at most from the inverse of this power of ten to the power itself.
@@ -7,7 +9,7 @@ const FARTHEST_DECADE: f64 = 300.0;
 
 /// A part of the number line that has a width.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Range {
+pub(in crate::report) struct Range {
     pub lo: f64,
     pub hi: f64,
 }
@@ -36,13 +38,10 @@ impl Range {
         low: f64,
         high: f64,
     ) -> Option<Self> {
-        let mut sorted: Vec<f64> = values.filter(|value| value.is_finite()).collect();
-        sorted.sort_by(f64::total_cmp);
-        let last = sorted.len().checked_sub(1)?;
-        let at = |quantile: f64| sorted[(quantile * last as f64).round() as usize];
-        Some(Self {
-            lo: at(low),
-            hi: at(high),
+        let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+        (!finite.is_empty()).then(|| Self {
+            lo: quantile(&finite, low),
+            hi: quantile(&finite, high),
         })
     }
 
@@ -112,7 +111,7 @@ pub enum Scale {
 
 impl Scale {
     /// The number that a value's place is proportional to.
-    pub(super) fn forward(self, value: f64) -> f64 {
+    pub(in crate::report) fn forward(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
             Self::Logarithmic => value.log10(),
@@ -127,12 +126,12 @@ impl Scale {
     }
 
     /// Whether a value has a place.
-    pub(super) fn shows(self, value: f64) -> bool {
+    pub(in crate::report) fn shows(self, value: f64) -> bool {
         self.forward(value).is_finite()
     }
 
     /// The places between which a range lies.
-    pub(super) fn stretched(self, Range { lo, hi }: Range) -> Range {
+    pub(in crate::report) fn stretched(self, Range { lo, hi }: Range) -> Range {
         Range {
             lo: self.forward(lo),
             hi: self.forward(hi),
@@ -140,7 +139,7 @@ impl Scale {
     }
 
     /// A range opened by a share of its length on the axis at both ends.
-    pub(super) fn widened(self, range: Range, share: f64) -> Range {
+    pub(in crate::report) fn widened(self, range: Range, share: f64) -> Range {
         let Range { lo, hi } = self.stretched(range).widened(share);
         Range {
             lo: self.back(lo),
@@ -148,7 +147,7 @@ impl Scale {
         }
     }
 
-    pub(super) fn ticks(self, range: Range, wanted: usize) -> Ticks {
+    pub(in crate::report) fn ticks(self, range: Range, wanted: usize) -> Ticks {
         match self {
             Self::Linear => Ticks::new(range, wanted),
             Self::Logarithmic => Ticks::logarithmic(range, wanted),
@@ -157,7 +156,7 @@ impl Scale {
 }
 
 /// Where an axis has its marks, and what stands at them.
-pub(super) struct Ticks {
+pub(in crate::report) struct Ticks {
     pub values: Vec<f64>,
     pub labels: Vec<String>,
     /// The labels count in this power of ten.
@@ -258,7 +257,7 @@ fn number(value: f64, decimals: usize) -> String {
 }
 
 /// A number with three significant digits.
-pub(super) fn three_digits(value: f64) -> String {
+pub(in crate::report) fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
@@ -287,7 +286,7 @@ fn power_number(value: f64) -> String {
 }
 
 /// A unit counted in a power of ten: `10⁻³ rad`.
-pub(super) fn scaled_unit(unit: &str, exponent: i32) -> String {
+pub(in crate::report) fn scaled_unit(unit: &str, exponent: i32) -> String {
     match exponent {
         0 => unit.to_owned(),
         _ => format!("10{} {unit}", superscript(exponent)),

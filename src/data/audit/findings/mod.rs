@@ -3,8 +3,9 @@
 mod torque;
 mod velocity;
 
+use super::joint::JointAudit;
+use super::quality::{Audit, Finding, Severity};
 use super::table::short;
-use super::{Audit, Finding, JointAudit, Severity};
 use crate::data::log::{Interval, Log};
 use Severity::{Info, Serious, Warning};
 

@@ -1,0 +1,230 @@
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::per_log::values_on;
+use crate::closeloop::select::{FALSE_ALARM, SIGNIFICANT_ALONE};
+use crate::closeloop::select::{PLAIN, WORTHWHILE};
+use crate::closeloop::select::{candidates, starts};
+use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::split::set_aside;
+use crate::closeloop::study::Study;
+use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty};
+use crate::model::{Effect, FittedEffect};
+
+/// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectionLimit {
+    /// The effect, absent.
+    pub effect: FittedEffect,
+    pub smallest: Smallest,
+    /// What was named with the effect at [`HIDDEN`](super::HIDDEN) times that size; `None` where it was not tried.
+    pub named: Option<Vec<FittedEffect>>,
+}
+
+impl DetectionLimit {
+    /// Whether the hidden effect was named; `None` where it was not tried.
+    pub fn verified(&self) -> Option<bool> {
+        let is_this = |named: &FittedEffect| named.label() == self.effect.label();
+        self.named.as_ref().map(|named| named.iter().any(is_this))
+    }
+}
+
+/// The smallest size of one effect that the search would name.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Smallest {
+    /// One switch alone, the one that shows at the smallest multiple of its typical value; the values of all
+    /// parameters, inner ones at the searched values that show the effect best, other switches at zero.
+    Detectable { switch: usize, values: Vec<f64> },
+    /// No size: the motion does not tell it from what the model has.
+    Indistinguishable,
+    /// No parameter at zero switches the effect off, so that its size has no scale to start from.
+    NotComputed,
+}
+
+/// Share of logs like these in which an effect of the smallest size is to be named: the standard normal quantile
+/// of 80 %.
+const POWER: f64 = 0.841_6;
+/// An effect of which less than this share of the information is its own is not told from the rest of the model.
+const OWN: f64 = 1e-6;
+
+/// For each effect that could join an accepted model, the smallest size that the search would name.
+///
+/// # Errors
+/// A model that diverges on the logs.
+pub(super) fn detection_limits(
+    study: &Study<'_>,
+    accepted: &Fitted,
+    library: &[Effect],
+) -> Result<Vec<DetectionLimit>, FitError> {
+    // The search chooses on this part alone.
+    let (chosen_by, _) = set_aside(study.logs);
+    let mut part = study.on(&chosen_by);
+    part.identifiability = study.identifiability.clone();
+    let look = Look::new(&part, accepted)?;
+    let all = candidates(&part, library, &accepted.effects);
+    let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
+    #[allow(clippy::cast_precision_loss)] // few trials
+    let level = FALSE_ALARM / trials.max(1) as f64;
+    Ok(all
+        .into_iter()
+        .map(|candidate| {
+            let smallest = look.size(&candidate, level);
+            DetectionLimit {
+                effect: candidate,
+                smallest,
+                named: None,
+            }
+        })
+        .collect())
+}
+
+/// An accepted model on the logs that effects are chosen by.
+struct Look<'a> {
+    study: &'a Study<'a>,
+    accepted: &'a Fitted,
+    locals: Vec<Vec<f64>>,
+    /// The loss on stretches left out of the fit.
+    loss: f64,
+}
+
+impl<'a> Look<'a> {
+    fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
+        let values = values_on(study.logs, &accepted.declared, &accepted.effects);
+        let scale = accepted.fit.scale;
+        let states = study.shooting.initial_locals(0);
+        let locals = fit(
+            &study.shooting,
+            &accepted.dynamics,
+            &[],
+            values.clone(),
+            states,
+            Some(scale),
+        )?
+        .locals;
+        let active = &accepted.fit.active;
+        let fit = as_it_stands(
+            &study.shooting,
+            &accepted.dynamics,
+            active,
+            values,
+            locals.clone(),
+            scale,
+        )?;
+        let loss = left_out_losses(&fit, &folds(&study.shooting)).iter().sum();
+        Ok(Self {
+            study,
+            accepted,
+            locals,
+            loss,
+        })
+    }
+
+    fn size(&self, candidate: &FittedEffect, level: f64) -> Smallest {
+        let parameters = &candidate.effect.parameters;
+        let switches: Vec<usize> = (0..parameters.len())
+            .filter(|&i| parameters[i].is_switch())
+            .collect();
+        if switches.is_empty() {
+            return Smallest::NotComputed;
+        }
+        // Of a value that each log has of its own, the same in all: there are as many to be tested.
+        let tested = if parameters.iter().any(|p| p.per_log) {
+            switches.len() * self.study.logs.len()
+        } else {
+            switches.len()
+        };
+        let mut common = candidate.clone();
+        for parameter in &mut common.effect.parameters {
+            parameter.per_log = false;
+        }
+        let starts = starts(&common);
+        let sizes = starts
+            .iter()
+            .flat_map(|start| switches.iter().map(move |&switch| (start, switch)))
+            .filter_map(|(start, switch)| {
+                let size = self.smallest(start, switch, tested, level)?;
+                let mut values: Vec<f64> = start.values.iter().map(|(value, _)| *value).collect();
+                values[switch] = size;
+                (candidate.effect.is_valid(&values)).then_some((switch, values))
+            });
+        let multiple =
+            |(switch, values): &(usize, Vec<f64>)| values[*switch] / parameters[*switch].typical;
+        sizes
+            .min_by(|a, b| multiple(a).total_cmp(&multiple(b)))
+            .map_or(Smallest::Indistinguishable, |(switch, values)| {
+                Smallest::Detectable { switch, values }
+            })
+    }
+
+    /// The smallest size of one switch, the other parameters as they are, in a test of all `switches`.
+    fn smallest(
+        &self,
+        start: &FittedEffect,
+        switch: usize,
+        switches: usize,
+        level: f64,
+    ) -> Option<f64> {
+        let fit = self.with(start, switch)?;
+        let information = own_information(&fit)?;
+        let known = uncertainty(&self.study.shooting, &fit);
+        let last = fit.columns.len() - 1;
+        let deviation = known.covariance[(last, last)].sqrt();
+        let needed = |p: f64, gain: f64| {
+            let significant = critical(p, switches, known.blocks)? * deviation;
+            let worthwhile = (2.0 * self.loss * gain / (1.0 - gain) / information).sqrt();
+            Some(significant.max(worthwhile) + POWER * deviation)
+        };
+        let plain = needed(SIGNIFICANT_ALONE, PLAIN)?;
+        Some(needed(level, WORTHWHILE)?.min(plain))
+    }
+
+    /// The accepted model with one more free value, a switch of the effect, at zero.
+    fn with(&self, start: &FittedEffect, switch: usize) -> Option<Fit> {
+        let accepted = self.accepted;
+        let mut effects = accepted.effects.clone();
+        effects.push(start.clone());
+        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
+        let values = values_on(self.study.logs, &accepted.declared, &effects);
+        let switch = values.common.len() - start.values.len() + switch;
+        as_it_stands(
+            &self.study.shooting,
+            &dynamics,
+            &[accepted.fit.active.as_slice(), &[switch]].concat(),
+            values,
+            self.locals.clone(),
+            accepted.fit.scale,
+        )
+        .ok()
+    }
+}
+
+/// Information on the last free value, the others free as well; `None` where it is no more than rounding.
+fn own_information(fit: &Fit) -> Option<f64> {
+    let last = fit.columns.len() - 1;
+    let mut terms = fit.nothing();
+    fit.reduced
+        .iter()
+        .for_each(|window| window.add_to(&mut terms));
+    let all = terms.hessian;
+    // Unit diagonal, so that rounding does not depend on units.
+    let unit = all
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scaled = |i: usize, j: usize| all[(i, j)] * unit[i] * unit[j];
+    let others = DMatrix::from_fn(last, last, scaled);
+    let cross = DVector::from_fn(last, |i, _| scaled(i, last));
+    let explained = cross.dot(&(others.pseudo_inverse(1e-12).ok()? * &cross));
+    let own = 1.0 - explained;
+    (own > OWN && unit[last] > 0.0).then(|| own * all[(last, last)])
+}
+
+/// Standard deviations from zero at which one of so many switches are significant at level `p`: the threshold of
+/// Hotelling's test. `None` for too few blocks.
+#[allow(clippy::cast_precision_loss)] // few blocks
+fn critical(p: f64, switches: usize, blocks: usize) -> Option<f64> {
+    let (q, freedom) = (switches as f64, blocks as f64 - switches as f64);
+    let law = FisherSnedecor::new(q, freedom).ok()?;
+    let f = law.inverse_cdf(1.0 - p);
+    Some((f * q * (blocks as f64 - 1.0) / freedom).sqrt())
+}

@@ -1,0 +1,128 @@
+use rand::{Rng, RngExt};
+
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::per_log::values_on;
+use crate::closeloop::study::Study;
+use crate::data::{Log, half_width_s};
+use crate::identify::{FitError, Window, blocks, fit};
+use crate::model::FittedEffect;
+
+/// The training logs as they would be if an accepted model were the truth.
+///
+/// A rig that balances upright cannot be simulated open loop over a whole log. Each window is simulated
+/// from its fitted start state instead, under the logged torques, and the windows stand apart in time:
+/// whatever cuts such logs into windows finds these again, and no motion leaps within one.
+pub(super) struct SimulatedLogs<'a> {
+    study: &'a Study<'a>,
+    accepted: &'a Fitted,
+    /// The windows of each training log, a pause before each.
+    apart: Vec<Log>,
+    windows: Vec<Window>,
+    locals: Vec<Vec<f64>>,
+    /// Model less log in units of the noise: `[window][row * joints + joint]`.
+    residuals: Vec<Vec<f64>>,
+    /// The block that each window belongs to.
+    members: Vec<usize>,
+}
+
+impl<'a> SimulatedLogs<'a> {
+    /// # Errors
+    /// A model that diverges on the logs, or logs without a window.
+    pub fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
+        let apart = apart(study.logs, &study.shooting.windows);
+        let rig = study.on(&apart);
+        let values = values_on(&apart, &accepted.declared, &accepted.effects);
+        let states = rig.shooting.initial_locals(0);
+        let scale = Some(accepted.fit.scale);
+        let locals = fit(
+            &rig.shooting,
+            &accepted.dynamics,
+            &[],
+            values.clone(),
+            states,
+            scale,
+        )?
+        .locals;
+        Ok(Self {
+            study,
+            accepted,
+            windows: rig.shooting.windows.clone(),
+            residuals: rig.shooting.residuals(&accepted.dynamics, &values, &locals),
+            members: blocks(&rig.shooting),
+            locals,
+            apart,
+        })
+    }
+
+    /// Logs of the accepted model with `more` effects. The noise is the residuals of the accepted model, the
+    /// sign of each block drawn at random (the wild cluster bootstrap of Cameron, Gelbach and Miller
+    /// 2008): colour, rounding and size stay, whatever is systematic goes. `None` where the motion diverges.
+    pub fn draw(&self, more: &[FittedEffect], rng: &mut impl Rng) -> Option<Vec<Log>> {
+        let effects = [self.accepted.effects.as_slice(), more].concat();
+        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
+        let values = values_on(&self.apart, &self.accepted.declared, &effects);
+        let rig = self.study.on(&self.apart);
+        let motion = rig.shooting.residuals(&dynamics, &values, &self.locals);
+        if motion.iter().flatten().any(|x| !x.is_finite()) {
+            return None;
+        }
+        let blocks = self.members.last().map_or(0, |last| last + 1);
+        let signs: Vec<f64> = (0..blocks)
+            .map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 })
+            .collect();
+        let mut logs = self.apart.clone();
+        for (w, window) in self.windows.iter().enumerate() {
+            let sign = signs[self.members[w]];
+            let mut cells = motion[w].iter().zip(&self.residuals[w]);
+            for row in window.first..=window.last {
+                for (q, noise) in logs[window.log].q.iter_mut().zip(&rig.shooting.noise) {
+                    let (motion, residual) =
+                        cells.next().expect("a residual for each row and joint");
+                    q[row] += noise * (motion - sign * residual);
+                }
+            }
+        }
+        Some(logs)
+    }
+}
+
+/// The rows of the windows alone. Before each stands one row at the edge of what the estimate of its start state
+/// reads, and before that a pause that no estimate and no window spans.
+fn apart(logs: &[Log], windows: &[Window]) -> Vec<Log> {
+    let stretch = |index: usize, log: &Log| {
+        let reach = half_width_s(log.median_step());
+        let mut out = Log {
+            time: Vec::new(),
+            q: vec![Vec::new(); log.joints()],
+            qd: vec![Vec::new(); log.joints()],
+            tau: vec![Vec::new(); log.joints()],
+            leave_out: Vec::new(),
+            ..log.clone()
+        };
+        for window in windows.iter().filter(|window| window.log == index) {
+            let edge = log.time[window.first] - reach * (1.0 + 1e-6);
+            let before = log.time.partition_point(|t| *t < edge);
+            let later = out
+                .time
+                .last()
+                .map_or(0.0, |last| last + PAUSE * reach - log.time[before]);
+            for row in std::iter::once(before).chain(window.first..=window.last) {
+                out.time.push(log.time[row] + later);
+                for j in 0..log.joints() {
+                    out.q[j].push(log.q[j][row]);
+                    out.qd[j].push(log.qd[j][row]);
+                    out.tau[j].push(log.tau[j][row]);
+                }
+            }
+        }
+        out
+    };
+    logs.iter()
+        .enumerate()
+        .map(|(index, log)| stretch(index, log))
+        .collect()
+}
+
+/// Length of a pause in half widths of an estimate, of which each is four median steps or more: windows end at
+/// pauses of five.
+const PAUSE: f64 = 1.5;

@@ -1,0 +1,78 @@
+use super::separation::{Separation, separation};
+use crate::closeloop::find::Found;
+use crate::closeloop::select::Rival;
+use crate::closeloop::stage::{Progress, Stage};
+use crate::closeloop::study::Study;
+use crate::model::FittedEffect;
+
+/// Another explanation that the logs do not tell from the one reported.
+#[derive(Debug, Clone)]
+pub struct Alternative {
+    /// The whole set of effects.
+    pub effects: Vec<FittedEffect>,
+    /// The one of them that the set reported does not have.
+    pub effect: FittedEffect,
+    pub reason: String,
+    /// What would tell it from the one reported; simulated for the few best alternatives.
+    pub separation: Option<Separation>,
+}
+
+/// Experiments are simulated for so many alternatives, the best ones: each costs as much as a few fits.
+const SIMULATED: usize = 3;
+
+/// The sets of effects that do as well as the one that stood, the best first; those of which a part was taken back
+/// are none. For the best of them the experiment that tells them from it is simulated.
+pub(in crate::closeloop) fn discriminate(
+    study: &Study<'_>,
+    found: &Found,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Vec<Alternative> {
+    let model = &found.after;
+    let stands = |effect: &FittedEffect| {
+        let same = |other: &FittedEffect| other.label() == effect.label();
+        model.effects.iter().any(same)
+    };
+    let mut rivals: Vec<&Rival> = (found.rivals.iter())
+        .filter(|rival| stands(&rival.instead_of))
+        .collect();
+    rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let alternative = |(rank, rival): (usize, &Rival)| {
+        let separation = (rank < SIMULATED).then(|| {
+            let text = format!("simulating experiments against {}", rival.effect.label());
+            progress(Progress::within(Stage::Discriminate, &text));
+            separation(study, model, rival)
+        });
+        Alternative::of(rival, separation.flatten())
+    };
+    rivals.into_iter().enumerate().map(alternative).collect()
+}
+
+impl Alternative {
+    fn of(rival: &Rival, separation: Option<Separation>) -> Self {
+        let chosen = rival.instead_of.label();
+        let reason = if rival.contains_chosen() {
+            format!("contains {chosen} and explains these logs no better")
+        } else {
+            format!(
+                "not separable from {chosen} on these logs: beside the other effects it cuts the left-out loss by {:.1} %, \
+                 that one by {:.1} %",
+                100.0 * rival.gain,
+                100.0 * rival.gain_of_chosen
+            )
+        };
+        Self {
+            effects: rival.model.effects.clone(),
+            effect: rival.effect.clone(),
+            reason,
+            separation,
+        }
+    }
+
+    /// The experiment that tells, in a sentence.
+    pub fn experiment(&self) -> String {
+        self.separation.as_ref().map_or_else(
+            || "not simulated: others do as well and come first".to_owned(),
+            Separation::text,
+        )
+    }
+}

@@ -1,0 +1,297 @@
+use rayon::prelude::*;
+
+use super::menu::{Experiment, as_logged, experiments, spread};
+use super::motion::{Motion, Record, is_turn};
+use super::payload::Payload;
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::per_log::values_on;
+use crate::closeloop::select::Rival;
+use crate::closeloop::study::{Study, WINDOW_S};
+use crate::data::Log;
+use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
+use crate::model::{Dynamics, FittedEffect};
+
+/// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
+/// probability of 95 %: the lead has the mean of half and the standard deviation of the root of this number.
+const NEEDED: f64 = 4.0 * (2.0 + 1.645) * (2.0 + 1.645);
+/// Motion faster than so many times the top speed of the logs is not what the rig was built for.
+const FASTEST: f64 = 5.0;
+/// Windows by which the present logs are represented.
+const PRESENT: usize = 40;
+/// Finer than this (rad or m) no position is measured.
+const FINEST: f64 = 1e-6;
+/// Scale of the residuals in refits: so large that the robust loss is plain least squares.
+const SCALE: f64 = 100.0;
+
+/// One of two explanations.
+pub(super) struct Hypothesis {
+    dynamics: Dynamics,
+    /// What differs by log, by the logs of the study.
+    values: Values,
+}
+
+impl Hypothesis {
+    pub fn new(study: &Study<'_>, effects: &[FittedEffect], declared: &[f64]) -> Self {
+        Self {
+            dynamics: study.system.dynamics_with(effects, &study.sign),
+            values: values_on(study.logs, declared, effects),
+        }
+    }
+
+    /// The rival without effects that were taken back from the model since.
+    pub fn of_rival(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Self {
+        let stands = |effect: &&FittedEffect| {
+            let mut known = model.effects.iter().chain([&rival.effect]);
+            known.any(|other| other.label() == effect.label())
+        };
+        let effects: Vec<FittedEffect> =
+            rival.model.effects.iter().filter(stands).cloned().collect();
+        Self::new(study, &effects, &rival.model.declared)
+    }
+
+    fn with(&self, payload: Option<&Payload>) -> Self {
+        Self {
+            dynamics: payload.map_or_else(|| self.dynamics.clone(), |p| p.on(&self.dynamics)),
+            values: self.values.clone(),
+        }
+    }
+
+    /// What it says the rig does; `None` where it diverges.
+    fn simulate(&self, motions: &[Motion]) -> Option<Record> {
+        Record::of(motions, &self.dynamics, &self.values, WINDOW_S)
+    }
+
+    /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
+    /// present logs do not.
+    fn refit(
+        &self,
+        shooting: &Shooting<'_>,
+        origins: &[usize],
+        locals: Vec<Vec<f64>>,
+    ) -> Option<Fit> {
+        let parameters = &self.dynamics.parameters;
+        let active: Vec<usize> = (0..parameters.len())
+            .filter(|&k| !parameters[k].fixed)
+            .collect();
+        let own = |(log, &origin): (usize, &usize)| {
+            let of_origin = self.values.own.iter().filter(move |own| own.log == origin);
+            of_origin.map(move |own| Own { log, ..*own })
+        };
+        let values = Values {
+            common: self.values.common.clone(),
+            own: origins.iter().enumerate().flat_map(own).collect(),
+        };
+        let scale = Some(SCALE);
+        fit(shooting, &self.dynamics, &active, values, locals, scale).ok()
+    }
+}
+
+/// One of two explanations taken for the truth, the other for what is to be told from it.
+pub(super) struct Comparison<'a> {
+    study: &'a Study<'a>,
+    truth: Hypothesis,
+    /// Fitted to the present logs as the truth has them.
+    other: Hypothesis,
+    noise: Vec<f64>,
+    /// The motion of the present logs as the truth has it.
+    present: Record,
+    /// Start states that the other takes there.
+    locals: Vec<Vec<f64>>,
+    /// Twice the loss that is left there, and the difference on each joint.
+    loss: f64,
+    differences: Vec<f64>,
+    /// How many times more data it takes than independent normal residuals would.
+    inflation: f64,
+}
+
+/// What came of simulating one experiment.
+pub(super) struct Trial {
+    /// What to do.
+    pub text: String,
+    /// The joint, counted from 0, on which the difference is largest beside the noise.
+    pub joint: usize,
+    /// Root mean squares on that joint after refitting, in rad (or m): in the experiment, and in the present logs.
+    pub difference: f64,
+    pub present: f64,
+    /// Standard deviation in rad (or m).
+    pub noise: f64,
+    /// Length of logs that suffices; infinite where none does.
+    pub seconds: f64,
+}
+
+impl<'a> Comparison<'a> {
+    /// `model` is fitted to the study's logs: its start states are theirs. `None` where the truth cannot follow them.
+    pub fn new(
+        study: &'a Study<'a>,
+        model: &Fitted,
+        truth: Hypothesis,
+        other: Hypothesis,
+    ) -> Option<Self> {
+        let noise = &study.shooting.noise;
+        let noise: Vec<f64> = (noise.iter())
+            .map(|noise| (noise * model.fit.scale).max(FINEST))
+            .collect();
+        let motions: Vec<Motion> = spread(study.shooting.windows.len(), PRESENT)
+            .into_iter()
+            .map(|w| window_of(study, model, w))
+            .collect();
+        let present = truth.simulate(&motions)?;
+        let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
+        let found = other.refit(&shooting, &present.origins, present.starts(0..))?;
+        let loss = loss_of(&found);
+        let windows = study.shooting.windows.iter();
+        let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
+        // The logs did not tell, whatever the noise says: they hold no more than was needed.
+        let too_sure = loss / present.duration_s(0..) * all_s / NEEDED;
+        let differences = differences(&shooting, &other, &found, 0);
+        Some(Self {
+            inflation: inflation(study, model).max(too_sure),
+            other: Hypothesis {
+                values: at_origins(found.found(), &present.origins),
+                ..other
+            },
+            locals: found.locals,
+            differences,
+            study,
+            truth,
+            noise,
+            present,
+            loss,
+        })
+    }
+
+    /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
+    pub fn trials(&self, model: &Fitted, joints: &[usize]) -> Vec<Trial> {
+        let changes = experiments(self.study, model, joints);
+        let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
+        let payloads = self.payloads();
+        let loaded = (payloads.par_iter())
+            .filter_map(|payload| self.test(&self.loaded(model, payload), Some(payload)));
+        changes.chain(loaded).collect()
+    }
+
+    fn payloads(&self) -> Vec<Payload> {
+        let times = self.present.logs.iter().flat_map(|log| &log.time);
+        let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
+        let declared = self.study.system.parameters.len();
+        let truth = &self.truth;
+        Payload::all(
+            &truth.dynamics,
+            &truth.values.common,
+            declared,
+            2.0 * latest_s + 10.0,
+        )
+    }
+
+    fn loaded(&self, model: &Fitted, payload: &Payload) -> Experiment {
+        let mut motions = as_logged(self.study, model);
+        for time in motions.iter_mut().flat_map(|motion| &mut motion.time) {
+            *time += payload.delay_s;
+        }
+        Experiment {
+            text: payload.text(&self.truth.dynamics),
+            motions,
+            turns: None,
+        }
+    }
+
+    /// Simulate an experiment; `None` where the rig cannot do it.
+    fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
+        let (truth, other) = (self.truth.with(payload), self.other.with(payload));
+        let proposed = truth
+            .simulate(&experiment.motions)
+            .filter(|record| self.is_possible(record, experiment.turns))?;
+        let both = self.present.and(&proposed);
+        let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
+        let present = self.locals.len();
+        let locals = [self.locals.clone(), both.starts(present..)].concat();
+        let found = other.refit(&shooting, &both.origins, locals)?;
+        let duration_s = both.duration_s(present..);
+        let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
+        let differences = differences(&shooting, &other, &found, present);
+        let share = |j: &usize| differences[*j] / self.noise[*j];
+        let joint = (0..differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+        Some(Trial {
+            text: experiment.text.clone(),
+            joint,
+            difference: differences[joint],
+            present: self.differences[joint],
+            noise: self.noise[joint],
+            seconds: NEEDED * self.inflation / rate,
+        })
+    }
+
+    fn is_possible(&self, record: &Record, turns: Option<usize>) -> bool {
+        let slow = |log: &Log| {
+            let mut joints = log.qd.iter().zip(&self.study.top_speed);
+            joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= FASTEST * top))
+        };
+        let turned = |j: usize| {
+            let mut motions = record.motions.iter();
+            motions.any(|m| is_turn(&record.logs[m.log].q[j][m.first..=m.last]))
+        };
+        record.logs.iter().all(slow) && turns.is_none_or(turned)
+    }
+}
+
+/// Values of a fit to a record by the logs of the study.
+fn at_origins(mut values: Values, origins: &[usize]) -> Values {
+    for own in &mut values.own {
+        own.log = origins[own.log];
+    }
+    values
+}
+
+/// The motion of one window of the logs.
+fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
+    let window = study.shooting.windows[w];
+    let log = &study.logs[window.log];
+    let rows = window.first..=window.last;
+    Motion {
+        log: window.log,
+        start: model.fit.locals[w].clone(),
+        time: log.time[rows.clone()].to_vec(),
+        tau: rows
+            .map(|row| log.tau.iter().map(|tau| tau[row]).collect())
+            .collect(),
+    }
+}
+
+/// Twice the loss of a fit, in units of the noise.
+fn loss_of(fit: &Fit) -> f64 {
+    2.0 * SCALE * SCALE * fit.cost
+}
+
+/// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.
+fn differences(shooting: &Shooting<'_>, model: &Hypothesis, fit: &Fit, first: usize) -> Vec<f64> {
+    let n = model.dynamics.joints;
+    let residuals = shooting.residuals(&model.dynamics, &fit.found(), &fit.locals);
+    let residuals: Vec<f64> = residuals[first..].concat();
+    let square = |j: usize| {
+        residuals
+            .iter()
+            .skip(j)
+            .step_by(n)
+            .map(|r| r * r)
+            .sum::<f64>()
+    };
+    #[allow(clippy::cast_precision_loss)] // a few thousand rows
+    let rows = (residuals.len() / n).max(1) as f64;
+    (0..n)
+        .map(|j| (square(j) / rows).sqrt() * shooting.noise[j])
+        .collect()
+}
+
+/// How much more the estimates of a fit scatter than independent normal residuals of its scale would let them, as a
+/// ratio of variances, at least 1: residuals of measured logs are correlated.
+fn inflation(study: &Study<'_>, model: &Fitted) -> f64 {
+    let size = model.fit.columns.len();
+    let covariance = uncertainty(&study.shooting, &model.fit).covariance;
+    let mut all = model.fit.nothing();
+    for window in &model.fit.reduced {
+        window.add_to(&mut all);
+    }
+    #[allow(clippy::cast_precision_loss)] // few parameters
+    let mean = (covariance * all.hessian).trace() / size.max(1) as f64;
+    mean.max(1.0)
+}

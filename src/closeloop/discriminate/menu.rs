@@ -1,0 +1,304 @@
+use super::motion::Motion;
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
+
+/// What drives the rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Drive {
+    /// The logged torque times a factor, run off at another pace.
+    Logged {
+        factor: f64,
+        pace: f64,
+    },
+    /// The logged torque and, on one joint, so many times its top torque on top.
+    Added(f64),
+    /// A triangle on one joint, from zero up, down and back, to this share of its top torque.
+    Ramps(f64),
+    Nothing,
+}
+
+/// Where motions begin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Start {
+    /// In states that the logs show, their velocities times a factor.
+    Logged(f64),
+    /// There, with one joint at so many times its top speed.
+    TopSpeed(f64),
+    /// At rest where each log begins.
+    Rest,
+}
+
+/// One experiment that the rig of the logs might do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct MenuItem {
+    /// What to do; `{joint}`, `{torque}` (N m or N) and `{speed}` (rad/s or m/s) stand for what the logs say.
+    text: &'static str,
+    drive: Drive,
+    start: Start,
+    /// Rows in place of one.
+    finer: u32,
+    /// Worth its name only where the joint goes round.
+    turns: bool,
+}
+
+const AS_LOGGED: MenuItem = MenuItem {
+    text: "longer logs of the same motion",
+    drive: Drive::Logged {
+        factor: 1.0,
+        pace: 1.0,
+    },
+    start: Start::Logged(1.0),
+    finer: 1,
+    turns: false,
+};
+
+const fn logged(text: &'static str, factor: f64, pace: f64, speed: f64) -> MenuItem {
+    MenuItem {
+        text,
+        drive: Drive::Logged { factor, pace },
+        start: Start::Logged(speed),
+        ..AS_LOGGED
+    }
+}
+
+const fn coasting(text: &'static str, speed: f64) -> MenuItem {
+    MenuItem {
+        text,
+        drive: Drive::Nothing,
+        start: Start::TopSpeed(speed),
+        ..AS_LOGGED
+    }
+}
+
+const fn turning(text: &'static str, torque: f64) -> MenuItem {
+    MenuItem {
+        text,
+        drive: Drive::Added(torque),
+        turns: true,
+        ..AS_LOGGED
+    }
+}
+
+/// Smallest changes of what the user does already first.
+const MENU: [MenuItem; 12] = [
+    AS_LOGGED,
+    MenuItem {
+        text: "the same motion sampled four times as often",
+        finer: 4,
+        ..AS_LOGGED
+    },
+    logged("half the torque", 0.5, 1.0, 0.5),
+    logged("double the torque", 2.0, 1.0, 2.0),
+    logged(
+        "the same torque run three times as slowly",
+        1.0,
+        1.0 / 3.0,
+        1.0 / 3.0,
+    ),
+    logged("the same torque run twice as fast", 1.0, 2.0, 1.0),
+    logged("the torque's sign reversed", -1.0, 1.0, -1.0),
+    MenuItem {
+        text: "slow torque ramps on joint {joint} from standstill to {torque}, up and down",
+        drive: Drive::Ramps(0.5),
+        start: Start::Rest,
+        ..AS_LOGGED
+    },
+    coasting(
+        "let joint {joint} coast without torque from its top speed of {speed}",
+        1.0,
+    ),
+    coasting(
+        "let joint {joint} coast without torque from {speed}, twice its top speed",
+        2.0,
+    ),
+    turning(
+        "full turns of joint {joint}, by a constant {torque} added to its torque",
+        1.0,
+    ),
+    turning(
+        "full turns of joint {joint}, by a constant {torque} added to its torque",
+        2.0,
+    ),
+];
+
+/// Encoders that give a new value after less than this (s) are taken to be read as often as they can be.
+const OFTEN_S: f64 = 4e-3;
+/// Length of the motions in s: long enough for another torque to show, short enough that no controller is missed.
+const MOTION_S: f64 = 2.0;
+/// Period of the ramps in s.
+const RAMPS_S: f64 = 8.0;
+/// Motions of one experiment.
+const MOTIONS: usize = 10;
+
+/// An experiment ready to be simulated.
+pub(super) struct Experiment {
+    pub text: String,
+    pub motions: Vec<Motion>,
+    /// A joint that must go round.
+    pub turns: Option<usize>,
+}
+
+/// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
+/// states are where motions begin.
+pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[usize]) -> Vec<Experiment> {
+    let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
+    let mut all = Vec::new();
+    for item in &MENU {
+        let joints = if of_one_joint(item) { joints } else { &[0] };
+        let able = joints
+            .iter()
+            .filter(|joint| item.is_possible(study, **joint));
+        all.extend(able.map(|&joint| Experiment {
+            text: item.words(study, joint),
+            motions: item.motions(study, model, joint),
+            turns: item.turns.then_some(joint),
+        }));
+    }
+    all
+}
+
+/// Motions under the logged torque, for an experiment that changes the rig.
+pub(super) fn as_logged(study: &Study<'_>, model: &Fitted) -> Vec<Motion> {
+    AS_LOGGED.motions(study, model, 0)
+}
+
+impl MenuItem {
+    fn is_possible(&self, study: &Study<'_>, joint: usize) -> bool {
+        let undriven = [AS_LOGGED.drive, Drive::Nothing].contains(&self.drive);
+        let driven = match self.drive {
+            Drive::Logged { .. } => study.top_torque.iter().any(|torque| *torque > 0.0),
+            _ => study.top_torque[joint] > 0.0,
+        };
+        let coarse = study.logs.iter().all(|log| log.median_step() >= OFTEN_S);
+        (undriven || driven)
+            && (self.finer == 1 || coarse)
+            && !(self.turns && (study.system.prismatic[joint] || goes_round(study, joint)))
+    }
+
+    fn words(&self, study: &Study<'_>, joint: usize) -> String {
+        let (force, length) = if study.system.prismatic[joint] {
+            ("N", "m")
+        } else {
+            ("N m", "rad")
+        };
+        let torque = match self.drive {
+            Drive::Added(share) | Drive::Ramps(share) => share * study.top_torque[joint],
+            _ => 0.0,
+        };
+        let speed = match self.start {
+            Start::TopSpeed(factor) => factor * study.top_speed[joint],
+            _ => 0.0,
+        };
+        self.text
+            .replace("{joint}", &(joint + 1).to_string())
+            .replace("{torque}", &format!("{torque:.2} {force}"))
+            .replace("{speed}", &format!("{speed:.1} {length}/s"))
+    }
+
+    fn motions(&self, study: &Study<'_>, model: &Fitted, joint: usize) -> Vec<Motion> {
+        let windows = &study.shooting.windows;
+        let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
+        let starts: Vec<usize> = match self.start {
+            Start::Rest => (0..windows.len())
+                .filter(first_of_log)
+                .take(MOTIONS)
+                .collect(),
+            _ => spread(windows.len(), MOTIONS),
+        };
+        starts
+            .into_iter()
+            .map(|w| self.motion(study, w, &model.fit.locals[w], joint))
+            .collect()
+    }
+
+    /// One motion that begins like window `w` of the logs.
+    fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: usize) -> Motion {
+        let window = study.shooting.windows[w];
+        let log = &study.logs[window.log];
+        let step_s = log.median_step() / f64::from(self.finer);
+        let length_s = match self.drive {
+            Drive::Ramps(_) => RAMPS_S,
+            _ => MOTION_S,
+        };
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
+        let rows = (length_s / step_s).round() as usize;
+        let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);
+        let mut motion = Motion {
+            log: window.log,
+            start: self.state(study, state, joint),
+            time: Vec::new(),
+            tau: Vec::new(),
+        };
+        for row in 0..=rows {
+            #[allow(clippy::cast_precision_loss)] // a few thousand rows
+            let since = row as f64 * step_s;
+            let pace = match self.drive {
+                Drive::Logged { pace, .. } => pace,
+                _ => 1.0,
+            };
+            let at = begin + pace * since;
+            if at > end && !matches!(self.drive, Drive::Ramps(_) | Drive::Nothing) {
+                break;
+            }
+            let held = log.time.partition_point(|t| *t <= at + 1e-9).max(1) - 1;
+            let logged = log.tau.iter().map(|tau| tau[held]);
+            motion.time.push(begin + since);
+            motion.tau.push(match self.drive {
+                Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
+                Drive::Added(share) => with(logged, joint, share * study.top_torque[joint]),
+                Drive::Ramps(share) => {
+                    let torque = share * study.top_torque[joint] * triangle(since / RAMPS_S);
+                    with(logged.map(|_| 0.0), joint, torque)
+                }
+                Drive::Nothing => logged.map(|_| 0.0).collect(),
+            });
+        }
+        motion
+    }
+
+    fn state(&self, study: &Study<'_>, logged: &[f64], joint: usize) -> Vec<f64> {
+        let mut state = logged.to_vec();
+        let velocities = &mut state[study.system.joints..];
+        match self.start {
+            Start::Logged(factor) => velocities.iter_mut().for_each(|v| *v *= factor),
+            Start::TopSpeed(factor) => {
+                velocities[joint] = (factor * study.top_speed[joint]).copysign(velocities[joint]);
+            }
+            Start::Rest => velocities.fill(0.0),
+        }
+        state
+    }
+}
+
+/// The torques with some more on one joint.
+fn with(torques: impl Iterator<Item = f64>, joint: usize, more: f64) -> Vec<f64> {
+    let mut torques: Vec<f64> = torques.collect();
+    torques[joint] += more;
+    torques
+}
+
+/// 0, up to 1, down to -1 and back to 0 as `phase` goes from 0 to 1.
+fn triangle(phase: f64) -> f64 {
+    let quarters = 4.0 * phase;
+    if quarters < 1.0 {
+        quarters
+    } else if quarters < 3.0 {
+        2.0 - quarters
+    } else {
+        quarters - 4.0
+    }
+}
+
+/// Whether the logs show the joint going round.
+fn goes_round(study: &Study<'_>, joint: usize) -> bool {
+    study
+        .logs
+        .iter()
+        .any(|log| super::motion::is_turn(&log.q[joint]))
+}
+
+/// At most `most` of the numbers below `count`, evenly spread.
+pub(super) fn spread(count: usize, most: usize) -> Vec<usize> {
+    let taken = count.min(most);
+    (0..taken).map(|k| k * count / taken).collect()
+}

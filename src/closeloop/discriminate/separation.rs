@@ -1,0 +1,105 @@
+use serde::Serialize;
+
+use super::comparison::{Comparison, Hypothesis, Trial};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::select::Rival;
+use crate::closeloop::study::Study;
+
+/// How far two explanations differ in the experiment that tells them apart best.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Separation {
+    /// What to do; `None` where nothing that was simulated tells them apart.
+    pub experiment: Option<String>,
+    /// Joint, counted from 1, on which the difference shows most.
+    pub joint: usize,
+    /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
+    /// the other does, in rad (or m).
+    pub difference_rad: f64,
+    /// The same in the present logs.
+    pub present_difference_rad: f64,
+    /// What the model of the present logs does not explain of a position, standard deviation in rad (or m).
+    pub noise_rad: f64,
+    /// Length in s of logs of the experiment that suffice.
+    pub seconds: Option<f64>,
+    #[serde(skip)]
+    slides: bool,
+}
+
+/// Below this length in s an experiment is not worth shortening.
+const SHORT_S: f64 = 10.0;
+/// Nobody records for longer than this (s) to tell two explanations.
+const LONG_S: f64 = 600.0;
+/// A difference below this share of the noise is less than what no model has right.
+const VISIBLE: f64 = 0.1;
+
+/// The experiment that would tell a rival from the model chosen, by T-optimality (Atkinson and Fedorov 1975): each
+/// experiment of the menu is simulated with one of the two, the other is refitted to it and to the present logs
+/// together, all its parameters and start states free, and what then still differs is weighed against the noise.
+/// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
+/// `None` where not even the present motion can be simulated.
+pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
+    let chosen = Hypothesis::new(study, &model.effects, &model.declared);
+    let other = Hypothesis::of_rival(study, model, rival);
+    let comparison = if rival.contains_chosen() {
+        Comparison::new(study, model, other, chosen)
+    } else {
+        Comparison::new(study, model, chosen, other)
+    }?;
+    let mut joints = vec![rival.effect.joint, rival.instead_of.joint];
+    joints.dedup();
+    let trials: Vec<Trial> = comparison.trials(model, &joints);
+    let telling = trials.iter().filter(|trial| trial.tells());
+    let best = telling.min_by(|a, b| a.worth().total_cmp(&b.worth()));
+    let widest = (trials.iter()).max_by(|a, b| a.deviation().total_cmp(&b.deviation()))?;
+    let shown = best.unwrap_or(widest);
+    Some(Separation {
+        experiment: best.map(|trial| trial.text.clone()),
+        joint: shown.joint + 1,
+        difference_rad: shown.difference,
+        present_difference_rad: shown.present,
+        noise_rad: shown.noise,
+        seconds: best.map(|trial| trial.worth().ceil()),
+        slides: study.system.prismatic[shown.joint],
+    })
+}
+
+impl Separation {
+    /// In a sentence.
+    pub fn text(&self) -> String {
+        let milli = |x: f64| {
+            let x = 1e3 * x;
+            let digits = if x < 0.995 { 2 } else { 1 };
+            format!("{x:.digits$}")
+        };
+        let unit = if self.slides { "mm" } else { "mrad" };
+        let (difference, noise) = (milli(self.difference_rad), milli(self.noise_rad));
+        match (&self.experiment, self.seconds) {
+            (Some(experiment), Some(seconds)) => format!(
+                "{experiment}; the two then differ by {difference} {unit} on joint {} (rms over half a second, after \
+                 refitting; in these logs {}, noise {noise}), and {seconds:.0} s are enough",
+                self.joint,
+                milli(self.present_difference_rad)
+            ),
+            _ => format!(
+                "no change of torque, speed, load or duration that was simulated separates them (largest difference \
+                 {difference} {unit}, noise {noise}): for this rig they are the same; fix one by an independent \
+                 measurement"
+            ),
+        }
+    }
+}
+
+impl Trial {
+    /// What the best experiment has least of: seconds, as far as they matter.
+    fn worth(&self) -> f64 {
+        self.seconds.max(SHORT_S)
+    }
+
+    fn tells(&self) -> bool {
+        self.seconds < LONG_S && self.deviation() > VISIBLE
+    }
+
+    fn deviation(&self) -> f64 {
+        self.difference / self.noise
+    }
+}

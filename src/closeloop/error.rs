@@ -1,0 +1,18 @@
+use thiserror::Error;
+
+use super::learn::LearnError;
+use crate::identify::FitError;
+
+/// Why the loop could not be closed at all.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StudyError {
+    #[error(
+        "the test logs hold no window of {horizon_s} s to score a model on; use longer test logs or leave out less of them"
+    )]
+    NoTest { horizon_s: f64 },
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+}

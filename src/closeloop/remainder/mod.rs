@@ -1,0 +1,15 @@
+//! Stage 5: whether the residuals are more than noise, what they depend on, and what they look like.
+
+mod curve;
+mod force;
+mod omnibus;
+mod proposal;
+mod residual;
+mod unexplained;
+
+pub use self::curve::Curve;
+pub use self::force::ForceSample;
+pub use self::omnibus::Omnibus;
+pub use self::proposal::{Proposal, proposal};
+pub use self::residual::ResidualForce;
+pub use self::unexplained::{NOTEWORTHY, Probed, SIGNIFICANT, UNKNOWN, Unexplained, unexplained};

@@ -1,0 +1,272 @@
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DVector};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
+use crate::data::Audit;
+use crate::data::statistics::{deviation, mean};
+
+/// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Omnibus {
+    /// Probability of residuals so smooth in time if they were noise.
+    pub p_value: f64,
+    /// Share of the residuals' variance that white noise does not explain, one a joint.
+    pub shares: Vec<f64>,
+    /// What of the declared model's residual variance above noise is still there.
+    pub fraction: f64,
+}
+
+impl Omnibus {
+    /// The joint (counted from 0) with the largest share, and that share.
+    pub fn most(&self) -> (usize, f64) {
+        let shares = self.shares.iter().copied().enumerate();
+        shares
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or((0, 0.0))
+    }
+}
+
+/// Waves over a window with up to so many half periods are smooth: a force that a model lacks reaches the
+/// positions through two integrations, so that little of it is left in faster ones.
+const SMOOTH: usize = 6;
+/// Logs of pure noise that the residuals are compared with.
+const SIMULATED: usize = 999;
+/// A start state is varied by this share of a radian (or m) and of a radian (or m) per second: small against
+/// what a model's curvature shows, large against rounding.
+const VARIED: f64 = 1e-5;
+
+/// Compare, window by window, the share of the residuals' energy that is smooth in time with that of noise of the
+/// sensor, rounded as the sensor rounds, passed through the same fit of start states. The share of a window
+/// does not depend on how large the noise is, and one bad reading raises it no more than any noise does.
+pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
+    let of_residuals = |windows: &[Window]| Energies::of(windows, |window| window.residual.clone());
+    let windows = windows(study, after);
+    let seeds: Vec<u64> = (0..SIMULATED).map(|_| rng.random()).collect();
+    let declared = of_residuals(&self::windows(study, before));
+    let found = of_residuals(&windows);
+    let simulated: Vec<Energies> = seeds
+        .into_par_iter()
+        .map(|seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            Energies::of(&windows, |window| window.noise(&mut rng))
+        })
+        .collect();
+    let joints = study.system.joints;
+    let nulls: Vec<NoiseShare> = (0..joints).map(|j| NoiseShare::of(&simulated, j)).collect();
+    let excess = |energies: &Energies| {
+        let each = (0..joints).map(|j| nulls[j].excess(energies.shares[j]));
+        each.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let bar = excess(&found);
+    #[allow(clippy::cast_precision_loss)] // a thousand
+    let as_smooth = simulated.iter().filter(|s| excess(s) >= bar).count() as f64;
+    #[allow(clippy::cast_precision_loss)]
+    let trials = SIMULATED as f64;
+    let noise: Vec<f64> = (0..joints).map(|j| nulls[j].noise(&found, j)).collect();
+    // In units of the sensors' noise, so that joints can be added.
+    let above = |energies: &Energies| -> f64 {
+        let of_joint = |j: usize| (energies.all[j] - noise[j]).max(0.0);
+        (0..joints)
+            .map(|j| of_joint(j) / study.shooting.noise[j].powi(2))
+            .sum()
+    };
+    Omnibus {
+        p_value: (1.0 + as_smooth) / (1.0 + trials),
+        shares: (0..joints)
+            .map(|j| (1.0 - noise[j] / found.all[j].max(f64::MIN_POSITIVE)).max(0.0))
+            .collect(),
+        fraction: (above(&found) / above(&declared).max(f64::MIN_POSITIVE)).min(1.0),
+    }
+}
+
+/// One window: its residual, and what the test needs to know of the fit and the sensor there.
+struct Window {
+    joints: usize,
+    /// In m or rad, `[row * joints + joint]`.
+    residual: DVector<f64>,
+    /// What changes of the start state can do to the residual: orthonormal columns.
+    absorbed: DMatrix<f64>,
+    /// Smooth waves over the rows of the window: orthonormal columns.
+    waves: DMatrix<f64>,
+    /// The model's positions, for what rounding does to them.
+    positions: DVector<f64>,
+    /// Deviation of the noise before rounding and the step of the rounding (0 for none), one each a joint.
+    sensor: Vec<[f64; 2]>,
+}
+
+fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
+    let joints = study.system.joints;
+    let shooting = &study.shooting;
+    let found = model.fit.found();
+    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&model.dynamics, &found, locals);
+    let sensors = sensors(study);
+    let at = residuals(&model.fit.locals);
+    let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
+        .map(|k| {
+            let mut locals = model.fit.locals.clone();
+            locals.iter_mut().for_each(|local| local[k] += VARIED);
+            residuals(&locals)
+        })
+        .collect();
+    shooting
+        .windows
+        .iter()
+        .enumerate()
+        .map(|(w, window)| {
+            let rows = window.rows();
+            let size = rows * joints;
+            let unit = |i: usize| shooting.noise[i % joints];
+            let residual = DVector::from_fn(size, |i, _| at[w][i] * unit(i));
+            let slopes = DMatrix::from_fn(size, varied.len(), |i, k| {
+                (varied[k][w][i] - at[w][i]) * unit(i)
+            });
+            let log = &study.logs[window.log];
+            let read = |i: usize| log.q[i % joints][window.first + i / joints];
+            Window {
+                joints,
+                positions: DVector::from_fn(size, |i, _| read(i) + residual[i]),
+                residual,
+                absorbed: slopes.qr().q(),
+                waves: waves(rows),
+                sensor: sensors[window.log].clone(),
+            }
+        })
+        .collect()
+}
+
+/// Noise before rounding, and step of the rounding, of each joint in each log.
+fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
+    let of_log = |audit: &Audit| {
+        let joints = &audit.joints;
+        let sensor = |j: usize| {
+            let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
+            let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
+            // Where the audit sees neither, any noise will do: shares do not depend on its size.
+            [
+                if step > 0.0 {
+                    noise
+                } else {
+                    study.shooting.noise[j]
+                },
+                step,
+            ]
+        };
+        (0..joints.len()).map(sensor).collect()
+    };
+    study.audits().iter().map(of_log).collect()
+}
+
+/// The slowest waves of the discrete cosine transform of so many rows, at most half of all.
+fn waves(rows: usize) -> DMatrix<f64> {
+    #[allow(clippy::cast_precision_loss)] // few rows
+    let count = rows as f64;
+    DMatrix::from_fn(rows, (SMOOTH + 1).min(rows / 2), |row, wave| {
+        #[allow(clippy::cast_precision_loss)]
+        let phase = PI * wave as f64 * (row as f64 + 0.5) / count;
+        phase.cos() * ((if wave == 0 { 1.0 } else { 2.0 }) / count).sqrt()
+    })
+}
+
+impl Window {
+    /// What the sensor adds to the model's positions.
+    fn noise(&self, rng: &mut impl Rng) -> DVector<f64> {
+        // Where within a step of the encoder the zero lies is not known to the fraction that matters.
+        let phases: Vec<f64> = (0..self.joints).map(|_| rng.random()).collect();
+        DVector::from_fn(self.positions.len(), |i, _| {
+            let [noise, step] = self.sensor[i % self.joints];
+            let added: f64 = StandardNormal.sample(rng);
+            let read = self.positions[i] + noise * added;
+            let shown = if step > 0.0 {
+                let phase = phases[i % self.joints];
+                ((read / step + phase).round() - phase) * step
+            } else {
+                read
+            };
+            shown - self.positions[i]
+        })
+    }
+
+    /// Smooth and whole energy of what the fit of the start state leaves of `signal`, one each a joint.
+    fn energies(&self, signal: &DVector<f64>) -> Vec<[f64; 2]> {
+        let left = signal - &self.absorbed * (self.absorbed.tr_mul(signal));
+        (0..self.joints)
+            .map(|j| {
+                let own = left.iter().skip(j).step_by(self.joints).copied();
+                let own = DVector::from_vec(own.collect());
+                [self.waves.tr_mul(&own).norm_squared(), own.norm_squared()]
+            })
+            .collect()
+    }
+}
+
+/// Energies of one set of residuals, one a joint.
+struct Energies {
+    /// Mean over the windows of the share that is smooth.
+    shares: Vec<f64>,
+    /// Sums over the windows.
+    smooth: Vec<f64>,
+    all: Vec<f64>,
+}
+
+impl Energies {
+    fn of(windows: &[Window], mut signal: impl FnMut(&Window) -> DVector<f64>) -> Self {
+        let joints = windows.first().map_or(0, |window| window.joints);
+        let mut sums = Self {
+            shares: vec![0.0; joints],
+            smooth: vec![0.0; joints],
+            all: vec![0.0; joints],
+        };
+        #[allow(clippy::cast_precision_loss)] // few windows
+        let count = windows.len() as f64;
+        for window in windows {
+            let energies = window.energies(&signal(window));
+            for (j, [smooth, all]) in energies.into_iter().enumerate() {
+                sums.shares[j] += smooth / all.max(f64::MIN_POSITIVE) / count;
+                sums.smooth[j] += smooth;
+                sums.all[j] += all;
+            }
+        }
+        sums
+    }
+}
+
+/// The smooth share of a joint's residuals under noise alone.
+struct NoiseShare {
+    mean: f64,
+    deviation: f64,
+    /// Of the energy summed over windows.
+    pooled: f64,
+}
+
+impl NoiseShare {
+    fn of(simulated: &[Energies], joint: usize) -> Self {
+        let shares = simulated.iter().map(|energies| energies.shares[joint]);
+        let shares: Vec<f64> = shares.collect();
+        let sum = |part: fn(&Energies) -> &[f64]| -> f64 {
+            simulated.iter().map(|energies| part(energies)[joint]).sum()
+        };
+        let all = sum(|energies| &energies.all);
+        Self {
+            mean: mean(&shares),
+            deviation: deviation(&shares),
+            pooled: sum(|energies| &energies.smooth) / all.max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// In deviations.
+    fn excess(&self, share: f64) -> f64 {
+        (share - self.mean) / self.deviation.max(f64::MIN_POSITIVE)
+    }
+
+    /// Energy of white noise that is as strong as the fast waves of these residuals.
+    fn noise(&self, energies: &Energies, joint: usize) -> f64 {
+        let rough = energies.all[joint] - energies.smooth[joint];
+        rough / (1.0 - self.pooled).max(f64::MIN_POSITIVE)
+    }
+}

@@ -1,0 +1,265 @@
+use std::fmt::Write;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::unexplained::{NOTEWORTHY, Unexplained};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::select::best_start;
+use crate::closeloop::select::gain;
+use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::study::Study;
+use crate::model::{Effect, FittedEffect};
+
+/// A formula for what is left: a proposal to think about, no finding. Nothing but its fit speaks for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proposal {
+    /// Counted from 0.
+    pub joint: usize,
+    /// Force in N m (or N), such as `-0.0012 * qd1^3`.
+    pub formula: String,
+    /// Share of the loss that noise does not explain which it takes away, on stretches left out of its fit.
+    pub explains: f64,
+    /// The formula as an effect file, for a folder that `--effects` names.
+    pub file: String,
+}
+
+/// A term of the joint's own variables, and the powers of q, qd, tau and t in its unit.
+type Term = (&'static str, [i32; 4]);
+
+/// What forces in machines are made of. Lines, squares and cubes have units that tell what their coefficients
+/// mean; functions of the angle and signs have none.
+const TERMS: [Term; 31] = [
+    ("1", [0, 0, 0, 0]),
+    ("q", [1, 0, 0, 0]),
+    ("sin(q)", [0, 0, 0, 0]),
+    ("cos(q)", [0, 0, 0, 0]),
+    ("sin(2*q)", [0, 0, 0, 0]),
+    ("cos(2*q)", [0, 0, 0, 0]),
+    ("sin(3*q)", [0, 0, 0, 0]),
+    ("cos(3*q)", [0, 0, 0, 0]),
+    ("sign(qd)", [0, 0, 0, 0]),
+    ("qd", [0, 1, 0, 0]),
+    ("abs(qd)", [0, 1, 0, 0]),
+    ("qd*abs(qd)", [0, 2, 0, 0]),
+    ("qd^2", [0, 2, 0, 0]),
+    ("qd^3", [0, 3, 0, 0]),
+    ("sign(qd)*sin(q)", [0, 0, 0, 0]),
+    ("sign(qd)*cos(q)", [0, 0, 0, 0]),
+    ("qd*sin(q)", [0, 1, 0, 0]),
+    ("qd*cos(q)", [0, 1, 0, 0]),
+    ("tau", [0, 0, 1, 0]),
+    ("tau*abs(tau)", [0, 0, 2, 0]),
+    ("tau^3", [0, 0, 3, 0]),
+    ("sign(tau)", [0, 0, 0, 0]),
+    ("tanh(tau)", [0, 0, 0, 0]),
+    ("abs(tau)*sign(qd)", [0, 0, 1, 0]),
+    ("tau*abs(qd)", [0, 1, 1, 0]),
+    ("tau*qd", [0, 1, 1, 0]),
+    ("tau*qd^2", [0, 2, 1, 0]),
+    ("t", [0, 0, 0, 1]),
+    ("t*sign(qd)", [0, 0, 0, 1]),
+    ("t*qd", [0, 1, 0, 1]),
+    ("t*tau", [0, 0, 1, 1]),
+];
+/// Longer formulas explain everything.
+const MOST_TERMS: usize = 3;
+/// Terms that are fitted after all have been screened.
+const FITTED: usize = 4;
+
+/// A short sum of terms for the force that `model` lacks on the joint where most is left: terms are added while
+/// they lower the loss on stretches left out of the fit. `None` where nothing that matters is left, or no
+/// term follows it.
+pub fn proposal(study: &Study<'_>, model: &Fitted, left: &Unexplained) -> Option<Proposal> {
+    if !left.is_significant() {
+        return None;
+    }
+    let folds = folds(&study.shooting);
+    let without = left_out_losses(&model.fit, &folds);
+    let mut found: Option<Sum> = None;
+    for _ in 0..MOST_TERMS {
+        let (terms, losses) = match &found {
+            Some(sum) => (sum.terms.as_slice(), &sum.losses),
+            None => (&[][..], &without),
+        };
+        let longer = longer(study, model, left.joint, terms, &folds)?;
+        if gain(losses, &longer.losses) < NOTEWORTHY {
+            break;
+        }
+        found = Some(longer);
+    }
+    let sum = found?;
+    let structured = left.omnibus.shares[left.joint].max(NOTEWORTHY);
+    Some(Proposal {
+        joint: left.joint,
+        formula: sum.formula(),
+        explains: (gain(&without, &sum.losses) / structured).min(1.0),
+        file: file(&sum.terms, &sum.magnitudes()),
+    })
+}
+
+/// Terms that were fitted beside all parameters of a model.
+struct Sum {
+    terms: Vec<Term>,
+    effect: FittedEffect,
+    losses: Vec<f64>,
+}
+
+/// The sum with the one more term that helps most.
+fn longer(
+    study: &Study<'_>,
+    model: &Fitted,
+    joint: usize,
+    terms: &[Term],
+    folds: &[usize],
+) -> Option<Sum> {
+    let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = TERMS
+        .par_iter()
+        .filter(|term| !terms.contains(term))
+        .filter_map(|term| {
+            let terms = [terms, &[*term]].concat();
+            let effect = FittedEffect::absent(&effect(&terms), joint);
+            let (start, cost) = best_start(study, model, &effect)?;
+            Some((terms, start, cost))
+        })
+        .collect();
+    screened.sort_by(|a, b| a.2.total_cmp(&b.2));
+    screened.truncate(FITTED);
+    let fitted: Vec<Sum> = screened
+        .into_par_iter()
+        .filter_map(|(terms, start, _)| {
+            let effects = [model.effects.as_slice(), &[start]].concat();
+            let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
+            let fitted = study.refit(&effects, &model.declared, locals, scale).ok()?;
+            Some(Sum {
+                terms,
+                losses: left_out_losses(&fitted.fit, folds),
+                effect: fitted.effects.last()?.clone(),
+            })
+        })
+        .collect();
+    let loss = |sum: &Sum| sum.losses.iter().sum::<f64>();
+    (fitted.into_iter()).min_by(|a, b| loss(a).total_cmp(&loss(b)))
+}
+
+impl Sum {
+    fn formula(&self) -> String {
+        let values = self.effect.values.iter().map(|(value, _)| digits(*value));
+        let written = self.effect.expression(&values.collect::<Vec<_>>());
+        written.replace("+ -", "- ")
+    }
+
+    fn magnitudes(&self) -> Vec<f64> {
+        self.effect
+            .values
+            .iter()
+            .map(|(value, _)| value.abs())
+            .collect()
+    }
+}
+
+/// Three significant digits, without an exponent.
+fn digits(value: f64) -> String {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12
+    let places = (2.0 - value.abs().max(1e-10).log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.places$}")
+}
+
+fn effect(terms: &[Term]) -> Effect {
+    let text = file(terms, &vec![1.0; terms.len()]);
+    Effect::from_text(Path::new("proposal.toml"), &text).expect("terms are formulas of an effect")
+}
+
+/// An effect file with one coefficient a term, of these magnitudes.
+fn file(terms: &[Term], magnitudes: &[f64]) -> String {
+    let sum: Vec<String> = terms
+        .iter()
+        .zip(1..)
+        .map(|((term, _), k)| format!("c_{k}*{term}"))
+        .collect();
+    let mut text = format!(
+        "[effect]\nname = \"proposed\"\nabout = \"a formula that fits what was left; no finding\"\n\
+         force = \"{}\"\n\n[parameters]\n",
+        sum.join(" + ")
+    );
+    for (((_, powers), magnitude), k) in terms.iter().zip(magnitudes).zip(1..) {
+        let typical = digits(magnitude.max(1e-9));
+        let _ = writeln!(
+            text,
+            "c_{k} = {{ unit = \"{}\", typical = {typical} }}",
+            unit(*powers)
+        );
+    }
+    text
+}
+
+/// The unit of a force over so many rad, rad/s, N m and s.
+fn unit([q, qd, tau, t]: [i32; 4]) -> String {
+    let powers = |unit: &str, power: i32| match power {
+        0 => None,
+        1 => Some(unit.to_owned()),
+        _ => Some(format!("{unit}^{power}")),
+    };
+    let listed =
+        |parts: &[Option<String>]| -> Vec<String> { parts.iter().flatten().cloned().collect() };
+    // The torque that a coefficient gives, over the torques that it takes; seconds count on both sides.
+    let force = match tau {
+        0 => Some("N m".to_owned()),
+        _ => None,
+    };
+    let over = listed(&[
+        if tau > 1 {
+            powers("(N m)", tau - 1)
+        } else {
+            None
+        },
+        powers("rad", q + qd),
+        powers("s", t - qd.min(t)),
+    ]);
+    let above = listed(&[force, powers("s", qd - qd.min(t))]);
+    let above = if above.is_empty() {
+        "1".to_owned()
+    } else {
+        above.join(" ")
+    };
+    match over.as_slice() {
+        [] => above,
+        [one] => format!("{above}/{one}"),
+        many => format!("{above}/({})", many.join(" ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_term_is_a_formula() {
+        for term in TERMS {
+            assert_eq!(effect(&[term]).parameters.len(), 1);
+        }
+    }
+
+    #[test]
+    fn units_belong_to_forces() {
+        let units = [
+            ([0, 0, 0, 0], "N m"),
+            ([0, 3, 0, 0], "N m s^3/rad^3"),
+            ([0, 0, 1, 0], "1"),
+            ([0, 0, 2, 0], "1/(N m)"),
+            ([0, 2, 1, 0], "s^2/rad^2"),
+            ([0, 1, 0, 1], "N m/rad"),
+            ([0, 0, 0, 1], "N m/s"),
+            ([0, 0, 1, 1], "1/s"),
+        ];
+        for (powers, wanted) in units {
+            assert_eq!(unit(powers), wanted);
+        }
+    }
+
+    #[test]
+    fn numbers_keep_three_digits() {
+        assert_eq!(digits(-0.001_234_5), "-0.00123");
+        assert_eq!(digits(1234.5), "1234");
+    }
+}

@@ -1,0 +1,37 @@
+use super::curve::{Curve, curves};
+use super::force::{ForceSample, residual_force};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
+use crate::data::statistics::upper_median;
+use crate::identify::FitError;
+
+/// The residual generalised force of a model along the training logs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResidualForce {
+    pub samples: Vec<ForceSample>,
+    /// The same as smooth curves over each variable.
+    pub curves: Vec<Curve>,
+}
+
+impl ResidualForce {
+    /// # Errors
+    /// Logs without a stretch, or a model that diverges over one of them.
+    pub(in crate::closeloop) fn of(study: &Study<'_>, model: &Fitted) -> Result<Self, FitError> {
+        let samples = residual_force(study, model)?;
+        Ok(Self {
+            curves: curves(&samples, &study.system.prismatic),
+            samples,
+        })
+    }
+
+    /// Root mean square over stretches and joints, outliers weighing no more than three times the median: in N m
+    /// (or N).
+    #[allow(clippy::cast_precision_loss)] // few stretches
+    pub fn norm(&self) -> f64 {
+        let forces = self.samples.iter().flat_map(|sample| &sample.force);
+        let squares: Vec<f64> = forces.map(|force| force * force).collect();
+        let limit = 9.0 * upper_median(&squares);
+        let sum: f64 = squares.iter().map(|square| square.min(limit)).sum();
+        (sum / squares.len() as f64).sqrt()
+    }
+}

@@ -1,0 +1,137 @@
+use rand::Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::omnibus::{Omnibus, omnibus};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::select::acting;
+use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::select::{gain, p_value};
+use crate::closeloop::study::Study;
+use crate::model::{Effect, FittedEffect};
+
+/// What is left when no effect helps any more.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unexplained {
+    /// Share of the declared model's residual variance above the sensor's noise that is still there.
+    pub fraction: f64,
+    /// Probability of so much structure in noise alone: the smaller of the omnibus test's and that of the probes
+    /// which save something that matters, times two.
+    pub p_value: f64,
+    /// The variable over which most of it lives: `q1`, `qd2`, `tau1`, `t`, products of them such as `q1*qd1`,
+    /// `unknown` where it follows none of them, `none` where nothing that matters is left.
+    pub place: String,
+    /// The joint (counted from 0) where most of it is.
+    pub joint: usize,
+    pub omnibus: Omnibus,
+    pub probes: Vec<Probed>,
+}
+
+/// What one flexible shape saw.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Probed {
+    /// The variables it asked about.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// Counted from 0.
+    #[serde(skip)]
+    pub joint: usize,
+    /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
+    pub p_value: f64,
+    /// Fall of the loss on left-out stretches, as a share.
+    pub gain: f64,
+}
+
+/// Below this probability what is left is no accident.
+pub const SIGNIFICANT: f64 = 0.01;
+/// Share of the residuals' variance (or of the loss, for a probe) below which what is left is of no practical
+/// interest.
+pub const NOTEWORTHY: f64 = 0.05;
+/// A probe tells where it lives if it saves this part of what is more than noise.
+const FAIR_PART: f64 = 0.25;
+/// Less than this share of the declared model's residual variance above noise, a tenth of its error, matters only
+/// where a probe says what it follows: so much the smoothing of dry friction leaves.
+const SLIVER: f64 = 0.01;
+/// What is left follows no variable that was probed.
+pub const UNKNOWN: &str = "unknown";
+const NONE: &str = "none";
+
+impl Unexplained {
+    pub fn is_significant(&self) -> bool {
+        self.place != NONE
+    }
+}
+
+/// Ask whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over
+/// each variable. Probes name nothing; what they save on left-out stretches is what an unknown effect would.
+pub fn unexplained(
+    study: &Study<'_>,
+    probes: &[Effect],
+    before: &Fitted,
+    after: &Fitted,
+    rng: &mut impl Rng,
+) -> Unexplained {
+    let omnibus = omnibus(study, before, after, rng);
+    let losses = left_out_losses(&after.fit, &folds(&study.shooting));
+    let probed: Vec<Probed> = acting(study, probes)
+        .into_par_iter()
+        .filter_map(|probe| ask(study, after, probe, &losses))
+        .collect();
+    #[allow(clippy::cast_precision_loss)] // few probes
+    let asked = probed.len() as f64;
+    let seen = probed.iter().filter(|p| p.gain > NOTEWORTHY);
+    let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
+    let (place, joint) = place(&omnibus, &probed);
+    Unexplained {
+        fraction: omnibus.fraction,
+        p_value: (2.0 * omnibus.p_value.min(least * asked)).min(1.0),
+        place,
+        joint,
+        omnibus,
+        probes: probed,
+    }
+}
+
+fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -> Option<Probed> {
+    let (place, joint) = (variables(&probe), probe.joint);
+    let mut effects = model.effects.clone();
+    effects.push(probe);
+    let scale = Some(model.fit.scale);
+    let fitted = study
+        .refit(&effects, &model.declared, model.fit.locals.clone(), scale)
+        .ok()?;
+    let without = left_out_losses(&fitted.fit, &folds(&study.shooting));
+    Some(Probed {
+        place,
+        joint,
+        p_value: p_value(study, &fitted, fitted.effects.len() - 1)?,
+        gain: gain(losses, &without),
+    })
+}
+
+/// The variable and the joint of the probe that saves most; one test among all probes and the omnibus test.
+fn place(omnibus: &Omnibus, probed: &[Probed]) -> (String, usize) {
+    #[allow(clippy::cast_precision_loss)] // few probes
+    let level = 0.5 * SIGNIFICANT / probed.len().max(1) as f64;
+    let (joint, share) = omnibus.most();
+    let matters = NOTEWORTHY.max(FAIR_PART * share);
+    let noteworthy = |p: &&Probed| p.p_value < level && p.gain > matters;
+    let most = probed.iter().filter(noteworthy);
+    let structured =
+        omnibus.p_value < 0.5 * SIGNIFICANT && share > NOTEWORTHY && omnibus.fraction > SLIVER;
+    match most.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
+        Some(most) => (most.place.clone(), most.joint),
+        None if structured => (UNKNOWN.to_owned(), joint),
+        None => (NONE.to_owned(), joint),
+    }
+}
+
+/// A probe is called by the variables that it asks about; those of a joint get the joint's number.
+fn variables(probe: &FittedEffect) -> String {
+    let numbered = |name: &str| match name {
+        "t" => name.to_owned(),
+        own => format!("{own}{}", probe.joint + 1),
+    };
+    let names: Vec<String> = probe.effect.name.split('*').map(numbered).collect();
+    names.join("*")
+}

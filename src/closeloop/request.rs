@@ -1,0 +1,55 @@
+use super::error::StudyError;
+use super::learn::ResidualLearner;
+use super::split::Split;
+use crate::evaluate::window_count;
+use crate::model::{Library, System};
+
+/// What closing the loop is asked for.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Request<'a> {
+    /// The declared model.
+    pub system: &'a System,
+    /// The effects that it may lack.
+    pub library: &'a Library,
+    pub split: Split,
+    /// Models to score as they are on the same test logs.
+    pub against: Vec<Reference>,
+    /// Horizons of the reported errors in s; the error reduction of an effect is reported at the middle one.
+    pub horizons_s: [f64; 3],
+    /// Trains the residual network; without it there is none.
+    pub learner: Option<&'a dyn ResidualLearner>,
+}
+
+/// A model that is scored as it is, beside those that are fitted.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// As the user calls it.
+    pub name: String,
+    /// With the same joints as the declared model.
+    pub system: System,
+}
+
+impl<'a> Request<'a> {
+    /// A request without a residual network and without reference models.
+    pub fn new(system: &'a System, library: &'a Library, split: Split) -> Self {
+        Self {
+            system,
+            library,
+            split,
+            against: Vec::new(),
+            horizons_s: [0.1, 0.5, 1.0],
+            learner: None,
+        }
+    }
+
+    /// # Errors
+    /// Test logs without a window of one of the horizons.
+    pub(super) fn check(&self) -> Result<(), StudyError> {
+        let has_no_window = |horizon_s: &&f64| window_count(&self.split.test, **horizon_s) == 0;
+        match self.horizons_s.iter().find(has_no_window) {
+            Some(&horizon_s) => Err(StudyError::NoTest { horizon_s }),
+            None => Ok(()),
+        }
+    }
+}

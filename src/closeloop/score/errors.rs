@@ -1,0 +1,72 @@
+use rand::Rng;
+
+use super::bootstrap::reduction_interval;
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::request::Reference;
+use crate::data::Log;
+use crate::evaluate::{Assessment, assess};
+use crate::model::{Dynamics, System};
+
+/// Open-loop errors on the test logs.
+pub struct Errors {
+    /// The declared model with the values in its file, before any fit.
+    pub declared: Assessment,
+    /// The declared model, fitted.
+    pub before: Assessment,
+    /// With the effects that were found, fitted.
+    pub after: Assessment,
+    /// With the residual network.
+    pub hybrid: Option<Assessment>,
+    /// Other models as they are, by name.
+    pub against: Vec<(String, Assessment)>,
+    /// 95 % interval of the relative reduction of the position error, before to after.
+    pub reduction_ci95: Option<[f64; 2]>,
+}
+
+/// Scores models on the test logs.
+pub(in crate::closeloop) struct Scorer<'a> {
+    pub test: &'a [Log],
+    pub horizons_s: &'a [f64],
+}
+
+impl Scorer<'_> {
+    /// Score the declared model as it is, before and after the effects were added, and what else is to be compared.
+    pub fn errors(
+        &self,
+        declared: &System,
+        [before, after]: [&Fitted; 2],
+        hybrid: Option<&Dynamics>,
+        against: &[Reference],
+        rng: &mut impl Rng,
+    ) -> Errors {
+        let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.system));
+        let (before, after) = rayon::join(|| self.fitted(before), || self.fitted(after));
+        Errors {
+            declared: self.as_it_is(declared),
+            hybrid: hybrid.map(|model| self.dynamics(model)),
+            against: against.iter().map(scored).collect(),
+            reduction_ci95: reduction_interval(before.middle(), after.middle(), rng),
+            before,
+            after,
+        }
+    }
+
+    /// The error of a fitted model.
+    pub fn fitted(&self, model: &Fitted) -> Assessment {
+        self.assess(&model.dynamics, |log| model.values_in(log))
+    }
+
+    fn as_it_is(&self, model: &System) -> Assessment {
+        let dynamics = model.dynamics(&model.sign());
+        self.assess(&dynamics, |log| model.values_in(&dynamics, log))
+    }
+
+    fn dynamics(&self, model: &Dynamics) -> Assessment {
+        self.assess(model, |_| model.values())
+    }
+
+    fn assess(&self, dynamics: &Dynamics, values_in: impl Fn(&Log) -> Vec<f64>) -> Assessment {
+        let values: Vec<Vec<f64>> = self.test.iter().map(values_in).collect();
+        assess(dynamics, |log| &values[log], self.test, self.horizons_s)
+    }
+}

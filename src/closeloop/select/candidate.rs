@@ -1,0 +1,124 @@
+use rayon::prelude::*;
+
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::per_log::values_on;
+use crate::closeloop::study::Study;
+use crate::identify::{Shooting, promise};
+use crate::model::{Effect, FittedEffect};
+
+/// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
+/// shift of a parameter that the file declares fixed.
+pub fn candidates(
+    study: &Study<'_>,
+    library: &[Effect],
+    present: &[FittedEffect],
+) -> Vec<FittedEffect> {
+    let mut all: Vec<FittedEffect> = study.system.shifts();
+    all.extend(acting(study, library));
+    all.retain(|new| !present.iter().any(|old| old.excludes(new)));
+    all
+}
+
+/// Every one of these effects on every joint where it can act and be seen.
+pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
+    let mut all = Vec::new();
+    for effect in effects {
+        for joint in 0..study.system.joints {
+            if is_driven_enough(study, effect, joint)
+                && study.system.can_carry(effect, joint).is_ok()
+            {
+                let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
+                all.push(FittedEffect::absent(
+                    &effect.measured_by(speed, torque),
+                    joint,
+                ));
+            }
+        }
+    }
+    all
+}
+
+/// Effects of the torque cannot be seen where there is none.
+fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
+    !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
+}
+
+/// The candidate at each of its starting points, every combination of searched values.
+pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
+    let mut points = vec![Vec::new()];
+    for parameter in &candidate.effect.parameters {
+        let grown = points.iter().flat_map(|point| {
+            let starts = parameter.starts.iter();
+            starts.map(move |start| [point.as_slice(), &[(*start, None)]].concat())
+        });
+        points = grown.collect();
+    }
+    let at = |values| FittedEffect {
+        values,
+        ..candidate.clone()
+    };
+    points.into_iter().map(at).collect()
+}
+
+/// The starting point of a candidate that promises most beside the model at hand, and the cost it promises: found
+/// on a sample of the windows where there are several, and asked of all of them.
+pub fn best_start(
+    study: &Study<'_>,
+    model: &Fitted,
+    candidate: &FittedEffect,
+) -> Option<(FittedEffect, f64)> {
+    let mut starts = starts(candidate);
+    if starts.len() > 1 {
+        let locals = study.sample.locals(&model.fit.locals);
+        let promised = |start: FittedEffect| {
+            let cost = promised(study, &study.sample.shooting, model, &start, &locals)?;
+            Some((start, cost))
+        };
+        let promised: Vec<(FittedEffect, f64)> =
+            starts.into_par_iter().filter_map(promised).collect();
+        let best = promised.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        starts = vec![best.0];
+    }
+    let start = starts.pop()?;
+    let cost = promised(study, &study.shooting, model, &start, &model.fit.locals)?;
+    Some((start, cost))
+}
+
+/// The cost that a candidate promises on some windows.
+fn promised(
+    study: &Study<'_>,
+    shooting: &Shooting<'_>,
+    model: &Fitted,
+    start: &FittedEffect,
+    locals: &[Vec<f64>],
+) -> Option<f64> {
+    let mut effects = model.effects.clone();
+    effects.push(start.clone());
+    let dynamics = study.system.dynamics_with(&effects, &study.sign);
+    let values = values_on(study.logs, &model.declared, &effects);
+    let (active, scale) = (study.active(&dynamics), model.fit.scale);
+    promise(shooting, &dynamics, &active, values, locals, scale)
+}
+
+/// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
+/// them. `None` if the model has an effect that contains the candidate.
+pub fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
+    let contains = |a: &FittedEffect, b: &FittedEffect| {
+        a.joint == b.joint && a.effect.contains.contains(&b.effect.name)
+    };
+    if model
+        .effects
+        .iter()
+        .any(|present| contains(present, candidate))
+    {
+        return None;
+    }
+    let mut beside = model.clone();
+    let found = beside.effects.split_off(study.system.effects.len());
+    beside.effects.extend(
+        found
+            .into_iter()
+            .filter(|present| !contains(candidate, present)),
+    );
+    Some(beside)
+}

@@ -1,0 +1,302 @@
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::candidate::{beside, best_start, candidates, starts};
+use super::evidence::{Evidence, PLAIN, WORTHWHILE};
+use super::folds::{folds, left_out_losses};
+use super::simpler::simpler;
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::stage::{Progress, Stage};
+use crate::closeloop::study::Study;
+use crate::model::{Effect, EffectParameter, FittedEffect};
+
+/// One look at a model: what was tried beside the effects that it has, best first.
+#[derive(Debug, Clone)]
+pub struct Round {
+    /// Number of candidates that were looked at.
+    pub candidates: usize,
+    /// Those that promised most, fitted, best first.
+    pub evidence: Vec<Evidence>,
+    /// Index of the one that the evidence is for.
+    pub chosen: Option<usize>,
+}
+
+/// A set of effects that explains the logs as well as the chosen one: it has `effect` in place of `instead_of`.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    pub model: Fitted,
+    pub effect: FittedEffect,
+    pub instead_of: FittedEffect,
+    /// Fall of the left-out loss by either, beside the other effects.
+    pub gain: f64,
+    pub gain_of_chosen: f64,
+}
+
+impl Rival {
+    /// Whether the chosen effect is a special case of the rival.
+    pub fn contains_chosen(&self) -> bool {
+        let (own, chosen) = (&self.effect, &self.instead_of);
+        own.joint == chosen.joint && own.effect.contains.contains(&chosen.effect.name)
+    }
+}
+
+/// Probability of a false alarm that a look admits, over all candidates and all their starting points.
+pub const FALSE_ALARM: f64 = 0.05;
+/// Few stretches cannot prove so much. There an effect is admitted that plainly helps if it alone is this
+/// significant.
+pub const SIGNIFICANT_ALONE: f64 = 0.01;
+/// Candidates that are fitted after all have been screened.
+const FITTED: usize = 8;
+/// Effects that one search adds at most.
+pub const MOST_EFFECTS: usize = 6;
+
+/// Effects of a model whatever their order.
+type Key = Vec<String>;
+
+fn key(effects: &[FittedEffect]) -> Key {
+    let mut key: Key = effects.iter().map(FittedEffect::label).collect();
+    key.sort();
+    key
+}
+
+/// A search for the effects that a model lacks, and what it has seen so far.
+pub struct Search<'a, 'p> {
+    study: &'a Study<'a>,
+    library: &'a [Effect],
+    folds: Vec<usize>,
+    /// What has been looked at, by the effects of the model.
+    looks: HashMap<Key, Round>,
+    /// Models that the search has passed through.
+    passed: Vec<Key>,
+    /// What was looked at to add one more effect, in this order.
+    pub rounds: Vec<Round>,
+    progress: &'p mut dyn FnMut(Progress<'_>),
+}
+
+impl<'a, 'p> Search<'a, 'p> {
+    /// `progress` is told what is being tried.
+    pub fn new(
+        study: &'a Study<'a>,
+        library: &'a [Effect],
+        progress: &'p mut dyn FnMut(Progress<'_>),
+    ) -> Self {
+        Self {
+            study,
+            library,
+            folds: folds(&study.shooting),
+            looks: HashMap::new(),
+            passed: Vec::new(),
+            rounds: Vec::new(),
+            progress,
+        }
+    }
+
+    /// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
+    /// then exchange, simplify and remove until each effect is the best choice beside all others.
+    pub fn select(&mut self, declared: Fitted) -> Fitted {
+        let mut model = declared;
+        while model.effects.len() < self.declared() + MOST_EFFECTS {
+            let round = self.look(&model, None);
+            self.rounds.push(round.clone());
+            let next = match round.chosen {
+                Some(chosen) => Some(round.evidence[chosen].model.clone()),
+                None => self.exchanged(&model),
+            };
+            let Some(next) = next else { break };
+            let next = self.simplified(self.rescaled(&next));
+            if self.has_passed(&next) {
+                break;
+            }
+            model = next;
+        }
+        model
+    }
+
+    /// Tell what is being done.
+    pub fn tell(&mut self, progress: Progress<'_>) {
+        (self.progress)(progress);
+    }
+
+    fn say(&mut self, text: &str) {
+        self.tell(Progress::within(Stage::Select, text));
+    }
+
+    fn has_passed(&mut self, model: &Fitted) -> bool {
+        let key = key(&model.effects);
+        let known = self.passed.contains(&key);
+        self.passed.push(key);
+        known
+    }
+
+    /// Weigh what could join `model`; `wanted` is among the candidates whatever it promises.
+    fn look(&mut self, model: &Fitted, wanted: Option<&FittedEffect>) -> Round {
+        let at = key(&model.effects);
+        let is_wanted = |c: &FittedEffect| wanted.is_some_and(|wanted| wanted.label() == c.label());
+        if let Some(known) = self.looks.get(&at)
+            && (wanted.is_none() || known.evidence.iter().any(|e| is_wanted(&e.effect)))
+        {
+            return known.clone();
+        }
+        let all = candidates(self.study, self.library, &model.effects);
+        let mut screened = self.screened(model, &all);
+        let rest = screened.split_off(FITTED.min(screened.len()));
+        screened.extend(rest.into_iter().filter(is_wanted));
+        let losses = left_out_losses(&model.fit, &self.folds);
+        self.say(&format!("fitting {} effects", screened.len()));
+        let (study, folds) = (self.study, self.folds.as_slice());
+        let mut evidence: Vec<Evidence> = screened
+            .into_par_iter()
+            .filter_map(|start| weigh(study, folds, model, start, &losses))
+            .collect();
+        evidence.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
+        let round = Round {
+            candidates: all.len(),
+            chosen: choose(&evidence, trials),
+            evidence,
+        };
+        self.looks.insert(at, round.clone());
+        round
+    }
+
+    /// Candidates at their most promising starting points, the most promising ones first.
+    fn screened(&mut self, model: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
+        self.say(&format!("screening {} effects", all.len()));
+        let study = self.study;
+        let mut screened: Vec<(FittedEffect, f64)> = all
+            .par_iter()
+            .filter_map(|candidate| {
+                let beside = beside(study, model, candidate)?;
+                best_start(study, &beside, candidate)
+            })
+            .collect();
+        // A step away from "absent" promises little truth of an effect that cannot be absent: such candidates are
+        // always fitted.
+        screened.sort_by(|a, b| {
+            has_switch(&a.0)
+                .cmp(&has_switch(&b.0))
+                .then(a.1.total_cmp(&b.1))
+        });
+        screened.into_iter().map(|(start, _)| start).collect()
+    }
+
+    /// The scale of the residuals has fallen: from now on the search looks with sharper eyes.
+    fn rescaled(&self, model: &Fitted) -> Fitted {
+        let locals = model.fit.locals.clone();
+        self.study
+            .refit(&model.effects, &model.declared, locals, None)
+            .unwrap_or_else(|_| model.clone())
+    }
+
+    /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
+    fn simplified(&self, model: Fitted) -> Fitted {
+        let (study, folds) = (self.study, self.folds.as_slice());
+        let with: f64 = left_out_losses(&model.fit, folds).iter().sum();
+        let simpler = simpler(self.library, &model.effects, self.declared());
+        let first = simpler.par_iter().find_map_first(|effects| {
+            let less = refit(study, &model, effects)?;
+            let without: f64 = left_out_losses(&less.fit, folds).iter().sum();
+            (without < with * (1.0 + 0.5 * WORTHWHILE)).then_some(less)
+        });
+        match first {
+            Some(less) => self.simplified(less),
+            None => model,
+        }
+    }
+
+    /// Look at every effect of the model again, beside all others: what came early was chosen without knowing
+    /// what would follow. The first other model that the evidence is for.
+    fn exchanged(&mut self, model: &Fitted) -> Option<Fitted> {
+        (self.declared()..model.effects.len()).find_map(|k| {
+            let (present, without) = self.without(model, k)?;
+            let round = self.look(&without, Some(&present));
+            match round.chosen.map(|chosen| &round.evidence[chosen]) {
+                None => Some(without),
+                Some(best) if best.effect.label() == present.label() => None,
+                Some(best) => Some(best.model.clone()),
+            }
+        })
+    }
+
+    /// What explains the logs as well as one of the effects of a model does, beside all others.
+    pub fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
+        let mut rivals = Vec::new();
+        for k in self.declared()..model.effects.len() {
+            let Some((present, without)) = self.without(model, k) else {
+                continue;
+            };
+            let round = self.look(&without, Some(&present));
+            let is_present = |e: &&Evidence| e.effect.label() == present.label();
+            let Some(chosen) = round.evidence.iter().find(is_present) else {
+                continue;
+            };
+            let others = round.evidence.iter().filter(|e| !is_present(e));
+            rivals.extend(others.filter(|e| e.is_as_good_as(chosen)).map(|e| Rival {
+                model: e.model.clone(),
+                effect: e.effect.clone(),
+                instead_of: present.clone(),
+                gain: e.gain,
+                gain_of_chosen: chosen.gain,
+            }));
+        }
+        rivals
+    }
+
+    /// The k-th effect, and the model refitted without it.
+    fn without(&self, model: &Fitted, k: usize) -> Option<(FittedEffect, Fitted)> {
+        let mut effects = model.effects.clone();
+        let present = effects.remove(k);
+        Some((present, refit(self.study, model, &effects)?))
+    }
+
+    /// Effects that the file declares stay.
+    fn declared(&self) -> usize {
+        self.study.system.effects.len()
+    }
+}
+
+/// Fit a candidate and judge it.
+fn weigh(
+    study: &Study<'_>,
+    folds: &[usize],
+    model: &Fitted,
+    start: FittedEffect,
+    without: &[f64],
+) -> Option<Evidence> {
+    let mut effects = beside(study, model, &start)?.effects;
+    effects.push(start);
+    let fitted = refit(study, model, &effects)?;
+    Evidence::of(study, fitted, folds, without)
+}
+
+/// Other effects from the values of a model, at its scale.
+fn refit(study: &Study<'_>, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
+    let locals = model.fit.locals.clone();
+    study
+        .refit(effects, &model.declared, locals, Some(model.fit.scale))
+        .ok()
+}
+
+/// Whether some value of a parameter switches the effect off, so that it can start from absent.
+fn has_switch(candidate: &FittedEffect) -> bool {
+    candidate
+        .effect
+        .parameters
+        .iter()
+        .any(EffectParameter::is_switch)
+}
+
+/// Index of the evidence to act upon: of all candidates that are significant over so many trials, worthwhile
+/// and as good as the best, the one with the fewest parameters.
+fn choose(evidence: &[Evidence], trials: usize) -> Option<usize> {
+    #[allow(clippy::cast_precision_loss)] // few trials
+    let level = FALSE_ALARM / trials.max(1) as f64;
+    let sound = |e: &Evidence| {
+        e.p_value < level && e.gain > WORTHWHILE || e.p_value < SIGNIFICANT_ALONE && e.gain > PLAIN
+    };
+    let best = evidence.iter().find(|e| sound(e))?;
+    (0..evidence.len())
+        .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best))
+        .min_by_key(|&i| evidence[i].complexity())
+}

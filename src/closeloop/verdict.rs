@@ -1,0 +1,90 @@
+use super::find::Found;
+use super::remainder::{UNKNOWN, Unexplained};
+use super::score::Errors;
+use super::study::Study;
+
+/// The answer in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Effects were found and nothing significant is left.
+    Explained,
+    /// Effects were found and something significant is left.
+    PartlyExplained,
+    /// Something significant is missing and no effect of the library names it.
+    Unexplained,
+    /// The declared model explains the logs.
+    NoMissingEffect,
+    /// The logs are too few or too poor to tell.
+    Inconclusive,
+}
+
+/// Fewer windows than this allow no conclusion.
+const FEWEST_WINDOWS: usize = 8;
+
+/// Effects that raise the error on the test logs by more than noise in the windows' start states does are not
+/// to be trusted: a twentieth.
+const WORSE: f64 = 1.05;
+
+/// The verdict and the reason for it, in a sentence.
+pub(super) fn verdict(study: &Study<'_>, found: &Found, errors: &Errors) -> (Verdict, String) {
+    match inconclusive(study, found, errors) {
+        Some(reason) => (Verdict::Inconclusive, reason),
+        None => conclusion(added(study, found), &found.unexplained),
+    }
+}
+
+/// Number of effects that were added to the declared model.
+fn added(study: &Study<'_>, found: &Found) -> usize {
+    found.after.effects.len() - study.system.effects.len()
+}
+
+/// Why the logs allow no conclusion, if they do not.
+fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<String> {
+    let windows = study.shooting.windows.len();
+    if windows < FEWEST_WINDOWS {
+        return Some(format!(
+            "the training logs hold only {windows} windows of half a second; record more motion"
+        ));
+    }
+    let known = &study.identifiability;
+    if known.free > 0 && known.determined == 0 {
+        return Some(
+            "the training logs determine no parameter of the declared model; move the joints more"
+                .into(),
+        );
+    }
+    let worse = errors.after.position_rms() > WORSE * errors.before.position_rms();
+    (added(study, found) > 0 && worse).then(|| {
+        "the effects lower the loss on left-out stretches of the training logs but raise the error on the test logs: \
+         do not use them before logs of more varied motion confirm them"
+            .into()
+    })
+}
+
+fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
+    let what_is_left = match left.place.as_str() {
+        UNKNOWN => "an unexplained remainder depends on none of the variables tested".to_owned(),
+        place => format!("an unexplained remainder depends on {place}"),
+    };
+    match (added, left.is_significant()) {
+        (0, false) => (
+            Verdict::NoMissingEffect,
+            "no effect of the library lowers the loss on left-out stretches".into(),
+        ),
+        (0, true) => (
+            Verdict::Unexplained,
+            format!(
+                "no effect of the library lowers the loss on left-out stretches, and {what_is_left}"
+            ),
+        ),
+        (_, false) => (
+            Verdict::Explained,
+            "the effects found leave nothing significant".into(),
+        ),
+        (_, true) => (
+            Verdict::PartlyExplained,
+            format!("effects were found, and {what_is_left}"),
+        ),
+    }
+}

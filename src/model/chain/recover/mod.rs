@@ -1,0 +1,144 @@
+//! Recovers a mechanism from equations of motion, for a few kinds: one joint, two that turn in one plane, one that turns
+//! on one that slides. Masses and lengths are chosen such that the motion is the same; the motion does not determine
+//! all of them.
+
+mod links;
+mod shape;
+
+use nalgebra::{Complex, Vector3};
+
+use super::spatial::turn;
+use super::{Joint, Pose};
+use crate::model::Dynamics;
+use links::Links;
+use shape::Shape;
+
+/// A point or vector of the plane in which links turn, as z + i x with z up. A rotation by q about y multiplies it by
+/// exp(i q).
+type Planar = Complex<f64>;
+
+/// A mechanism with the same equations of motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recovered {
+    pub joints: Vec<Joint>,
+    /// m/s^2
+    pub gravity: f64,
+}
+
+/// Largest deviation of the equations from those of a mechanism, relative to the largest value of each entry.
+const SAME: f64 = 1e-9;
+/// A number below this share of what it is added to is rounding.
+const ROUNDING: f64 = 1e-10;
+/// Gravity where the equations do not contain it, m/s^2.
+const GRAVITY: f64 = 9.81;
+
+/// The mechanism with the equations of `declared`, effects excluded; `prismatic` says which joints slide.
+///
+/// In the world frame at q = 0, joints turn about y or slide along a horizontal or inclined x, and gravity acts against
+/// z.
+///
+/// # Errors
+/// Equations of another kind of mechanism, or of one that no bodies can have.
+pub fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, String> {
+    let (shape, links): (Shape, fn(&[f64], f64) -> Result<Links, String>) = match prismatic {
+        [false] => (Shape::turning(), links::turning),
+        [true] => (Shape::sliding(), links::sliding),
+        [false, false] => (Shape::arm(), links::arm),
+        [true, false] => (Shape::on_a_slide(), links::on_a_slide),
+        _ => return Err(KNOWN.to_owned()),
+    };
+    let found = shape.fit(declared)?;
+    let (mut joints, downward) = links(&found, gravity(declared))?;
+    let largest = found.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    for (joint, damping) in joints.iter_mut().zip(shape.damping(&found)) {
+        if *damping < -ROUNDING * largest {
+            return Err(format!("{} is driven by its own speed", joint.name));
+        }
+        joint.drivetrain.damping = if *damping > ROUNDING * largest {
+            *damping
+        } else {
+            0.0
+        };
+    }
+    Ok(upright(joints, downward))
+}
+
+const KNOWN: &str = "it is none of the mechanisms that are known: one joint, two that turn in one plane, one that turns on one that slides";
+
+/// The model's own gravity if it has one, m/s^2.
+fn gravity(declared: &Dynamics) -> f64 {
+    let mut parameters = declared.parameters.iter();
+    let own = parameters.find(|p| p.unit == "m/s^2" && p.value > 0.0);
+    own.map_or(GRAVITY, |p| p.value)
+}
+
+/// Joints given in the world frame as joints of a chain, turned so that gravity acts against z.
+fn upright(mut joints: Vec<Joint>, downward: Planar) -> Recovered {
+    let level = Pose {
+        rotation: turn(Vector3::y(), (-downward.conj()).arg()),
+        origin: Vector3::zeros(),
+    };
+    let mut inner = level.inverse();
+    for joint in &mut joints {
+        let outer = joint.pose;
+        joint.pose = inner.inverse().then(&outer);
+        inner = outer;
+    }
+    Recovered {
+        joints,
+        gravity: downward.norm(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::recover;
+    use crate::expr::SignForm;
+    use crate::model::{Library, System};
+
+    fn recovered(system: &System) -> Result<super::Recovered, String> {
+        let declared = system.dynamics_with(&[], &vec![SignForm::DEFAULT; system.joints]);
+        recover(&declared, &system.prismatic)
+    }
+
+    fn built_in(name: &str) -> super::Recovered {
+        recovered(&Library::built_in().system(Path::new(name)).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_acrobots_elbow_is_a_link_away() {
+        let acrobot = built_in("acrobot");
+        let elbow = acrobot.joints[1].pose.origin;
+        assert!((elbow.norm() - 1.0).abs() < 1e-12, "{elbow}");
+        assert!((acrobot.gravity - 9.8).abs() < 1e-12);
+        let moment = acrobot.joints[1].inertia.moment;
+        assert!((moment.norm() - 0.5).abs() < 1e-12, "{moment}");
+    }
+
+    #[test]
+    fn the_cartpoles_gravity_is_that_of_its_file() {
+        let cartpole = built_in("cartpole");
+        assert_eq!(cartpole.gravity, 9.81);
+        let whole: f64 = cartpole.joints.iter().map(|joint| joint.inertia.mass).sum();
+        assert!((whole - 1.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn equations_of_no_mechanism_are_refused() {
+        for (bias, said) in [
+            ("q1^3", "none of the mechanisms"),
+            ("sin(2*q1)", "none of the mechanisms"),
+            ("tanh(qd1)", "none of the mechanisms"),
+            ("-qd1", "driven by its own speed"),
+        ] {
+            let text = format!(
+                "[system]\nname = \"odd\"\njoints = 1\n[dynamics]\nmass = [[\"1\"]]\nbias = [\"{bias}\"]\n"
+            );
+            let odd = System::from_text(Path::new("odd.toml"), &text, &[]).unwrap();
+            let error = recovered(&odd).unwrap_err();
+            assert!(error.contains(said), "{bias}: {error}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Numbers, lists and names as reports write them.
+
+use crate::closeloop::Finding;
+use crate::model::{OwnValue, Parameter};
+
+/// The models that a report compares, by one name each in tables, plots and on the terminal.
+pub(super) const AS_WRITTEN: &str = "declared model as written";
+pub(super) const FITTED: &str = "declared model, fitted";
+pub(super) const WITH_EFFECTS: &str = "with effects";
+pub(super) const WITH_NETWORK: &str = "with effects and network";
+
+/// `a`, `a and b`, `a, b and c`
+pub(super) fn listed(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// The text with a capital first letter.
+pub(super) fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().collect::<String>() + letters.as_str()
+    })
+}
+
+/// The relative reduction of a quantity in percent, in words where the quantity rises instead.
+pub(super) fn reduction(part: f64, quantity: &str) -> String {
+    let percent = 100.0 * part;
+    if percent > -0.05 {
+        format!("{:.1} %", percent.max(0.0))
+    } else if percent > -100.0 {
+        format!("none ({quantity} rises by {:.1} %)", -percent)
+    } else {
+        format!("none ({quantity} more than doubles)")
+    }
+}
+
+/// One text for each value of a finding; a value that holds in one log alone names it.
+pub(super) fn values(finding: &Finding) -> Vec<String> {
+    let row = |(parameter, log): &(Parameter, Option<&OwnValue>)| match log {
+        Some(own) => format!("{} in {}", value(parameter), own.log_name()),
+        None => value(parameter),
+    };
+    finding.rows().iter().map(row).collect()
+}
+
+/// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
+pub(super) fn value(parameter: &Parameter) -> String {
+    format!("{} = {}", parameter.name, amount(parameter))
+}
+
+/// `0.1598 N m (0.1593 to 0.1603)`
+pub(super) fn amount(parameter: &Parameter) -> String {
+    let (value, ends) = digits(parameter);
+    let interval = ends.map_or_else(
+        || "not fitted".to_owned(),
+        |[low, high]| format!("{low} to {high}"),
+    );
+    format!("{} ({interval})", with_unit(value, &parameter.unit))
+}
+
+/// A number with its unit; a pure number has the unit `1`.
+pub(super) fn with_unit(number: String, unit: &str) -> String {
+    match unit {
+        "" | "1" => number,
+        unit => format!("{number} {unit}"),
+    }
+}
+
+/// A parameter's value and the ends of its interval, rounded to a twentieth of the interval's width.
+pub(crate) fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
+    let resolution = match parameter.ci95 {
+        Some([low, high]) => 0.05 * (high - low),
+        None => 1e-4 * parameter.value.abs(),
+    };
+    let number = |x: f64| rounded(x, resolution);
+    (
+        number(parameter.value),
+        parameter.ci95.map(|ends| ends.map(number)),
+    )
+}
+
+/// A number with as many decimals as the resolution needs.
+fn rounded(x: f64, resolution: f64) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let resolution = resolution.max(1e-9 * x.abs()).max(1e-12);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12
+    let digits = (-resolution.log10()).ceil().clamp(0.0, 12.0) as usize;
+    format!("{x:.digits$}")
+}
+
+/// A p-value.
+pub(super) fn probability(p: f64) -> String {
+    if p < 1e-12 {
+        "< 1e-12".to_owned()
+    } else if p < 1e-3 {
+        format!("{p:.0e}")
+    } else {
+        format!("{p:.3}")
+    }
+}
+
+/// A number with two to three significant digits.
+pub(super) fn small(x: f64) -> String {
+    rounded(x, 0.01 * x.abs())
+}
