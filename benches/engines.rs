@@ -13,11 +13,10 @@ use residyn::batch::{Rollouts, Rows};
 use residyn::closeloop::{Request, Split, close_loop};
 use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
-use residyn::model::{
-    Dynamics, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights,
-};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
+use residyn::sim::Integrator;
 use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 const STEP_S: f64 = 0.02;

@@ -12,11 +12,10 @@ use rand_chacha::ChaCha8Rng;
 use residyn::batch::Rollouts;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit};
-use residyn::model::{
-    Dynamics, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, System,
-};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, System};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
+use residyn::sim::Integrator;
 use residyn::train::{Backend, FitSettings, HybridModel, Progress, Segments, Training};
 
 const STEP_S: f64 = 0.02;

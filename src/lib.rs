@@ -61,5 +61,6 @@ pub mod plant;
 pub mod recipe;
 pub mod report;
 pub mod rounds;
+pub mod sim;
 #[cfg(feature = "train")]
 pub mod train;

@@ -1,7 +1,7 @@
 //! Models that are scored as they are, beside those that are fitted.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -47,26 +47,28 @@ fn rig() -> Rig {
     }
 }
 
+impl Rig {
+    /// `closeloop` of the pendulum on these logs, beside other models.
+    fn command<'a>(&'a self, out: &'a Path, against: &[&'a str]) -> Vec<&'a str> {
+        let [first, second] = &self.train;
+        let logs = [
+            "--train",
+            text(first),
+            text(second),
+            "--test",
+            text(&self.test),
+        ];
+        let model = ["closeloop", "--model", "pendulum", "--out", text(out)];
+        [&model[..], &logs, &["--against"], against].concat()
+    }
+}
+
 #[test]
 fn models_are_scored_as_they_are_on_the_same_windows() {
     let rig = rig();
     let out = rig.folder.path().join("report");
-    let json = succeeds(&[
-        "closeloop",
-        "--json",
-        "--model",
-        "pendulum",
-        "--train",
-        text(&rig.train[0]),
-        text(&rig.train[1]),
-        "--test",
-        text(&rig.test),
-        "--against",
-        "pendulum",
-        text(&rig.true_rig),
-        "--out",
-        text(&out),
-    ]);
+    let against = ["pendulum", text(&rig.true_rig)];
+    let json = succeeds(&[&rig.command(&out, &against)[..], &["--json"]].concat());
     let report: Value = serde_json::from_str(&json).unwrap();
     let error = &report["error"];
     let [pendulum, true_rig] = error["against"].as_array().unwrap().as_slice() else {
@@ -154,20 +156,7 @@ fn models_of_other_rigs_and_files_that_cannot_be_read_are_refused() {
     let rig = rig();
     let out = rig.folder.path().join("out");
     let says = |other: &str, parts: &[&str]| {
-        let message = refuses(&[
-            "closeloop",
-            "--model",
-            "pendulum",
-            "--train",
-            text(&rig.train[0]),
-            text(&rig.train[1]),
-            "--test",
-            text(&rig.test),
-            "--against",
-            other,
-            "--out",
-            text(&out),
-        ]);
+        let message = refuses(&rig.command(&out, &[other]));
         for part in parts {
             assert!(message.contains(part), "{part:?} is missing in:\n{message}");
         }

@@ -33,7 +33,7 @@ fn demo() -> &'static Path {
     report
 }
 
-/// Run one of the scripts in `tests/clients`; without an interpreter, say so where nobody misses it.
+/// Run one of the scripts in `tests/clients`; without an interpreter, print a prominent note.
 pub fn client(script: &str, arguments: &[&Path]) {
     let Some(python) = std::env::var_os("RESIDYN_PYTHON") else {
         let note = format!("SKIPPED {script}: RESIDYN_PYTHON is not set; run tests/run\n");

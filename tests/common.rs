@@ -1,4 +1,4 @@
-//! What several tests share: the catalog of systems and effects, random points, comparisons.
+//! Shared by several tests: the catalog of systems and effects, random points, comparisons.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -10,9 +10,8 @@ use rand_distr::{Distribution, Normal};
 use residyn::data::Log;
 use residyn::expr::{Graph, Program, SignForm};
 use residyn::lanes::Row;
-use residyn::model::{
-    Commands, Dynamics, Effect, Entry, FittedEffect, Library, Rollout, Sensors, StepTorque, System,
-};
+use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, System};
+use residyn::sim::{Commands, Hold, RK4, Simulator};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
@@ -43,7 +42,7 @@ pub fn dynamics(system: &System, effects: &[FittedEffect], sign: SignForm) -> Dy
     system.dynamics_with(effects, &vec![sign; system.joints])
 }
 
-/// Whether the effect has anything to act on there.
+/// Whether the effect can act on that joint.
 pub fn can_act(system: &System, effect: &Effect, joint: usize) -> bool {
     let inertia = matches!(effect.entry, Entry::Inertia(_));
     !(inertia && !system.has_mass_matrix() || effect.first_joint_only && joint > 0)
@@ -103,10 +102,10 @@ pub fn catalog(sign: SignForm) -> Vec<Case> {
     cases
 }
 
-/// Inputs of a program of motion: states, torques, time, parameters, all exact in f32.
+/// Inputs of a program of dynamics: states, torques, time, parameters, all exact in f32.
 ///
-/// Parameters vary by a quarter about their declared or typical values, so that masses stay masses and
-/// a whole number of cogs does not (the formula takes any number).
+/// Parameters vary by a quarter about their declared or typical values: masses stay positive, and the number of cogs
+/// need not be whole.
 pub fn point(dynamics: &Dynamics, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let n = dynamics.joints;
     let bounds = [vec![3.0; n], vec![4.0; n], vec![2.0; n]].concat();
@@ -152,12 +151,9 @@ pub fn in_f32(program: &Program, points: &[Vec<f64>]) -> Vec<Vec<f64>> {
     found
 }
 
-/// Both backends that every build has, gradients switched on.
+/// The devices that every build has, with gradients.
 pub fn devices() -> Vec<Device> {
-    use residyn::train::Backend;
-    [Backend::NdArray, Backend::NdArray]
-        .map(Backend::device)
-        .to_vec()
+    vec![residyn::train::Backend::NdArray.device()]
 }
 
 pub fn tensor(values: &[f64], device: &Device) -> Tensor<1> {
@@ -185,7 +181,7 @@ pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
     );
 }
 
-/// A log of these rows, to be filled.
+/// A log without rows.
 pub fn empty_log(name: &str, joints: usize) -> Log {
     Log {
         path: name.into(),
@@ -215,21 +211,18 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
         *tau = log.time.iter().map(|t| 0.25 * torque * wave(*t)).collect();
     }
     let (time, tau) = (log.time.clone(), log.tau.clone());
-    let commands = Commands::new(model, &model.values(), &time, &tau);
-    let mut rollout = Rollout::<f64, 1>::new(model, &model.values());
-    let mut sensors = Sensors::<1>::new(model, &model.values());
-    let mut state: Vec<Row<f64, 1>> = start.iter().map(|x| Row([*x])).collect();
+    let commands = [&Commands::new(model, &time, &tau)];
+    let mut simulator = Simulator::new(model, RK4);
+    simulator.put(start);
     for row in 0..=rows {
         let time = log.time[row];
-        let before = || Commands::just_before([&commands], [row]);
-        let shown = sensors.show(&state, before, Row([time]));
+        let [angles, velocities] = simulator.shown(commands, [row]);
         for j in 0..n {
-            log.q[j].push(shown[j][0]);
-            log.qd[j].push(state[n + j][0]);
+            log.q[j].push(angles[j][0]);
+            log.qd[j].push(velocities[j][0]);
         }
         let held: Vec<Row<f64, 1>> = log.tau.iter().map(|tau| Row([tau[row]])).collect();
-        let torque = StepTorque::new([&commands], &held, Row([time]), Row([time + 0.01]), 20);
-        rollout.advance(&mut state, &torque.mean, Row([time]), Row([0.01]), 20);
+        simulator.advance(&Hold::lasting(commands, &held, Row([time]), 0.01, 20));
     }
     log
 }

@@ -155,44 +155,19 @@ fn what_was_written_is_taken_by_other_commands() {
 fn a_checkpoint_of_another_model_is_refused() {
     let (_report, folder) = demo("5");
     let checkpoint = folder.path().join("report/checkpoint");
-    let log = folder.path().join("two-joints.csv");
-    succeeds(&[
-        "simulate",
-        "--plant",
-        "acrobot",
-        "--out",
-        text(&log),
-        "--duration",
-        "2",
-    ]);
-    let message = refuses(&[
-        "evaluate",
-        "--checkpoint",
-        text(&checkpoint),
-        "--test",
-        text(&log),
-    ]);
+    let refused_on_log_of = |plant: &str| {
+        let log = folder.path().join(plant).with_extension("csv");
+        let simulate = ["simulate", "--plant", plant, "--out", text(&log)];
+        succeeds(&[&simulate[..], &["--duration", "2"]].concat());
+        let evaluate = ["evaluate", "--checkpoint", text(&checkpoint)];
+        refuses(&[&evaluate[..], &["--test", text(&log)]].concat())
+    };
+    let message = refused_on_log_of("acrobot");
     assert!(message.contains("joint"), "{message}");
     // A checkpoint whose weights belong to another model than its own model file.
     let model = include_str!("../models/drive.toml");
     std::fs::write(checkpoint.join("model.toml"), model).unwrap();
-    let one = folder.path().join("one-joint.csv");
-    succeeds(&[
-        "simulate",
-        "--plant",
-        "pendulum",
-        "--out",
-        text(&one),
-        "--duration",
-        "2",
-    ]);
-    let message = refuses(&[
-        "evaluate",
-        "--checkpoint",
-        text(&checkpoint),
-        "--test",
-        text(&one),
-    ]);
+    let message = refused_on_log_of("pendulum");
     assert!(
         message.contains("pendulum") && message.contains("drive"),
         "{message}"

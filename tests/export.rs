@@ -1,14 +1,16 @@
 //! Exported models, read by programs of their users.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use residyn::control::{Meter, Task};
 use residyn::formats::{
     Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
 };
-use residyn::model::{Integrator, System};
+use residyn::model::System;
+use residyn::sim::Integrator;
 use serde_json::{Value, json};
+use tempfile::TempDir;
 
 use crate::clients::client;
 use crate::common::{USER_EFFECT, rng, system};
@@ -59,13 +61,19 @@ fn expected(model: &ExportModel) -> (Samples, Predictions) {
     (samples, own)
 }
 
+/// A model written in a format to a folder of its own.
+fn written(format: &Format, name: &str, model: &ExportModel) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name.replace(' ', "_"));
+    let path = path.with_extension(format.extension);
+    format.write(model, &path).unwrap();
+    (folder, path)
+}
+
 /// Every model in one format, as the format's client predicts it.
 pub fn client_agrees(format: &Format, models: &[(&str, ExportModel)]) {
     for (name, model) in models {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(name.replace(' ', "_"));
-        let path = path.with_extension(format.extension);
-        format.write(model, &path).unwrap();
+        let (_folder, path) = written(format, name, model);
         let (samples, own) = expected(model);
         let name = format!("{name} as {}", format.name);
         if let Some(theirs) = predictions(&name, || format.predict(&path, &samples)) {
@@ -112,9 +120,7 @@ fn a_description_is_read_back_to_the_same_model() {
 #[test]
 fn a_description_can_be_rebuilt_with_numpy() {
     for (name, model) in models::all() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("model.json");
-        find("json").unwrap().write(&model, &path).unwrap();
+        let (_folder, path) = written(find("json").unwrap(), name, &model);
         let (samples, own) = expected(&model);
         if let Some(theirs) = predictions(name, || DESCRIPTION.predict(&path, &samples)) {
             agree(name, &own, &theirs, 1e-9);
@@ -124,10 +130,8 @@ fn a_description_can_be_rebuilt_with_numpy() {
 
 #[test]
 fn onnx_files_pass_the_checker_and_say_what_they_are() {
-    for (_, model) in models::all() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("model.onnx");
-        find("onnx").unwrap().write(&model, &path).unwrap();
+    for (name, model) in models::all() {
+        let (folder, path) = written(find("onnx").unwrap(), name, &model);
         let parameters = model.equations.parameters.iter();
         let parameters: Vec<Value> = parameters
             .map(|p| json!([p.name, p.value, p.unit]))
@@ -146,9 +150,7 @@ fn gymnasium_takes_the_environment_of_a_module() {
         let Some(task) = Task::of_system(model.name()) else {
             continue;
         };
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(format!("{name}.py"));
-        find("python").unwrap().write(&model, &path).unwrap();
+        let (folder, path) = written(find("python").unwrap(), name, &model);
         let samples = model.samples(&mut rng(1)).unwrap();
         let meter = Meter::of(&task.objective());
         let points = samples.states.iter().zip(&samples.torques);
@@ -299,9 +301,7 @@ fn what_cannot_be_exported_is_refused_before_anything_is_written() {
 #[test]
 fn latex_is_parsed_and_holds_equations_values_and_intervals() {
     for (name, model) in models::all() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(format!("{name}.tex"));
-        find("latex").unwrap().write(&model, &path).unwrap();
+        let (folder, path) = written(find("latex").unwrap(), name, &model);
         let mut pieces = Vec::new();
         let mut environments = vec!["document"];
         if model.prior.is_none() {
@@ -338,7 +338,7 @@ delta = 0.005
 driven = 1
 "#;
     let system = models::system("pendulum", effects);
-    let model = ExportModel::of_system(&system, Integrator::Rk4, 0.01, Value::Null);
+    let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
         let limits = (find(name).unwrap().not_carried)(&model);
         for piece in [
@@ -357,7 +357,7 @@ fn names_and_units_of_files_do_not_break_a_module() {
                 lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
                 [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
     let system = System::from_text(Path::new("odd.toml"), text, &[]).unwrap();
-    let model = ExportModel::of_system(&system, Integrator::Rk4, 0.01, json!("\"\"\"\n\\"));
+    let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("\"\"\"\n\\"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.module");
     let format = find("python").unwrap();

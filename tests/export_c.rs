@@ -1,4 +1,4 @@
-//! The C header, compiled: what it predicts, its Jacobians, and that no compiler has anything to say about it.
+//! The compiled C header: its predictions, its Jacobians, and no warnings of any compiler.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -8,14 +8,15 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use residyn::formats::{ExportModel, Predictions, Samples, find};
 use residyn::lanes::Row;
-use residyn::model::{Commands, Integrator, Library, StepTorque, System};
+use residyn::model::{Library, System};
+use residyn::sim::{Commands, Hold, Integrator, StepTorque};
 use serde_json::json;
 use tempfile::TempDir;
 
 use crate::common::rng;
 use crate::models;
 
-/// Every function of formulas, names that C has taken, and text that would end a comment.
+/// Every function of formulas, reserved names of C, and text that would end a comment.
 const ODD: &str = r#"
 [system]
 name = "Rig"
@@ -38,7 +39,7 @@ qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 
 fn odd() -> ExportModel {
     let library = Library::built_in();
     let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
-    ExportModel::of_system(&system, Integrator::Rk4, 0.01, json!("*/ \\"))
+    ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("*/ \\"))
 }
 
 /// A model's header in a folder of its own.
@@ -53,7 +54,7 @@ impl Header {
         self.folder.path().join("model.h")
     }
 
-    /// Arguments that every client is compiled with.
+    /// Arguments for the compilation of every client.
     fn arguments(&self) -> Vec<String> {
         let lower = self.model.name().to_lowercase();
         let upper = lower.to_uppercase();
@@ -66,7 +67,7 @@ impl Header {
         ]
     }
 
-    /// A client as a program, compiled with these flags.
+    /// A client compiled with these flags.
     fn program(&self, client: &str, flags: &[&str]) -> PathBuf {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let program = self.folder.path().join("client");
@@ -84,7 +85,7 @@ impl Header {
         program
     }
 
-    /// The rows of numbers that a client prints which is compiled with these flags.
+    /// The rows of numbers that a client prints, compiled with these flags.
     fn ask(&self, client: &str, flags: &[&str], question: &str) -> Vec<Vec<f64>> {
         rows(
             Command::new(self.program(client, flags)),
@@ -123,7 +124,7 @@ pub fn succeeds(command: &mut Command, what: &str) {
     assert!(run.status.success(), "{what}: {command:?}\n{said}");
 }
 
-/// Whether these tools start; where one does not, say so where nobody misses it.
+/// Whether these tools start; if one does not, print a prominent note.
 pub fn there_are(tools: &[&str]) -> bool {
     let starts = |tool: &&str| Command::new(tool).arg("--version").output().is_ok();
     let missing: Vec<&str> = tools.iter().copied().filter(|tool| !starts(tool)).collect();
@@ -172,7 +173,7 @@ fn question(samples: &Samples) -> String {
 
 const CLIENT: &str = "docs/clients/c.c";
 
-/// What the client answers under these flags.
+/// The predictions of the client under these flags.
 fn predictions(header: &Header, flags: &[&str], samples: &Samples) -> Predictions {
     let rows = header.ask(CLIENT, flags, &question(samples));
     let (points, rollout) = rows.split_at(samples.states.len());
@@ -309,7 +310,7 @@ fn jacobians_are_the_slopes() {
     }
 }
 
-/// Steps of any length, so that a delay spans now few of them and now many.
+/// Steps of varying length, so that a delay spans few or many of them.
 #[test]
 fn torques_act_as_the_filters_say_whatever_the_steps() {
     let filtered = |header: &Header| !header.model.equations.filters.is_empty();
@@ -329,16 +330,13 @@ fn torques_act_as_the_filters_say_whatever_the_steps() {
         }
         time.push(now);
         let equations = &header.model.equations;
-        let commands = Commands::new(equations, &equations.values(), &time[..=steps], &tau);
-        let parts = match header.model.integrator {
-            Integrator::Fine { steps } => steps.get() as usize,
-            _ => 1,
-        };
+        let commands = Commands::new(equations, &time[..=steps], &tau);
+        let parts = header.model.integrator.substeps();
         let rows = header.ask("tests/clients/acting.c", &[], &question);
         for (k, row) in rows.iter().enumerate() {
             let held: Vec<_> = tau.iter().map(|tau| Row([tau[k + 1]])).collect();
             let ends = [time[k + 1], time[k + 2]].map(|time| Row([time]));
-            let acting = StepTorque::new([&commands], &held, ends[0], ends[1], parts).mean;
+            let acting = StepTorque::new(&Hold::between([&commands], &held, ends, parts)).mean;
             for (a, Row([b])) in row.iter().zip(acting) {
                 assert!((a - b).abs() < 1e-9, "{} step {k}: {a} {b}", header.name);
             }

@@ -1,4 +1,4 @@
-//! Model files made of robot descriptions.
+//! Model files derived from robot descriptions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ pub fn fixture(name: &str) -> PathBuf {
     root.join("tests/fixtures/mechanisms").join(name)
 }
 
-/// The format of robot descriptions that a file's extension tells.
+/// The format of a robot description, by the file's extension.
 fn format(file: &Path) -> &'static Format {
     let extension = file.extension().unwrap();
     let mut formats = FORMATS.iter().filter(|format| format.robots.is_some());
@@ -53,7 +53,7 @@ fn system(chain: &Chain) -> System {
     .unwrap()
 }
 
-/// The model with the effects that are forces of a state: MuJoCo's dry friction and limits are constraints.
+/// The model with effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
 fn comparable(system: &System) -> Dynamics {
     let others = ["coulomb_friction", "actuator_saturation"];
     let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
@@ -84,7 +84,7 @@ fn mujoco_finds_the_same_torques() {
     }
 }
 
-/// Coordinates, speeds, torques, time, and the parameters as they are.
+/// Positions, velocities, torques, time, and the parameters at their values.
 fn states(model: &Dynamics, count: usize) -> Vec<Vec<f64>> {
     let moving = 3 * model.joints + 1;
     let with_values = |point: Vec<f64>| [&point[..moving], &model.values()].concat();
@@ -111,7 +111,7 @@ fn energy_changes_by_the_power() {
     }
 }
 
-/// The mass matrix at a point: its inverse by what single torques change.
+/// The mass matrix at a point, the inverse of the accelerations by unit torques.
 fn inverse_mass(model: &Dynamics, point: &[f64]) -> nalgebra::DMatrix<f64> {
     let n = model.joints;
     let accelerations = |torque: Option<usize>| {
@@ -141,7 +141,7 @@ fn the_mass_matrix_is_symmetric_and_positive() {
     }
 }
 
-/// A change of one parameter cannot be undone by the others: the torques' derivatives by them are independent.
+/// No change of one parameter can be compensated by the others: the derivatives of the torques are independent.
 #[test]
 fn all_parameters_can_be_told_apart() {
     for name in FILES {
@@ -247,7 +247,7 @@ fn the_command_writes_what_other_commands_take() {
     succeeds(&["evaluate", "--model", text(&out), "--test", text(&log)]);
 }
 
-/// What the command says of a fixture in which one place is changed.
+/// The message of the command for a fixture with one change.
 fn message(name: &str, from: &str, to: &str) -> String {
     let contents = fs::read_to_string(fixture(name)).unwrap();
     assert!(contents.contains(from), "{name} has no {from}");

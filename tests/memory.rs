@@ -4,9 +4,8 @@ use residyn::data::Log;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit, uncertainty};
 use residyn::lanes::Row;
-use residyn::model::{
-    Commands, Dynamics, FittedEffect, Library, Sensors, StepTorque, with_own_angles,
-};
+use residyn::model::{Dynamics, FittedEffect, Library};
+use residyn::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
 
 use serde_json::Value;
 
@@ -41,14 +40,9 @@ fn history() -> (Vec<f64>, Vec<f64>) {
 fn means(model: &Dynamics, from: f64, to: f64, parts: usize) -> (Vec<f64>, Vec<f64>) {
     let (time, tau) = history();
     let tau = [tau];
-    let commands = Commands::new(model, &model.values(), &time, &tau);
-    let torque = StepTorque::new(
-        [&commands],
-        &[Row([f64::NAN])],
-        Row([from]),
-        Row([to]),
-        parts,
-    );
+    let commands = Commands::new(model, &time, &tau);
+    let (held, ends) = ([Row([f64::NAN])], [from, to].map(|time| Row([time])));
+    let torque = StepTorque::new(&Hold::between([&commands], &held, ends, parts));
     let first = |lanes: Vec<Row<f64, 1>>| lanes.into_iter().map(|lane| lane[0]).collect();
     (first(torque.mean), first(torque.slopes))
 }
@@ -348,7 +342,7 @@ fn play_parts_the_sensor_from_the_link() {
         (0.0, [-2.0, -0.5], 0.01),
     ] {
         let model = pendulum(&[backlash(0.02, driven)]);
-        let mut sensors = Sensors::<1>::new(&model, &model.values());
+        let mut sensors = Sensors::<1>::new(&model);
         let mut state = [Row([0.7]), Row([v])];
         let shown = sensors.show(&state, || vec![Row([tau])], Row([0.0]))[0][0];
         assert_near(shown, 0.7 + ahead, 1e-12, "angle shown");
@@ -412,7 +406,7 @@ fn the_rigs_own_angles_are_found_behind_play() {
         let model = pendulum(&[backlash(0.01, driven)]);
         let shown = simulate(&model, &[3.0, 0.0], 1.5, 1500, 4);
         assert!(distances(&shown, &truth).len() > 1300);
-        let own = with_own_angles(&model, &model.values(), &shown);
+        let own = with_own_angles(&model, &shown);
         let left = distances(&own, &truth);
         // The torque is logged; a reversal of the motion is seen through velocities over 8 rows on either side.
         let reach = if driven > 0.0 { None } else { Some(8) };

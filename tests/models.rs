@@ -5,14 +5,15 @@ use std::path::Path;
 use rand_chacha::ChaCha8Rng;
 use residyn::formats::ExportModel;
 use residyn::model::{
-    Angles, InputScaling, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights,
-    ResidualOn, System,
+    Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights, ResidualOn,
+    System,
 };
+use residyn::sim::Integrator;
 use serde_json::json;
 
 use crate::common::rng;
 
-/// Friction, and a command that is delayed by no whole number of steps and then smoothed.
+/// Friction, and a command that is delayed by a fraction of a step and then lagged.
 const PENDULUM_EFFECTS: &str = r#"
 [[effect]]
 name = "coulomb_friction"
@@ -57,10 +58,8 @@ m = 4.0
 
 /// All of them, by name.
 pub fn all() -> Vec<(&'static str, ExportModel)> {
-    let fine = Integrator::Fine {
-        steps: 4.try_into().unwrap(),
-    };
-    let (euler, rk4) = (Integrator::SemiImplicitEuler, Integrator::Rk4);
+    let fine = Integrator::fine(4.try_into().unwrap());
+    let (euler, rk4) = (Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4);
     let pendulum = || system("pendulum", "");
     let friction = || system("pendulum", PENDULUM_EFFECTS);
     let acrobot = || system("acrobot", "");
@@ -154,7 +153,7 @@ fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {
     }
 }
 
-/// A random network whose features are scaled and whose outputs are small beside the motion's own.
+/// A random network with scaled features and outputs that are small relative to the derivative.
 fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> MlpWeights {
     let features = settings.angles.features(joints);
     let scaling = InputScaling {

@@ -1,11 +1,12 @@
-//! Mechanisms exported for simulators of rigid bodies, as MuJoCo moves them and as they are read back here.
+//! Mechanisms exported for simulators of rigid bodies: simulated by MuJoCo, and read back.
 
 use std::path::Path;
 
 use residyn::expr::SignForm;
 use residyn::formats::{ExportModel, FORMATS, find};
 use residyn::model::chain::model_text;
-use residyn::model::{Integrator, Library, System};
+use residyn::model::{Library, System};
+use residyn::sim::Integrator;
 use serde_json::json;
 
 use crate::common::{assert_near, dynamics, points, rng};
@@ -14,7 +15,7 @@ use crate::mechanism::{fixture, read};
 use crate::models;
 use crate::support::{refuses, residyn, text};
 
-/// An effect as a model file has it.
+/// An effect as in a model file.
 fn effect(name: &str, joint: usize, values: &str) -> String {
     format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
 }
@@ -30,11 +31,9 @@ fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     ExportModel::of_system(&system, integrator, 0.01, json!({}))
 }
 
-/// What both formats carry.
+/// Models that both formats carry.
 fn plain() -> Vec<(&'static str, ExportModel)> {
-    let fine = Integrator::Fine {
-        steps: 4.try_into().unwrap(),
-    };
+    let fine = Integrator::fine(4.try_into().unwrap());
     let friction = |joint| {
         let dry = effect("coulomb_friction", joint, "F_c = 0.1");
         dry + &effect("viscous_friction", joint, "b = 0.05")
@@ -44,23 +43,23 @@ fn plain() -> Vec<(&'static str, ExportModel)> {
     vec![
         (
             "pendulum",
-            portable("pendulum", Integrator::SemiImplicitEuler, &[]),
+            portable("pendulum", Integrator::SEMI_IMPLICIT_EULER, &[]),
         ),
         (
             "pendulum with effects",
             portable(
                 "pendulum",
-                Integrator::Rk4,
+                Integrator::RK4,
                 &[friction(1), limited(1, 2.0), tilted.clone()],
             ),
         ),
-        ("drive", portable("drive", Integrator::Rk4, &[friction(1)])),
+        ("drive", portable("drive", Integrator::RK4, &[friction(1)])),
         ("acrobot", portable("acrobot", fine, &[])),
         (
             "acrobot with effects",
             portable(
                 "acrobot",
-                Integrator::Rk4,
+                Integrator::RK4,
                 &[friction(2), limited(2, 5.0), tilted],
             ),
         ),
@@ -69,21 +68,21 @@ fn plain() -> Vec<(&'static str, ExportModel)> {
             "cartpole with effects",
             portable(
                 "cartpole",
-                Integrator::SemiImplicitEuler,
+                Integrator::SEMI_IMPLICIT_EULER,
                 &[friction(1), friction(2), limited(1, 4.0)],
             ),
         ),
     ]
 }
 
-/// Equations alone: what they are those of has to be found.
+/// Equations alone, whose mechanism has to be recovered.
 fn stated() -> Vec<(&'static str, ExportModel)> {
     let stated = |slides: &str, mass: &[&[&str]], bias: &[&str]| {
         let text = format!(
             "[system]\nname = \"stated\"\njoints = {}\nprismatic = {slides}\n[dynamics]\nmass = {mass:?}\nbias = {bias:?}\n",
             bias.len()
         );
-        of_text(&text, Integrator::Rk4)
+        of_text(&text, Integrator::RK4)
     };
     let lean = &["2*sin(q1) + 1.5*cos(q1) + 0.1*qd1"];
     let coupling = "0.9 + 0.4*cos(q2) + 0.1*sin(q2)";
@@ -109,11 +108,11 @@ fn stated() -> Vec<(&'static str, ExportModel)> {
                 inclined,
             ),
         ),
-        ("arm from URDF", of_text(&model_text(&arm), Integrator::Rk4)),
+        ("arm from URDF", of_text(&model_text(&arm), Integrator::RK4)),
     ]
 }
 
-/// What MJCF carries beside that, by steps.
+/// Models that MJCF alone carries, compared step by step.
 fn driven() -> Vec<(&'static str, ExportModel)> {
     let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
     let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");
@@ -125,7 +124,7 @@ fn driven() -> Vec<(&'static str, ExportModel)> {
             "gain, then limit",
             portable(
                 "pendulum",
-                Integrator::Rk4,
+                Integrator::RK4,
                 &[gain(1), limited(1), spring(1)],
             ),
         ),
@@ -133,7 +132,7 @@ fn driven() -> Vec<(&'static str, ExportModel)> {
             "limit, then gain",
             portable(
                 "acrobot",
-                Integrator::Rk4,
+                Integrator::RK4,
                 &[limited(2), gain(2), rotor(1), rotor(2)],
             ),
         ),
@@ -141,7 +140,7 @@ fn driven() -> Vec<(&'static str, ExportModel)> {
             "gain and offset",
             portable(
                 "cartpole",
-                Integrator::Rk4,
+                Integrator::RK4,
                 &[constant(1), gain(1), rotor(1), rotor(2), spring(2)],
             ),
         ),
@@ -163,7 +162,7 @@ fn mujoco_moves_urdf_alike() {
 #[test]
 fn a_lag_has_the_same_derivative() {
     let lag = effect("actuator_lag", 1, "T = 0.05") + &effect("actuator_gain", 1, "g = -0.2");
-    let model = portable("pendulum", Integrator::Rk4, &[lag]);
+    let model = portable("pendulum", Integrator::RK4, &[lag]);
     let format = find("mjcf").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("model.xml");
@@ -215,7 +214,7 @@ fn what_is_not_carried_is_said() {
     let rest = effect("stribeck_friction", 1, "F_c = 0.1\nF_s = 0.2\nv_s = 0.1")
         + &effect("rotor_inertia", 2, "J = 0.1")
         + &effect("actuator_gain", 2, "g = 0.5");
-    let model = portable("acrobot", Integrator::Rk4, &[rest]);
+    let model = portable("acrobot", Integrator::RK4, &[rest]);
     let said = |format: &str| (find(format).unwrap().not_carried)(&model).join("\n");
     let (mjcf, urdf) = (said("mjcf"), said("urdf"));
     assert!(

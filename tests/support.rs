@@ -1,4 +1,4 @@
-//! What several tests share: the real binary, scratch folders, measured data.
+//! Shared by several tests: the real binary, scratch folders, measured data.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -19,7 +19,7 @@ pub fn succeeds(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("output is UTF-8")
 }
 
-/// Run the program, which must come to an answer, be it "no", and return its standard output.
+/// Run the program, which must end with an answer, yes or no, and return its standard output.
 pub fn answers(arguments: &[&str]) -> String {
     let output = residyn(arguments);
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -28,7 +28,7 @@ pub fn answers(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("output is UTF-8")
 }
 
-/// Run the program, which must fail as one that could not run, and return its message.
+/// Run the program, which must fail with exit status 2, and return its message.
 pub fn refuses(arguments: &[&str]) -> String {
     let output = residyn(arguments);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -42,7 +42,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are UTF-8")
 }
 
-/// The folder of measured logs, `$RESIDYN_DATA` or beside the project; loudly `None` where there is none.
+/// The folder of measured logs, `$RESIDYN_DATA` or beside the project; `None`, said loudly, where there is none.
 ///
 /// # Panics
 /// Where `RESIDYN_REQUIRE_DATA` is set and there is none.

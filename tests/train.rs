@@ -240,27 +240,23 @@ fn tuning_refuses_what_does_not_fit() {
     let acrobot = config("smoke/train-acrobot.toml");
     json(dir, &["train", "--config", &acrobot, "--out", "acrobot"]);
     let pendulum = config("smoke/tune-pendulum.toml");
-    let message = refused(
-        dir,
-        &["tune", "--checkpoint", "acrobot", "--config", &pendulum],
-    );
-    assert!(
-        message.contains("its system is acrobot, the model's is pendulum"),
-        "{message}"
-    );
-    let message = refused(
-        dir,
-        &["tune", "--checkpoint", "acrobot", "--config", &acrobot],
-    );
-    assert!(
-        message.contains("[start] and `hold` are for training from scratch"),
-        "{message}"
-    );
-    let message = refused(
-        dir,
-        &["tune", "--checkpoint", "none", "--config", &pendulum],
-    );
-    assert!(message.contains("not a checkpoint"), "{message}");
+    for (checkpoint, config, part) in [
+        (
+            "acrobot",
+            &pendulum,
+            "its system is acrobot, the model's is pendulum",
+        ),
+        (
+            "acrobot",
+            &acrobot,
+            "[start] and `hold` are for training from scratch",
+        ),
+        ("none", &pendulum, "not a checkpoint"),
+    ] {
+        let tune = ["tune", "--checkpoint", checkpoint, "--config", config];
+        let message = refused(dir, &tune);
+        assert!(message.contains(part), "{message}");
+    }
 }
 
 #[test]

@@ -1,4 +1,4 @@
-/* What an exported model predicts. For a model of a pendulum:
+/* Predicts with an exported model. For a model of a pendulum:
 
        cc -include pendulum.h '-DMODEL(name)=pendulum_##name' -DJOINTS=PENDULUM_JOINTS c.c -lm
 

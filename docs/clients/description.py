@@ -56,27 +56,25 @@ def derivative(state, torque, time):
 
 
 def advance(state, torque, time, h):
-    """One step, or substep, of the integrator."""
-    if model["integrator"] == "semi_implicit_euler":
-        rates = derivative(state, torque, time)
-        gain = h * rates[:, n:]
-        return state + np.hstack([h * (rates[:, :n] + gain), gain])
-    k1 = derivative(state, torque, time)
-    k2 = derivative(state + h / 2 * k1, torque, time + h / 2)
-    k3 = derivative(state + h / 2 * k2, torque, time + h / 2)
-    k4 = derivative(state + h * k3, torque, time + h)
-    return state + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+    """One substep: an explicit Runge-Kutta method whose stages each need the one before."""
+    inner = end = state
+    for after, reach, weight in equations["stages"]:
+        rates = derivative(inner, torque, time + after * h)
+        end = end + weight * h * rates
+        inner = state + reach * h * rates
+    if equations["semi_implicit"]:
+        end[:, :n] += h * h * rates[:, n:]
+    return end
 
 
 def rest(rows):
-    """No torque so far: for each filtered joint earlier torques, the newest first, and the lagged one."""
+    """At rest: for each filtered joint earlier torques, newest first, and the lagged torque."""
     return [[np.zeros((f["past"], rows)), np.zeros(rows)] for f in equations["held"]]
 
 
 def step(state, torque, time, memory):
     """The next state, and the memory of delayed and lagged torques."""
-    integrator, left = model["integrator"], []
-    substeps = integrator["fine"]["steps"] if "fine" in integrator else 1
+    substeps, left = equations["substeps"], []
     acting = np.repeat(torque[None], substeps, axis=0)
     for f, (past, lagged) in zip(equations["held"], memory):
         past = np.vstack([torque[:, f["joint"]], past])

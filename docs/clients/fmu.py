@@ -50,7 +50,7 @@ def rollout(fmu, state, held):
 
 
 def derivatives(fmu):
-    """Rates of model exchange."""
+    """The derivative in model exchange."""
     start(fmu, samples["start"])
     fmu.newDiscreteStates() if fmi2 else fmu.updateDiscreteStates()
     fmu.enterContinuousTimeMode()

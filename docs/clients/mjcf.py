@@ -13,8 +13,8 @@ model = mujoco.MjModel.from_xml_path(path)
 data = mujoco.MjData(model)
 n = model.nv
 
-# MuJoCo's dry friction is a constraint, which lets joints stick. The model that was exported has a smooth one: with that
-# in its place all the rest can be compared to the last digits.
+# In MuJoCo dry friction is a constraint, which lets joints stick; in the exported model it is smooth. With the smooth form in
+# its place, everything else can be compared exactly.
 level, model.dof_frictionloss[:] = model.dof_frictionloss.copy(), 0
 width = model.numeric("dry_friction_width").data
 
@@ -33,7 +33,7 @@ def begin(state):
 
 
 def derivative(state, torque):
-    """A drive with a lag takes the torque as the one that it has come to."""
+    """The torque acts: for a drive with a lag it is the lagged torque."""
     begin(state)
     data.ctrl = torque
     data.act = [t for t, address in zip(torque, model.actuator_actadr) if address >= 0]

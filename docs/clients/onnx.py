@@ -14,14 +14,14 @@ derivative = onnxruntime.InferenceSession(path.with_name(f"{path.stem}-derivativ
 
 
 def run(session, state, torque, time, memory=None):
-    """A batch of rows through a graph; it takes those of the inputs that it has."""
+    """Run a batch of rows through a graph, with those inputs that the graph has."""
     given = {"state": state, "torque": torque, "time": time, "memory": memory}
     given = {i.name: np.asarray(given[i.name], np.float32) for i in session.get_inputs()}
     return session.run(None, given)
 
 
 def rest(rows):
-    """The memory of delayed or lagged torques after no torque."""
+    """The memory of delayed or lagged torques at rest."""
     width = [i.shape[1] for i in step.get_inputs() if i.name == "memory"]
     return np.zeros((rows, *width), np.float32)
 

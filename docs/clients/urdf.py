@@ -14,8 +14,8 @@ model = mujoco.MjModel.from_xml_path(path)
 data = mujoco.MjData(model)
 n = model.nv
 
-# MuJoCo's dry friction is a constraint, which lets joints stick. The model that was exported has a smooth one: with that
-# in its place all the rest can be compared to the last digits.
+# In MuJoCo dry friction is a constraint, which lets joints stick; in the exported model it is smooth. With the smooth form in
+# its place, everything else can be compared exactly.
 level, model.dof_frictionloss[:] = model.dof_frictionloss.copy(), 0
 width = np.array(ElementTree.parse(path).find("residyn").get("dry_friction_width").split(), float)
 
@@ -27,7 +27,7 @@ def smooth_friction(_, data):
 if level.any():
     mujoco.set_mjcb_passive(smooth_friction)
 
-# The largest effort that the file gives for each joint.
+# Effort limits of the joints.
 limited = model.jnt_actfrclimited.astype(bool)
 least, most = (np.where(limited, bound, side) for bound, side in zip(model.jnt_actfrcrange.T, (-np.inf, np.inf)))
 

@@ -1,8 +1,9 @@
 use super::Rows;
 use crate::data::Log;
 use crate::lanes::{Arch, Simd, Vector, WithSimd};
+use crate::model::Dynamics;
 use crate::model::to_f32;
-use crate::model::{Commands, Dynamics};
+use crate::sim::Commands;
 
 /// What the filters of a model make of torques that are held over equal steps. Filters are linear: the mean torque that
 /// acts over a step is a weighted sum of the torques commanded over this step and those before.
@@ -29,7 +30,7 @@ impl Memory {
         let mut tau = vec![0.0; impulse.rows()];
         tau[1] = 1.0;
         impulse.tau.fill(tau);
-        let commands = Commands::of_log(equations, &equations.values(), &impulse);
+        let commands = Commands::of_log(equations, &impulse);
         let response = commands.acting_on(&impulse).tau;
         let weights = response
             .iter()

@@ -3,7 +3,8 @@ use super::{Network, Rows, W};
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use crate::model::to_f32;
-use crate::model::{Dynamics, Integrator, MlpWeights};
+use crate::model::{Dynamics, MlpWeights};
+use crate::sim::Integrator;
 
 /// Model, objective and integrator, ready to be rolled out from one state under many sequences of inputs.
 #[derive(Debug, Clone)]
@@ -16,9 +17,7 @@ pub struct Rollouts {
     networks: Vec<Added>,
     /// Where torques are filtered.
     memory: Option<Memory>,
-    stages: &'static [Stage],
-    semi_implicit: bool,
-    substeps: usize,
+    integrator: Integrator,
     step_s: f32,
 }
 
@@ -29,35 +28,6 @@ struct Added {
     first_rate: usize,
     first_feature: usize,
 }
-
-/// One evaluation within a step of an explicit Runge-Kutta method.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Stage {
-    /// When it is taken, as a share of the step.
-    time: f32,
-    /// How far the next stage lies along this one's slope, as a share of the step.
-    reach: f32,
-    /// Its weight in the step's slope.
-    weight: f32,
-}
-
-const fn stage(time: f32, reach: f32, weight: f32) -> Stage {
-    Stage {
-        time,
-        reach,
-        weight,
-    }
-}
-
-const EULER: &[Stage] = &[stage(0.0, 0.0, 1.0)];
-
-/// The classical method of order 4.
-const RK4: &[Stage] = &[
-    stage(0.0, 0.5, 1.0 / 6.0),
-    stage(0.5, 0.5, 1.0 / 3.0),
-    stage(0.5, 1.0, 1.0 / 3.0),
-    stage(1.0, 0.0, 1.0 / 6.0),
-];
 
 /// Working memory of [`W`] rollouts.
 #[derive(Debug, Clone)]
@@ -96,20 +66,13 @@ impl Rollouts {
                 .check(equations.joints)
                 .expect("networks of this system");
         }
-        let (stages, substeps) = match integrator {
-            Integrator::SemiImplicitEuler => (EULER, 1),
-            Integrator::Rk4 => (RK4, 1),
-            Integrator::Fine { steps } => (RK4, steps.get() as usize),
-        };
         Self {
             joints: equations.joints,
             program: whole(equations, networks, objective),
             parameters: equations.values().iter().map(|x| *x as f32).collect(),
             networks: added(equations.joints, networks),
             memory: Memory::new(equations, step_s),
-            stages,
-            semi_implicit: integrator == Integrator::SemiImplicitEuler,
-            substeps,
+            integrator,
             step_s: step_s as f32,
         }
     }
@@ -266,11 +229,11 @@ impl WithSimd for Run<'_, '_> {
         } = self;
         let Rollouts {
             joints: n,
-            stages,
-            substeps,
+            integrator,
             step_s,
             ..
         } = *block.rollouts;
+        let (stages, substeps) = (integrator.scheme().stages, integrator.substeps());
         let (steps, h) = (inputs.len() / n, step_s / substeps as f32);
         for (row, value) in block.next.iter_mut().zip(start) {
             *row = Rows::splat(*value);
@@ -282,7 +245,9 @@ impl WithSimd for Run<'_, '_> {
                 let begin_s = time_s + (step * substeps + substep) as f32 * h;
                 block.begin();
                 for (k, stage) in stages.iter().enumerate() {
-                    block.tape.moving()[3 * n] = Rows::splat(begin_s + stage.time * h);
+                    let [time, reach, weight] =
+                        [stage.time, stage.reach, stage.weight].map(|share| share as f32 * h);
+                    block.tape.moving()[3 * n] = Rows::splat(begin_s + time);
                     block.tape.run_on(simd);
                     if k == 0 && substep == 0 && step > 0 {
                         add(simd, returns, block.tape.output(2 * n), 1.0);
@@ -291,7 +256,7 @@ impl WithSimd for Run<'_, '_> {
                         }
                     }
                     block.rates(simd);
-                    block.advance(simd, stage.reach * h, stage.weight * h);
+                    block.advance(simd, reach, weight);
                 }
                 block.finish(simd, h);
             }
@@ -353,7 +318,7 @@ impl Block<'_> {
     /// The end of a substep of length `h`.
     #[inline(always)]
     fn finish<S: Simd>(&mut self, simd: S, h: f32) {
-        if self.rollouts.semi_implicit {
+        if self.rollouts.integrator.scheme().semi_implicit {
             let (positions, _) = self.next.split_at_mut(self.rollouts.joints);
             let accelerations = &self.rates[positions.len()..];
             for (position, acceleration) in positions.iter_mut().zip(accelerations) {

@@ -7,11 +7,11 @@ use super::{Rollouts, Rows, W};
 use crate::expr::SignForm;
 use crate::lanes::Row;
 use crate::model::{
-    Angles, Commands, Dynamics, FittedEffect, InputScaling, Integrator, LastLayer, Library,
-    MlpSettings, MlpWeights, ResidualOn, Rollout, StepTorque, with_residual,
+    Angles, Dynamics, FittedEffect, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
+    ResidualOn, with_residual,
 };
 use crate::plan::Objective;
-use crate::plant::Environment;
+use crate::sim::{Commands, Environment, Hold, Integrator, RK4, Simulator};
 
 const STEP_S: f64 = 0.02;
 const STEPS: usize = 12;
@@ -55,9 +55,8 @@ fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -
     let whole = networks.iter().fold(equations.clone(), |sum, mlp| {
         with_residual(&sum, mlp).unwrap()
     });
-    let values = whole.values();
     let exact = |lane: usize| {
-        let mut model = Environment::new(&whole, &values, integrator, STEP_S);
+        let mut model = Environment::new(&whole, integrator, STEP_S);
         let mut state: Vec<f64> = start.iter().copied().map(f64::from).collect();
         let mut sum = 0.0;
         for step in 0..STEPS {
@@ -81,13 +80,6 @@ fn both(equations: &Dynamics, networks: &[MlpWeights], integrator: Integrator) -
 
 #[test]
 fn a_block_returns_what_single_rollouts_in_f64_do() {
-    let integrators = [
-        Integrator::SemiImplicitEuler,
-        Integrator::Rk4,
-        Integrator::Fine {
-            steps: 3.try_into().unwrap(),
-        },
-    ];
     for name in ["pendulum", "acrobot", "cartpole"] {
         let equations = equations(name);
         let mut networks = vec![Vec::new()];
@@ -97,7 +89,11 @@ fn a_block_returns_what_single_rollouts_in_f64_do() {
             }
         }
         networks.push([networks[1].clone(), networks[4].clone()].concat());
-        for (networks, integrator) in networks.iter().flat_map(|n| integrators.map(|i| (n, i))) {
+        let each = Integrator::each();
+        for (networks, integrator) in networks
+            .iter()
+            .flat_map(|n| each.iter().map(move |i| (n, *i)))
+        {
             let [found, wanted] = both(&equations, networks, integrator);
             for (found, wanted) in found.iter().zip(&wanted) {
                 // Twelve rewards of order one in f32.
@@ -173,7 +169,7 @@ fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
 }
 
 fn filtered_rollouts(equations: &Dynamics, objective: &Objective) -> Rollouts {
-    Rollouts::new(equations, &[], objective.program(), Integrator::Rk4, STEP_S)
+    Rollouts::new(equations, &[], objective.program(), Integrator::RK4, STEP_S)
 }
 
 #[test]
@@ -245,17 +241,15 @@ fn filtered_return(
     let tau: Vec<Vec<f64>> = (0..model.joints)
         .map(|joint| rows.iter().map(|tau| tau[joint]).collect())
         .collect();
-    let values = model.values();
-    let commands = Commands::new(model, &values, &time[..rows.len()], &tau);
-    let mut rollout = Rollout::<f64, 1>::new(model, &values);
-    let mut state: Vec<_> = start.iter().map(|x| Row([*x])).collect();
+    let commands = Commands::new(model, &time[..rows.len()], &tau);
+    let mut simulator = Simulator::new(model, RK4);
+    simulator.put(start);
     let mut sum = 0.0;
     for row in past.len()..rows.len() {
         let held: Vec<_> = rows[row].iter().map(|x| Row([*x])).collect();
-        let (from, to) = (Row([time[row]]), Row([time[row + 1]]));
-        let acting = StepTorque::new([&commands], &held, from, to, 1).mean;
-        rollout.advance(&mut state, &acting, from, Row([STEP_S]), 1);
-        let seen = [state.as_slice(), &held, &[to]].concat();
+        let [from, to] = [row, row + 1].map(|row| Row([time[row]]));
+        simulator.advance(&Hold::lasting([&commands], &held, from, STEP_S, 1));
+        let seen = [simulator.state.as_slice(), &held, &[to]].concat();
         let seen: Vec<f64> = seen.iter().map(|row| row[0]).collect();
         sum += objective.program().eval(&seen)[0];
     }

@@ -203,9 +203,9 @@ fn one(
 ) -> Result<Entry> {
     let seed = arguments.common.seed;
     let mut rng = stream(seed, Purpose::Judge, number);
-    let (dynamics, values) = (plant.dynamics(), plant.values());
+    let dynamics = plant.true_dynamics();
     let start = task.draw_start(&mut rng);
-    let mut rig = task.rig(plant, &dynamics, &values, &start);
+    let mut rig = task.rig(plant, &dynamics, &start);
     let draws = stream(seed, Purpose::JudgePlan, number);
     with_controller(predictor, task, task.replan, &draws, |controller| {
         let mut timed = Timed {

@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
-use crate::model::{Integrator, Library};
+use crate::model::Library;
+use crate::sim::Integrator;
 use crate::train::Manifest;
 
 /// Write a model for other programs, and compare their predictions with its own
@@ -117,7 +118,7 @@ fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<Expo
     let system = library.system(file)?;
     Ok(ExportModel::of_system(
         &system,
-        arguments.integrator.unwrap_or(Integrator::Rk4),
+        arguments.integrator.unwrap_or(Integrator::RK4),
         arguments.step.unwrap_or(STEP_S),
         json!({"config": {"model": file}, "seed": arguments.common.seed}),
     ))

@@ -13,7 +13,8 @@ use super::refine::Refined;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{Dynamics, Origin, absorbed, as_modelled};
+use crate::model::{Dynamics, Origin, absorbed};
+use crate::sim::{Point, as_modelled};
 
 /// How the residual network is trained.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,8 +133,8 @@ fn task(study: &Study<'_>, model: &Fitted, settings: LearnSettings) -> ResidualT
         length_s: settings.stretch_s,
     };
     let of_log = |(k, log): (usize, &Log)| {
-        let values = model.fit.values_of_log(k);
-        trajectories(&as_modelled(&model.dynamics, &values, log), thinning)
+        let point = Point::new(&model.dynamics, model.fit.values_of_log(k));
+        trajectories(&as_modelled(&point, log), thinning)
     };
     let stretches = (study.logs.iter().enumerate()).flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Meter;
-use crate::model::{Dynamics, Integrator};
+use crate::model::Dynamics;
 use crate::plan::{Objective, Settings};
 use crate::plant::{Noise, Plant, Rig};
+use crate::sim::Integrator;
 
 /// What a plant is to do, and how to plan for it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -164,21 +165,15 @@ impl Task {
             .collect()
     }
 
-    /// `plant` at a true start state, with the integrator and sensor noise of the task; `dynamics` and `values` are the
-    /// plant's own.
+    /// `plant` at a true start state, with the integrator and sensor noise of the task; `dynamics` are the plant's
+    /// [own](Plant::true_dynamics).
     ///
     /// # Panics
     /// When one of them is of another system.
-    pub fn rig<'d>(
-        &self,
-        plant: &Plant,
-        dynamics: &'d Dynamics,
-        values: &[f64],
-        start: &[f64],
-    ) -> Rig<'d> {
+    pub fn rig<'d>(&self, plant: &Plant, dynamics: &'d Dynamics, start: &[f64]) -> Rig<'d> {
         let PlantSettings { integrator, noise } = self.plant;
         let start = plant.as_read(start);
-        Rig::new(dynamics, values, &start, integrator, self.step_s, noise)
+        Rig::new(dynamics, &start, integrator, self.step_s, noise)
     }
 
     /// Check the task for a plant of `joints` joints.

@@ -7,7 +7,8 @@ use super::summary::{Summary, summarise};
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
 use crate::lanes::Row;
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
+use crate::model::Dynamics;
+use crate::sim::{Commands, PREDICTION_S, Point, RK4, Simulator, with_own_angles};
 
 /// Windows side by side in one rollout.
 const LANES: usize = 8;
@@ -15,9 +16,8 @@ const LANES: usize = 8;
 const SENSIBLE: f64 = 1e4;
 /// Halving the step may change no number by more than this share.
 const STEP_TOLERANCE: f64 = 1e-3;
-/// First and last length of the integrator's steps in s.
-pub(super) const LONGEST_STEP_S: f64 = 1e-3;
-const SHORTEST_STEP_S: f64 = 1e-3 / 64.0;
+/// Steps are halved no further than this, in s.
+const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
 
 /// The open-loop error of `dynamics` with parameters `values` on `logs`. `values` may differ by log (own
 /// sensor offsets, say): it is asked for each.
@@ -30,7 +30,7 @@ pub fn assess<'v>(
     logs: &[Log],
     horizons_s: &[f64],
 ) -> Assessment {
-    let mut step_s = LONGEST_STEP_S;
+    let mut step_s = PREDICTION_S;
     let mut coarse = run(dynamics, &values, logs, horizons_s, step_s);
     loop {
         let fine = run(dynamics, &values, logs, horizons_s, step_s / 2.0);
@@ -54,11 +54,8 @@ fn run<'v>(
     horizons_s: &[f64],
     step_s: f64,
 ) -> Vec<OpenLoop> {
-    let commands: Vec<Commands<'_>> = (logs.iter().enumerate())
-        .map(|(index, log)| Commands::of_log(dynamics, values(index), log))
-        .collect();
-    let own: Vec<Cow<'_, Log>> = (logs.iter().enumerate())
-        .map(|(index, log)| with_own_angles(dynamics, values(index), log))
+    let replays: Vec<Replay<'_>> = (logs.iter().enumerate())
+        .map(|(index, log)| Replay::new(Point::new(dynamics, values(index)), log))
         .collect();
     let one = |&horizon_s: &f64| {
         let windows: Vec<Window> = logs
@@ -72,17 +69,7 @@ fn run<'v>(
             .collect();
         let errors: Vec<Vec<WindowError>> = packs
             .par_iter()
-            .map(|pack| {
-                roll(
-                    dynamics,
-                    values(pack[0].log),
-                    &commands[pack[0].log],
-                    &logs[pack[0].log],
-                    &own[pack[0].log],
-                    pack,
-                    step_s,
-                )
-            })
+            .map(|pack| replays[pack[0].log].errors(pack, step_s))
             .collect();
         OpenLoop {
             horizon_s,
@@ -132,56 +119,61 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
         .collect()
 }
 
-/// Integrate up to [`LANES`] windows of one log, started from `own`, the log with the rig's own angles.
-fn roll(
-    dynamics: &Dynamics,
-    values: &[f64],
-    commands: &Commands<'_>,
-    log: &Log,
-    own: &Log,
-    pack: &[Window],
-    step_s: f64,
-) -> Vec<WindowError> {
-    let n = dynamics.joints;
-    let half_width = half_width_s(log.median_step());
-    let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
-    let starts: Vec<Vec<f64>> = pack
-        .iter()
-        .map(|w| initial_state(own, half_width, w.first).expect("windows() checks this"))
-        .collect();
-    let mut state: Vec<Row<f64, LANES>> = (0..2 * n)
-        .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
-        .collect();
-    let mut errors: Vec<WindowError> = pack.iter().map(|w| WindowError::none(w, log, n)).collect();
-    let mut rollout = Rollout::<f64, LANES>::new(dynamics, values);
-    let mut sensors = Sensors::<LANES>::new(dynamics, values);
-    let before = |at: [usize; LANES]| move || Commands::just_before([commands; LANES], at);
-    let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
-    for row in 0..rows - 1 {
-        let at: [usize; LANES] =
-            std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
-        let time = Row(at.map(|row| log.time[row]));
-        let end = Row(at.map(|row| log.time[row + 1]));
-        let dt = Row(std::array::from_fn(|lane| end[lane] - time[lane]));
-        let tau: Vec<Row<f64, LANES>> = (log.tau.iter())
-            .map(|tau| Row(at.map(|row| tau[row])))
-            .collect();
-        let longest = dt.iter().fold(0.0_f64, |a: f64, b: &f64| a.max(*b));
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // a small positive number
-        let substeps = ((longest / step_s - 1e-6).ceil() as usize).max(1);
-        let torque = StepTorque::new([commands; LANES], &tau, time, end, substeps);
-        rollout.advance(&mut state, &torque.mean, time, dt, substeps);
-        let counts = |l: usize| pack[l].first + row < pack[l].last;
-        for l in (0..pack.len()).filter(|l| counts(*l)) {
-            errors[l].hold(&mut state, l);
-        }
-        let shown = sensors.show(&state, before(at.map(|row| row + 1)), end);
-        for l in (0..pack.len()).filter(|l| counts(*l)) {
-            errors[l].add(shown, &state[n..], l, log, pack[l].first + row + 1);
+/// A log and a model at its values there.
+struct Replay<'l> {
+    model: Point<'l>,
+    commands: Commands<'l>,
+    log: &'l Log,
+    /// The log with the rig's own angles, from which start states are estimated.
+    own: Cow<'l, Log>,
+}
+
+impl<'l> Replay<'l> {
+    fn new(model: Point<'l>, log: &'l Log) -> Self {
+        Self {
+            commands: Commands::of_log(&model, log),
+            own: with_own_angles(&model, log),
+            model,
+            log,
         }
     }
-    errors
+
+    /// The errors of up to [`LANES`] windows of the log, in substeps of at most `step_s`.
+    fn errors(&self, pack: &[Window], step_s: f64) -> Vec<WindowError> {
+        let (log, n) = (self.log, self.model.dynamics.joints);
+        let commands = [&self.commands; LANES];
+        let lane = |lane: usize| pack[lane.min(pack.len() - 1)];
+        let mut simulator = Simulator::<LANES>::new(&self.model, RK4);
+        simulator.state = self.starts(pack);
+        let mut errors: Vec<WindowError> =
+            pack.iter().map(|w| WindowError::none(w, log, n)).collect();
+        let rows = pack.iter().map(Window::rows).max().unwrap_or(0);
+        for row in 0..rows - 1 {
+            let at: [usize; LANES] =
+                std::array::from_fn(|l| (lane(l).first + row).min(lane(l).last - 1));
+            simulator.follow(commands, at, step_s);
+            let counts = |l: usize| pack[l].first + row < pack[l].last;
+            for l in (0..pack.len()).filter(|l| counts(*l)) {
+                errors[l].hold(&mut simulator.state, l);
+            }
+            let shown = simulator.shown(commands, at.map(|row| row + 1));
+            for l in (0..pack.len()).filter(|l| counts(*l)) {
+                errors[l].add(shown, l, log, pack[l].first + row + 1);
+            }
+        }
+        errors
+    }
+
+    /// The states (`[2n][lane]`) at the windows' starts; empty lanes repeat the last.
+    fn starts(&self, pack: &[Window]) -> Vec<Row<f64, LANES>> {
+        let half_width = half_width_s(self.log.median_step());
+        let starts: Vec<Vec<f64>> = (pack.iter())
+            .map(|w| initial_state(&self.own, half_width, w.first).expect("windows() checks this"))
+            .collect();
+        (0..self.model.dynamics.states())
+            .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
+            .collect()
+    }
 }
 
 impl WindowError {
@@ -214,8 +206,7 @@ impl WindowError {
     /// Compare angles shown and velocities with a row of the log.
     fn add(
         &mut self,
-        angles: &[Row<f64, LANES>],
-        velocities: &[Row<f64, LANES>],
+        [angles, velocities]: [&[Row<f64, LANES>]; 2],
         lane: usize,
         log: &Log,
         row: usize,

@@ -1,7 +1,7 @@
 use crate::data::{Log, half_width_s};
 use crate::identify::{Window, initial_state};
-use crate::lanes::Row;
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque, with_own_angles};
+use crate::model::Dynamics;
+use crate::sim::{Commands, PREDICTION_S, Point, RK4, Simulator, with_own_angles};
 
 /// One open-loop prediction: times in s and, for each joint, angles in rad (or m).
 #[derive(Debug, Clone, PartialEq)]
@@ -14,8 +14,9 @@ pub struct Trace {
 /// Predictions of `horizon_s` seconds one after the other along a log, each started from the log: what a
 /// picture of an open-loop error shows.
 pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) -> Vec<Trace> {
-    let commands = Commands::of_log(dynamics, values, log);
-    let own = with_own_angles(dynamics, values, log);
+    let model = Point::new(dynamics, values);
+    let commands = Commands::of_log(&model, log);
+    let own = with_own_angles(&model, log);
     // Windows for the error overlap by half; a picture wants each second one.
     super::open_loop::windows(0, log, horizon_s)
         .iter()
@@ -23,42 +24,32 @@ pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) ->
         .map(|window| {
             let start = initial_state(&own, half_width_s(log.median_step()), window.first)
                 .expect("windows() checks this");
-            trace(dynamics, values, &commands, log, window, &start)
+            trace(&model, &commands, log, window, &start)
         })
         .collect()
 }
 
 fn trace(
-    dynamics: &Dynamics,
-    values: &[f64],
+    model: &Point<'_>,
     commands: &Commands<'_>,
     log: &Log,
     window: &Window,
     start: &[f64],
 ) -> Trace {
-    let mut state: Vec<Row<f64, 1>> = start.iter().map(|value| Row([*value])).collect();
-    let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
-    let mut sensors = Sensors::<1>::new(dynamics, values);
-    let before = |row: usize| move || Commands::just_before([commands], [row]);
+    let mut simulator = Simulator::new(model, RK4);
+    simulator.put(start);
     let mut trace = Trace {
         time: Vec::new(),
-        q: vec![Vec::new(); dynamics.joints],
+        q: vec![Vec::new(); log.q.len()],
     };
     for row in window.first..=window.last {
-        trace.time.push(log.time[row]);
-        let shown = sensors.show(&state, before(row), Row([log.time[row]]));
-        for (q, value) in trace.q.iter_mut().zip(shown) {
-            q.push(value[0]);
+        if row > window.first {
+            simulator.follow([commands], [row - 1], PREDICTION_S);
         }
-        if row < window.last {
-            let (from, to) = (log.time[row], log.time[row + 1]);
-            let dt = to - from;
-            let tau: Vec<Row<f64, 1>> = log.tau.iter().map(|tau| Row([tau[row]])).collect();
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            // a small positive number
-            let substeps = ((dt / super::open_loop::LONGEST_STEP_S).ceil() as usize).max(1);
-            let torque = StepTorque::new([commands], &tau, Row([from]), Row([to]), substeps);
-            rollout.advance(&mut state, &torque.mean, Row([from]), Row([dt]), substeps);
+        trace.time.push(log.time[row]);
+        let [angles, _] = simulator.shown([commands], [row]);
+        for (q, angle) in trace.q.iter_mut().zip(angles) {
+            q.push(angle[0]);
         }
     }
     trace

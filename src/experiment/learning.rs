@@ -6,7 +6,8 @@ use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
-use crate::model::{Dynamics, Integrator, Library, Origin, System};
+use crate::model::{Dynamics, Library, Origin, System};
+use crate::sim::Integrator;
 use crate::train::{Backend, Checkpoint, HybridModel};
 
 /// A method with all that it names read.

@@ -46,7 +46,7 @@ impl DiscreteFilter {
             let lag = model.filter(joint, CommandFilter::Lag);
             (delay.is_some() || lag.is_some()).then(|| {
                 let delay = delay.unwrap_or(0.0);
-                Self::new(joint, delay, lag, model.step_s, model.integrator.parts())
+                Self::new(joint, delay, lag, model.step_s, model.integrator.substeps())
             })
         };
         (0..model.joints()).filter_map(of_joint).collect()

@@ -7,9 +7,9 @@ use serde_json::json;
 use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use crate::expr::Op;
 use crate::model::{
-    CommandFilter, Dynamics, Integrator, MlpWeights, ModelWeights, NetworkError, Parameter, System,
-    nothing_but,
+    CommandFilter, Dynamics, MlpWeights, ModelWeights, NetworkError, Parameter, System, nothing_but,
 };
+use crate::sim::Integrator;
 
 /// A model as every format reads it: equations with their values, the networks whose outputs are added to their
 /// derivative, and the step.

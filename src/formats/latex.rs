@@ -6,7 +6,7 @@ use std::path::Path;
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
 use crate::expr::latex_name;
-use crate::model::{Angles, Entry, FittedEffect, Integrator, MlpWeights, Parameter, ResidualOn};
+use crate::model::{Angles, Entry, FittedEffect, MlpWeights, Parameter, ResidualOn};
 use crate::report::digits;
 
 pub(super) const FORMAT: Format = Format {
@@ -197,15 +197,14 @@ fn network_in_words(what: &str, network: &MlpWeights) -> String {
 }
 
 fn step(model: &ExportModel) -> String {
-    let integrator = match model.integrator {
-        Integrator::SemiImplicitEuler => "one step of the semi-implicit Euler method".to_owned(),
-        Integrator::Rk4 => "one step of the classical Runge--Kutta method".to_owned(),
-        Integrator::Fine { steps } => {
-            format!("{steps} equal steps of the classical Runge--Kutta method")
-        }
+    let steps = match model.integrator.substeps() {
+        1 => "one step".to_owned(),
+        substeps => format!("{substeps} equal steps"),
     };
+    let scheme = model.integrator.scheme().title;
+    let scheme = scheme.replace("Runge-Kutta", "Runge--Kutta");
     format!(
-        "\\subsection*{{Step}}\n\nTorques are held for {} s, over which the motion is integrated by {integrator}.\n\n",
+        "\\subsection*{{Step}}\n\nTorques are held for {} s, over which the motion is integrated by {steps} of the {scheme}.\n\n",
         model.step_s
     )
 }

@@ -1,29 +1,32 @@
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Row, Simd, WithSimd};
-use crate::model::{Dynamics, StepTorque};
+use crate::model::Dynamics;
+use crate::sim::{Hold, Scheme, Stage, StepTorque};
 
-/// Lanes of the identification: one AVX-512 register, two AVX2 registers of f64.
+/// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
 pub(super) const LANES: usize = 16;
 pub(super) type Lane = Row<f64, LANES>;
 
-/// What is free in each window, besides the parameters that all windows share.
+/// The free values of each window, besides the parameters that all windows share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Local {
     /// The state at the window's start.
     State,
-    /// That, and a constant generalised force a joint: what the model lacks there.
+    /// The start state and a constant generalised force per joint, which stands for what the model lacks.
     StateAndForce,
 }
 
-/// The program of a model's accelerations with their derivatives by states, shared parameters and forces.
+/// The tangent-linear model: accelerations and their derivatives with respect to states, shared parameters and forces,
+/// as one program.
 ///
-/// Outputs: accelerations (n), for each joint their derivatives by `q` and `qd`, then for each active parameter and,
-/// if they are free, each force their derivatives by it. The identification is for physics: dq/dt = qd. Inputs are the
-/// model's; before its parameters stand the derivatives of the torques by the parameters of its filters.
+/// Outputs: the n accelerations; per joint the derivatives of its acceleration with respect to `q` and `qd`; per active
+/// parameter, and per force if forces are free, the derivatives of all accelerations. dq/dt = qd is assumed. Inputs:
+/// those of the model, with the derivatives of the torques with respect to filter parameters inserted before its
+/// parameters.
 pub(super) struct Tangent {
     pub program: Program,
-    /// Where sensors show other angles than the rig's own: those (n), then for each joint their derivatives by `q`
-    /// and `qd`, then for each joint those by active parameters. The inputs are the model's.
+    /// The sensor model, if it is not the identity: the n measured angles; per joint their derivatives with respect to
+    /// `q` and `qd`; per joint those with respect to active parameters. Inputs: those of the model.
     pub reading: Option<Program>,
     pub joints: usize,
     /// Number of the model's filters.
@@ -75,13 +78,13 @@ impl Tangent {
         }
     }
 
-    /// Columns of the sensitivities: shared parameters, then what is local to a window.
+    /// Columns of the sensitivities: shared parameters, then the window's own free values.
     pub fn columns(&self) -> usize {
         self.active.len() + self.locals()
     }
 
-    /// The output that holds the direct derivatives by a column's value, where there are any; the first column is
-    /// the state itself, whose slopes are the accelerations.
+    /// The first output with the partial derivatives df/dc of a column c, or `None` where they are zero. Column 0 is the
+    /// state itself, whose slopes are the accelerations.
     #[inline(always)]
     fn direct(&self, column: usize) -> Option<usize> {
         let (n, shared) = (self.joints, self.active.len());
@@ -98,7 +101,7 @@ impl Tangent {
         3 * self.joints + 1 + self.filters
     }
 
-    /// Free values of one window.
+    /// Number of free values of one window.
     pub fn locals(&self) -> usize {
         match self.local {
             Local::State => 2 * self.joints,
@@ -107,7 +110,7 @@ impl Tangent {
     }
 }
 
-/// See [`Tangent::reading`].
+/// The program of [`Tangent::reading`].
 fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
     let n = dynamics.joints;
     let mut graph = Graph::new();
@@ -120,34 +123,29 @@ fn reading(dynamics: &Dynamics, active: &[usize]) -> Option<Program> {
     Some(graph.finish(&[shown, by_state, by_parameter].concat()))
 }
 
-/// Integrates states and their sensitivities together, by the classical Runge-Kutta method of order 4.
+/// Integrates the states and their sensitivities together.
 ///
-/// The sensitivity of column c obeys dS/dt = (df/dx) S + df/dc; rows are angles, then velocities.
-pub(super) struct Flow<'t> {
+/// The sensitivity S of the state with respect to a column c obeys dS/dt = (df/ds) S + df/dc. Rows are positions, then
+/// velocities.
+pub(super) struct TangentStepper<'t> {
     tangent: &'t Tangent,
+    scheme: &'static Scheme,
+    torque: StepTorque<LANES>,
     tape: Tape<'t, f64, LANES>,
-    /// States, then for each column their sensitivities: 2n rows each.
+    /// The state, then the sensitivity of each column: 2n rows each.
     now: Vec<Lane>,
     inner: Vec<Lane>,
     next: Vec<Lane>,
     sum: Vec<Lane>,
-    /// Derivatives of the accelerations by states, `[joint * 2n + state]`.
+    /// Derivatives of the accelerations with respect to the state, `[joint * 2n + state]`.
     by_state: Vec<Lane>,
     reading: Option<Tape<'t, f64, LANES>>,
-    /// Angles shown, then `[joint * columns + column]` their sensitivities.
+    /// The measured angles, then their sensitivities `[joint * columns + column]`.
     shown: Vec<Lane>,
 }
 
-/// The classical Runge-Kutta method: time of the stage, weight in the sum, reach of the next stage.
-const STAGES: [(f64, f64, f64); 4] = [
-    (0.0, 1.0 / 6.0, 0.5),
-    (0.5, 1.0 / 3.0, 0.5),
-    (0.5, 1.0 / 3.0, 1.0),
-    (1.0, 1.0 / 6.0, 0.0),
-];
-
-impl<'t> Flow<'t> {
-    pub fn new(tangent: &'t Tangent, values: &[f64]) -> Self {
+impl<'t> TangentStepper<'t> {
+    pub fn new(tangent: &'t Tangent, values: &[f64], scheme: &'static Scheme) -> Self {
         let n = tangent.joints;
         let first = tangent.first_parameter();
         let mut tape = tangent.program.tape_with_held(first);
@@ -167,6 +165,8 @@ impl<'t> Flow<'t> {
         let size = 2 * n * (1 + tangent.columns());
         Self {
             tangent,
+            scheme,
+            torque: StepTorque::default(),
             tape,
             now: rows(size),
             inner: rows(size),
@@ -178,7 +178,7 @@ impl<'t> Flow<'t> {
         }
     }
 
-    /// Let a parameter have another value in one lane.
+    /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
         self.tape.inputs()[self.tangent.first_parameter() + parameter][lane] = value;
         if let Some(reading) = &mut self.reading {
@@ -186,8 +186,8 @@ impl<'t> Flow<'t> {
         }
     }
 
-    /// The angles that the sensors show and their sensitivities (`[joint * columns + column]`), when the torque
-    /// until now was `tau`.
+    /// The measured angles (`[n]`) and their sensitivities (`[joint * columns + column]`). `tau` is the torque that acted
+    /// until now.
     pub fn shown(&mut self, tau: impl FnOnce() -> Vec<Lane>, time: Lane) -> (&[Lane], &[Lane]) {
         let (n, columns) = (self.tangent.joints, self.tangent.columns());
         let (state, sensitivities) = self.now.split_at(2 * n);
@@ -227,7 +227,7 @@ impl<'t> Flow<'t> {
         (angles, slopes)
     }
 
-    /// Start at these states; only the columns of the initial state are sensitive to them.
+    /// Start at these states (`[2n][lane]`). Their sensitivity to themselves is the identity, all others are zero.
     pub fn start(&mut self, states: &[Lane]) {
         let (n, shared) = (self.tangent.joints, self.tangent.active.len());
         self.now.fill(Row::splat(0.0));
@@ -237,28 +237,27 @@ impl<'t> Flow<'t> {
         }
     }
 
-    /// As [`Rollout::advance`](crate::model::Rollout::advance), with the torque's derivatives by the parameters
-    /// of filters.
-    pub fn advance(&mut self, torque: &StepTorque<LANES>, time: Lane, dt: Lane, substeps: usize) {
+    /// Move states and sensitivities to the end of a hold.
+    pub fn advance(&mut self, hold: &Hold<'_, LANES>) {
+        self.torque.fill(hold);
         Lane::dispatch(Advance {
-            flow: self,
-            torque,
-            time,
-            dt,
-            substeps,
+            stepper: self,
+            time: hold.from,
+            length: hold.length,
+            substeps: hold.substeps,
         });
     }
 
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
         let n = self.tangent.joints;
-        for (k, stage) in STAGES.into_iter().enumerate() {
+        for (k, stage) in self.scheme.stages.iter().enumerate() {
             let inner = if k == 0 { &self.now } else { &self.inner };
             let inputs = self.tape.moving();
             inputs[..2 * n].copy_from_slice(&inner[..2 * n]);
             for part in 0..Lane::parts::<S>() {
                 let h = h.get(simd, part);
-                inputs[3 * n].set(part, h.mul_add(h.like(stage.0), time.get(simd, part)));
+                inputs[3 * n].set(part, h.mul_add(h.like(stage.time), time.get(simd, part)));
             }
             self.tape.run_on(simd);
             for (k, slope) in self.by_state.iter_mut().enumerate() {
@@ -267,13 +266,35 @@ impl<'t> Flow<'t> {
             self.stage(simd, h, k == 0, stage);
             std::mem::swap(&mut self.inner, &mut self.next);
         }
+        if self.scheme.semi_implicit {
+            self.move_with_new_velocities(simd, h);
+        }
         std::mem::swap(&mut self.now, &mut self.sum);
     }
 
-    /// Add a stage's slopes to the sums, and find where they lead to.
+    /// Move positions with the new velocities: q += h (v' - v), and the same for the sensitivities.
     #[inline(always)]
-    fn stage<S: Simd>(&mut self, simd: S, h: &Lane, is_first: bool, stage: (f64, f64, f64)) {
-        // Numbers that the compiler knows: loops over so few rows vanish.
+    fn move_with_new_velocities<S: Simd>(&mut self, simd: S, h: &Lane) {
+        let n = self.tangent.joints;
+        let columns = self
+            .now
+            .chunks_exact(2 * n)
+            .zip(self.sum.chunks_exact_mut(2 * n));
+        for (now, sum) in columns {
+            for part in 0..Lane::parts::<S>() {
+                for j in 0..n {
+                    let gain = sum[n + j].get(simd, part) - now[n + j].get(simd, part);
+                    let moved = gain.mul_add(h.get(simd, part), sum[j].get(simd, part));
+                    sum[j].set(part, moved);
+                }
+            }
+        }
+    }
+
+    /// Accumulate the weighted slopes of a stage, and compute the states of the next.
+    #[inline(always)]
+    fn stage<S: Simd>(&mut self, simd: S, h: &Lane, is_first: bool, stage: &Stage) {
+        // With the number of joints known at compile time, the loops over rows are unrolled.
         match self.tangent.joints {
             1 => self.stage_of(simd, 1, h, is_first, stage),
             2 => self.stage_of(simd, 2, h, is_first, stage),
@@ -282,14 +303,7 @@ impl<'t> Flow<'t> {
     }
 
     #[inline(always)]
-    fn stage_of<S: Simd>(
-        &mut self,
-        simd: S,
-        n: usize,
-        h: &Lane,
-        is_first: bool,
-        (_, weight, reach): (f64, f64, f64),
-    ) {
+    fn stage_of<S: Simd>(&mut self, simd: S, n: usize, h: &Lane, is_first: bool, stage: &Stage) {
         let rows = 2 * n;
         let inner = if is_first { &self.now } else { &self.inner };
         let columns = (self.now.chunks_exact(rows))
@@ -301,7 +315,7 @@ impl<'t> Flow<'t> {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
                 let h = h.get(simd, part);
-                let (weighed, reached) = (h * h.like(weight), h * h.like(reach));
+                let (weighed, reached) = (h * h.like(stage.weight), h * h.like(stage.reach));
                 for row in 0..rows {
                     let slope = if row < n {
                         inner[n + row].get(simd, part)
@@ -333,10 +347,9 @@ impl<'t> Flow<'t> {
 }
 
 struct Advance<'a, 't> {
-    flow: &'a mut Flow<'t>,
-    torque: &'a StepTorque<LANES>,
+    stepper: &'a mut TangentStepper<'t>,
     time: Lane,
-    dt: Lane,
+    length: Lane,
     substeps: usize,
 }
 
@@ -345,17 +358,85 @@ impl WithSimd for Advance<'_, '_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let n = self.flow.tangent.joints;
+        let n = self.stepper.tangent.joints;
         #[allow(clippy::cast_precision_loss)] // few substeps
-        let h = Row(self.dt.map(|dt| dt / self.substeps as f64));
+        let h = Row(self.length.map(|length| length / self.substeps as f64));
         for part in 0..self.substeps {
-            let (tau, slopes) = self.torque.part(n, part);
-            let inputs = self.flow.tape.moving();
+            let (tau, slopes) = self.stepper.torque.part(n, part);
+            let inputs = self.stepper.tape.moving();
             inputs[2 * n..3 * n].copy_from_slice(tau);
             inputs[3 * n + 1..].copy_from_slice(slopes);
-            self.flow.step(simd, &self.time, &h);
+            self.stepper.step(simd, &self.time, &h);
             for lane in 0..LANES {
                 self.time[lane] += h[lane];
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{LANES, Local, Tangent, TangentStepper};
+    use crate::expr::SignForm;
+    use crate::lanes::Row;
+    use crate::model::Library;
+    use crate::sim::{Commands, Hold, Point, SCHEMES, Simulator};
+
+    const START: [f64; 4] = [0.7, -0.4, 1.5, -2.0];
+    const HELD: [f64; 2] = [0.5, -1.5];
+    const SUBSTEPS: usize = 3;
+
+    #[test]
+    fn sensitivities_are_the_slopes_of_every_schemes_steps() {
+        let acrobot = Library::built_in().system(Path::new("acrobot")).unwrap();
+        let model = acrobot.dynamics(&[SignForm::Exact; 2]);
+        let active: Vec<usize> = (0..model.parameters.len()).collect();
+        let tangent = Tangent::new(&model, &active, Local::State);
+        let (time, tau) = ([0.0], HELD.map(|tau| vec![tau]));
+        let commands = Commands::new(&model, &time, &tau);
+        for scheme in SCHEMES {
+            let end = |values: &[f64], start: &[f64]| {
+                let mut simulator = Simulator::<1>::new(Point::new(&model, values), scheme);
+                simulator.put(start);
+                let (held, from) = (HELD.map(|tau| Row([tau])), Row([0.2]));
+                simulator.advance(&Hold::lasting([&commands], &held, from, 0.1, SUBSTEPS));
+                simulator.state.clone()
+            };
+            let values = model.values();
+            let mut stepper = TangentStepper::new(&tangent, &values, scheme);
+            stepper.start(&START.map(Row::splat));
+            let (held, from) = (HELD.map(Row::splat), Row::splat(0.2));
+            stepper.advance(&Hold::lasting(
+                [&commands; LANES],
+                &held,
+                from,
+                0.1,
+                SUBSTEPS,
+            ));
+            for (row, state) in end(&values, &START).iter().enumerate() {
+                let off = (stepper.now[row][3] - state[0]).abs();
+                assert!(off < 1e-12, "{}, state {row}: {off}", scheme.name);
+            }
+            for column in 0..tangent.columns() {
+                let moved = |by: f64| {
+                    let (mut values, mut start) = (values.clone(), START);
+                    match values.get_mut(column) {
+                        Some(value) => *value += by,
+                        None => start[column - active.len()] += by,
+                    }
+                    end(&values, &start)
+                };
+                for (row, (after, before)) in moved(1e-6).iter().zip(&moved(-1e-6)).enumerate() {
+                    let wanted = (after[0] - before[0]) / 2e-6;
+                    let found = stepper.now[4 * (1 + column) + row][3];
+                    assert!(
+                        (found - wanted).abs() < 1e-8,
+                        "{}, column {column}, state {row}: {found} {wanted}",
+                        scheme.name
+                    );
+                }
             }
         }
     }

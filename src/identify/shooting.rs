@@ -1,42 +1,39 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::sensitivity::{Flow, LANES, Lane, Tangent};
+use super::sensitivity::{LANES, Lane, Tangent, TangentStepper};
 use super::values::Values;
 use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
 use crate::lanes::{Row, Simd, WithSimd};
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
+use crate::model::Dynamics;
+use crate::sim::{Commands, FIT_S, Hold, Point, RK4, Simulator, substeps};
 
-/// Steps of the integrator are no longer than this (s): at 2 ms the classical Runge-Kutta method stays
-/// stable and accurate with dry friction smoothed to a fraction of a percent of the top speed.
-const LONGEST_STEP_S: f64 = 2e-3;
-
-/// Residuals beyond this many scales count by their size, not by their square (Huber 1964): spikes
-/// stay harmless, while of a normal sample only 0.3 % are touched.
+/// Residuals larger than this many scales enter the loss linearly instead of quadratically (Huber 1964). Outliers
+/// lose their influence, while only 0.3 % of a normal sample are affected.
 const HUBER: f64 = 3.0;
 
-/// Least squares over windows of logs ("multiple shooting"): in each window the model starts from a
-/// free state and is compared with the logged positions at every row.
+/// Multiple shooting: least squares over windows of logs. In each window the model is integrated from a free start
+/// state and compared with the logged positions at every row.
 pub struct Shooting<'l> {
     pub logs: &'l [Log],
     pub windows: Vec<Window>,
-    /// Standard deviation of the positions' noise, one a joint.
+    /// Standard deviation of the position noise, per joint, in rad (or m).
     pub noise: Vec<f64>,
     packs: Vec<Pack>,
 }
 
-/// What windows say about free values: for one window the parameters first, then its own.
+/// The normal equations of a window: shared parameters first, then the window's own free values.
 #[derive(Debug, Clone)]
 pub struct WindowTerms {
-    /// Sum of the Huber losses of its residuals.
+    /// Sum of the Huber losses of the residuals.
     pub cost: f64,
     pub gradient: DVector<f64>,
     pub hessian: DMatrix<f64>,
 }
 
 impl WindowTerms {
-    /// What windows that say nothing say about this many values.
+    /// Zero normal equations of this many free values.
     pub fn zeros(values: usize) -> Self {
         Self {
             cost: 0.0,
@@ -46,12 +43,13 @@ impl WindowTerms {
     }
 }
 
-/// Up to [`LANES`] windows side by side, padded with steps of no length and rows of no weight.
+/// Up to [`LANES`] windows integrated side by side. Shorter windows are padded with steps of zero length and rows of
+/// zero weight.
 struct Pack {
     windows: Vec<usize>,
     /// The log of each lane.
     logs: [usize; LANES],
-    /// The row of each lane's log.
+    /// `[row][lane]`: the row of the lane's log.
     at: Vec<[usize; LANES]>,
     time: Vec<Lane>,
     dt: Vec<Lane>,
@@ -59,7 +57,7 @@ struct Pack {
     /// `[row][joint]`
     tau: Vec<Vec<Lane>>,
     q: Vec<Vec<Lane>>,
-    /// 1 / noise, 0 where a lane has no such row.
+    /// `[row][joint]`: 1 / noise, or 0 where the lane has no such row.
     weight: Vec<Vec<Lane>>,
 }
 
@@ -68,7 +66,7 @@ impl<'l> Shooting<'l> {
     /// When `noise` has not one entry a joint of the logs.
     pub fn new(logs: &'l [Log], windows: Vec<Window>, noise: &[f64]) -> Self {
         let mut order: Vec<usize> = (0..windows.len()).collect();
-        // Windows of equal length side by side waste no padding.
+        // Windows of similar length share a pack, which keeps the padding small.
         order.sort_by_key(|&w| windows[w].rows());
         let packs = order
             .chunks(LANES)
@@ -82,16 +80,16 @@ impl<'l> Shooting<'l> {
         }
     }
 
-    /// The same windows integrated in steps no longer than this (s).
+    /// The same windows, integrated in substeps of at most `longest_s`.
     #[must_use]
     pub fn in_steps_of(mut self, longest_s: f64) -> Self {
         for pack in &mut self.packs {
-            pack.substeps = pack.dt.iter().map(|dt| substeps(dt, longest_s)).collect();
+            pack.cut(longest_s);
         }
         self
     }
 
-    /// Each window's first guess of its state, with `extra` zeros behind.
+    /// Initial guess of each window's start state, followed by `extra` zeros.
     pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
         let half_widths: Vec<f64> = self
             .logs
@@ -163,9 +161,12 @@ impl<'l> Shooting<'l> {
             .collect()
     }
 
-    /// What the model's filters make of the torques of each log.
+    /// The torques of each log as filtered by the model's delays and lags.
     fn commands(&self, dynamics: &Dynamics, values: &Values) -> Vec<Commands<'l>> {
-        let of_log = |(index, log)| Commands::of_log(dynamics, &values.of_log(index), log);
+        let of_log = |(index, log)| {
+            let point = Point::new(dynamics, values.of_log(index));
+            Commands::of_log(&point, log)
+        };
         self.logs.iter().enumerate().map(of_log).collect()
     }
 
@@ -190,7 +191,7 @@ impl<'l> Shooting<'l> {
     }
 }
 
-/// Huber's loss, and the weight that makes its gradient that of least squares.
+/// Huber's loss, and the weight with which iteratively reweighted least squares has the same gradient.
 fn loss(residual: f64) -> (f64, f64) {
     let size = residual.abs();
     if size <= HUBER {
@@ -241,19 +242,20 @@ impl Pack {
                 }
             }
         }
-        pack.substeps = pack
-            .dt
-            .iter()
-            .map(|dt| substeps(dt, LONGEST_STEP_S))
-            .collect();
+        pack.cut(FIT_S);
         pack
+    }
+
+    /// Cut the steps between rows into substeps of at most `longest_s`.
+    fn cut(&mut self, longest_s: f64) {
+        self.substeps = self.dt.iter().map(|dt| substeps(dt, longest_s)).collect();
     }
 
     fn rows(&self) -> usize {
         self.time.len()
     }
 
-    /// The local values of each lane as lanes.
+    /// The local values of the pack's windows, one row per value.
     fn gather(&self, locals: &[Vec<f64>]) -> Vec<Lane> {
         let lane_of = |lane: usize| &locals[self.windows[lane.min(self.windows.len() - 1)]];
         (0..lane_of(0).len())
@@ -261,44 +263,39 @@ impl Pack {
             .collect()
     }
 
-    /// Tell of the values that the logs of single lanes have of their own: parameter, lane, value.
-    fn own_values(&self, values: &Values, mut tell: impl FnMut(usize, usize, f64)) {
+    /// Call `set(parameter, lane, value)` for every value that belongs to the log of a single lane.
+    fn own_values(&self, values: &Values, mut set: impl FnMut(usize, usize, f64)) {
         for own in &values.own {
             for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
-                tell(own.parameter, lane, own.value);
+                set(own.parameter, lane, own.value);
             }
         }
     }
 
-    /// The torque from `row` to the next with the windows' own forces, if any, added.
-    fn put_torque(
-        &self,
-        torque: &mut StepTorque<LANES>,
-        commands: &[Commands<'_>],
+    /// The hold from `row` to the next. `force` holds the windows' own forces, if they have any.
+    fn hold<'a>(
+        &'a self,
+        commands: &'a [Commands<'a>],
         row: usize,
-        forces: &[Lane],
-    ) {
-        let end = self.time.get(row + 1).unwrap_or(&self.time[row]);
-        torque.fill(
-            self.logs.map(|log| &commands[log]),
-            &self.tau[row],
-            self.time[row],
-            *end,
-            self.substeps[row],
-        );
-        for (tau, force) in torque.mean.iter_mut().zip(forces.iter().cycle()) {
-            for lane in 0..LANES {
-                tau[lane] += force[lane];
-            }
+        force: &'a [Lane],
+    ) -> Hold<'a, LANES> {
+        Hold {
+            commands: self.logs.map(|log| &commands[log]),
+            held: &self.tau[row],
+            force,
+            from: self.time[row],
+            to: *self.time.get(row + 1).unwrap_or(&self.time[row]),
+            length: self.dt[row],
+            substeps: self.substeps[row],
         }
     }
 
-    /// The torque that acted until `row`.
+    /// The torque that acted just before `row`.
     fn torque_before(&self, commands: &[Commands<'_>], row: usize) -> Vec<Lane> {
         Commands::just_before(self.logs.map(|log| &commands[log]), self.at[row])
     }
 
-    /// Integrate and show the angles at each row.
+    /// Integrate the windows, calling `see(row, angles)` with the measured angles at each row.
     fn roll(
         &self,
         dynamics: &Dynamics,
@@ -309,24 +306,17 @@ impl Pack {
     ) {
         let mut state = self.gather(locals);
         let forces = state.split_off(dynamics.states());
-        let mut rollout = Rollout::<f64, LANES>::new(dynamics, &values.common);
-        let mut sensors = Sensors::<LANES>::new(dynamics, &values.common);
+        let model = Point::new(dynamics, values.common.as_slice());
+        let mut simulator = Simulator::<LANES>::new(&model, RK4);
+        simulator.state = state;
         self.own_values(values, |parameter, lane, value| {
-            rollout.set_in_lane(parameter, lane, value);
-            sensors.set_in_lane(parameter, lane, value);
+            simulator.set_in_lane(parameter, lane, value);
         });
-        let mut torque = StepTorque::default();
         for row in 0..self.rows() {
-            let before = || self.torque_before(commands, row);
-            see(row, sensors.show(&state, before, self.time[row]));
-            self.put_torque(&mut torque, commands, row, &forces);
-            rollout.advance(
-                &mut state,
-                &torque.mean,
-                self.time[row],
-                self.dt[row],
-                self.substeps[row],
-            );
+            let at = self.logs.map(|log| &commands[log]);
+            let [angles, _] = simulator.shown(at, self.at[row]);
+            see(row, angles);
+            simulator.advance(&self.hold(commands, row, &forces));
         }
     }
 
@@ -341,15 +331,14 @@ impl Pack {
         let (n, columns) = (tangent.joints, tangent.columns());
         let states = self.gather(locals);
         let mut sums = Sums::new(columns);
-        let mut flow = Flow::new(tangent, &values.common);
+        let mut stepper = TangentStepper::new(tangent, &values.common, RK4);
         self.own_values(values, |parameter, lane, value| {
-            flow.set_in_lane(parameter, lane, value);
+            stepper.set_in_lane(parameter, lane, value);
         });
-        flow.start(&states);
-        let mut torque = StepTorque::default();
+        stepper.start(&states);
         for row in 0..self.rows() {
             let before = || self.torque_before(commands, row);
-            let (angles, slopes) = flow.shown(before, self.time[row]);
+            let (angles, slopes) = stepper.shown(before, self.time[row]);
             for j in 0..n {
                 let weight = Row(self.weight[row][j].map(|w| w / scale));
                 let residual = Row(std::array::from_fn(|l| {
@@ -357,8 +346,7 @@ impl Pack {
                 }));
                 sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
-            self.put_torque(&mut torque, commands, row, &states[2 * n..]);
-            flow.advance(&torque, self.time[row], self.dt[row], self.substeps[row]);
+            stepper.advance(&self.hold(commands, row, &states[2 * n..]));
         }
         self.windows
             .iter()
@@ -368,14 +356,7 @@ impl Pack {
     }
 }
 
-fn substeps(dt: &Lane, longest_s: f64) -> usize {
-    let longest = dt.iter().fold(0.0_f64, |a, b| a.max(*b));
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
-    let steps = (longest / longest_s - 1e-6).ceil() as usize;
-    steps.max(1)
-}
-
-/// Running sums of the normal equations, all lanes at once; the matrix as its upper triangle.
+/// Running sums of the normal equations of all lanes. The matrix is stored as its upper triangle.
 struct Sums {
     columns: usize,
     cost: Lane,
@@ -393,7 +374,7 @@ impl Sums {
         }
     }
 
-    /// Add one row: normalised `residual`, sensitivities of the angle, and 1 / (noise scale).
+    /// Add one measurement: its normalised residual, the sensitivities of the angle, and 1 / (noise scale).
     fn add(&mut self, residual: &Lane, sensitivities: &[Lane], weight: &Lane) {
         let losses = residual.map(loss);
         for lane in 0..LANES {
@@ -401,7 +382,7 @@ impl Sums {
         }
         Lane::dispatch(Add {
             sums: self,
-            // The residual and the weight of each sensitivity, times the weight that Huber's loss gives.
+            // Both are multiplied by the weight of Huber's loss.
             residual: Row(std::array::from_fn(|l| {
                 losses[l].1 * weight[l] * residual[l]
             })),
@@ -473,7 +454,7 @@ mod tests {
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::model::{FittedEffect, Library};
 
-    /// Two seconds at 100 Hz of some motion under some torque.
+    /// Two seconds of an arbitrary motion and torque at 100 Hz.
     fn log() -> Log {
         let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
         let column = |f: fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect::<Vec<f64>>()];

@@ -3,14 +3,14 @@ use crate::data::{Log, half_width_s, local_cubic};
 /// A stretch of one log, rows `first..=last`, over which a model is integrated open loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    /// Index into the list of logs.
+    /// Index of the log.
     pub log: usize,
     pub first: usize,
     pub last: usize,
 }
 
 impl Window {
-    /// Number of rows, the first one included.
+    /// Number of rows, including the first and the last.
     pub fn rows(&self) -> usize {
         self.last - self.first + 1
     }
@@ -27,11 +27,11 @@ impl Window {
     }
 }
 
-/// A pause this many median steps long is a gap: no window spans it.
+/// A pause longer than this many median steps is a gap, which no window spans.
 const GAP_STEPS: f64 = 5.0;
 
-/// Consecutive windows of `length_s` seconds in all logs, none of which spans a gap or touches a
-/// left-out interval, each beginning where the state can be estimated from the log.
+/// Consecutive windows of `length_s` seconds in all logs. No window spans a gap or touches a left-out interval, and
+/// each begins where the state can be estimated from the log.
 pub fn cut(logs: &[Log], length_s: f64) -> Vec<Window> {
     let mut windows = Vec::new();
     for (index, log) in logs.iter().enumerate() {
@@ -54,9 +54,10 @@ pub fn cut(logs: &[Log], length_s: f64) -> Vec<Window> {
     windows
 }
 
-/// The last row of a window that begins at `first`, or the next row at which one may begin.
+/// The last row of the window that begins at `first`; if there is none, the next row at which one may begin, as an
+/// error.
 fn window_at(log: &Log, step_s: f64, first: usize, length_s: f64) -> Result<usize, usize> {
-    // Times are rounded decimals: half a step of slack keeps windows at their nominal length.
+    // Half a step of tolerance, because logged times are rounded decimals.
     let end = log.time[first] + length_s + 0.5 * step_s;
     let last = log.time.partition_point(|t| *t <= end) - 1;
     if log.time[last] < log.time[first] + length_s - 0.5 * step_s {
@@ -85,8 +86,8 @@ fn window_at(log: &Log, step_s: f64, first: usize, length_s: f64) -> Result<usiz
         .ok_or(first + 1)
 }
 
-/// Angles, then velocities at a row, from the logged positions within `half_width_s` alone (see
-/// [`half_width_s`]); `None` near the log's ends.
+/// Positions, then velocities at a row, estimated from the logged positions within `half_width_s` (see
+/// [`half_width_s`]). `None` near the ends of the log.
 pub fn initial_state(log: &Log, half_width_s: f64, row: usize) -> Option<Vec<f64>> {
     let fits: Option<Vec<_>> = log
         .q

@@ -48,10 +48,10 @@ impl Judge<'_> {
         predictor: &Predictor,
         replan: usize,
     ) -> Result<(Episode, usize), RunError> {
-        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
+        let dynamics = self.plant.true_dynamics();
         let mut rng = stream(self.seed, Purpose::Judge, 0);
         let start = self.task.draw_start(&mut rng);
-        let mut rig = self.task.rig(self.plant, &dynamics, &values, &start);
+        let mut rig = self.task.rig(self.plant, &dynamics, &start);
         let draws = stream(self.seed, Purpose::JudgePlan, 0);
         with_controller(predictor, self.task, replan, &draws, |controller| {
             let episode = episode(self.task, &mut rig, controller, &mut rng)?;

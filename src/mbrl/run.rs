@@ -61,8 +61,8 @@ impl Run<'_> {
     /// # Errors
     /// A plant that diverges.
     pub fn begin(&self) -> Result<Progress, RunError> {
-        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
-        let mut rig = self.rig(&dynamics, &values, 0);
+        let dynamics = self.plant.true_dynamics();
+        let mut rig = self.rig(&dynamics, 0);
         let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random, 0));
         let mut noise = stream(self.seed, Purpose::Gather, 0);
         let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
@@ -111,8 +111,8 @@ impl Run<'_> {
     }
 
     fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
-        let (dynamics, values) = (self.plant.dynamics(), self.plant.values());
-        let mut rig = self.rig_now(&dynamics, &values, progress)?;
+        let dynamics = self.plant.true_dynamics();
+        let mut rig = self.rig_now(&dynamics, progress)?;
         let of_round = |purpose| stream(self.seed, purpose, progress.rounds + 1);
         let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
         let steps = self.schedule.gather;
@@ -127,12 +127,11 @@ impl Run<'_> {
     fn rig_now<'d>(
         &self,
         dynamics: &'d Dynamics,
-        values: &[f64],
         progress: &Progress,
     ) -> Result<Rig<'d>, RunError> {
         let of_episode = self.task.steps / self.schedule.gather;
         let (episode, begun) = (progress.rounds / of_episode, progress.rounds % of_episode);
-        let mut rig = self.rig(dynamics, values, 1 + episode);
+        let mut rig = self.rig(dynamics, 1 + episode);
         let controlled = &progress.experience.logs[1..];
         for log in &controlled[controlled.len() - begun..] {
             for row in 0..log.rows() - 1 {
@@ -143,9 +142,9 @@ impl Run<'_> {
         Ok(rig)
     }
 
-    fn rig<'d>(&self, dynamics: &'d Dynamics, values: &[f64], number: usize) -> Rig<'d> {
+    fn rig<'d>(&self, dynamics: &'d Dynamics, number: usize) -> Rig<'d> {
         let mut rng = stream(self.seed, Purpose::Start, number);
         let start = self.task.draw_start(&mut rng);
-        self.task.rig(self.plant, dynamics, values, &start)
+        self.task.rig(self.plant, dynamics, &start)
     }
 }

@@ -1,5 +1,5 @@
-use super::command::{CommandFilter, Filter};
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
+use super::filter::{CommandFilter, Filter};
 use super::reader::Located;
 use super::system::{FittedEffect, Motion, System};
 use super::{Dynamics, Parameter};

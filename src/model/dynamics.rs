@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::command::Filter;
+use super::filter::Filter;
 use crate::expr::Program;
 
 /// A physical parameter of a model or an effect.
@@ -48,7 +48,7 @@ pub struct Dynamics {
     pub joints: usize,
     pub parameters: Vec<Parameter>,
     pub program: Program,
-    /// What the commanded torques go through first, see [`Commands`](super::Commands).
+    /// What the commanded torques go through first, see [`Commands`](crate::sim::Commands).
     pub filters: Vec<Filter>,
     /// What the sensors show for the angles, from the same inputs, where that is not the rig's own: n outputs. The
     /// torques are those that acted until then.

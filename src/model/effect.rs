@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use super::command::CommandFilter;
+use super::filter::CommandFilter;
 use super::reader::{Document, FileError, Located, Section};
 use crate::expr::{Formula, Graph, Scope, SignForm};
 

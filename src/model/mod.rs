@@ -3,28 +3,24 @@
 
 mod assemble;
 pub mod chain;
-mod command;
 mod dynamics;
 mod effect;
 mod effects_in_file;
 mod file;
-mod integrator;
+mod filter;
 mod library;
 mod network;
 mod reader;
-mod rollout;
 mod saved;
 mod sections;
-mod sensors;
 mod shift;
 mod system;
 mod typeset;
 pub(crate) mod weights;
 
-pub use command::{CommandFilter, Commands, Filter, StepTorque};
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
-pub use integrator::Integrator;
+pub use filter::{CommandFilter, Filter};
 pub use library::Library;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,
@@ -32,8 +28,6 @@ pub use network::{
 };
 pub(crate) use network::{nothing_but, to_f32};
 pub use reader::FileError;
-pub use rollout::Rollout;
 pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
-pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use shift::absorbed;
 pub use system::{FittedEffect, OwnValue, System, put_own};

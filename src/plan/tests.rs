@@ -12,8 +12,8 @@ use super::{Cem, Evaluate, Icem, Method, Mppi, Objective, Plan, Planner, Setting
 use crate::batch::{Rollouts, Rows, W};
 use crate::expr::SignForm;
 use crate::lanes::{Arch, Row};
-use crate::model::{Commands, Dynamics, FittedEffect, Integrator, Library, Rollout, StepTorque};
-use crate::plant::Environment;
+use crate::model::{Dynamics, FittedEffect, Library};
+use crate::sim::{Commands, Environment, Hold, Integrator, RK4, Simulator};
 
 const SETTINGS: Settings = Settings {
     population: 300,
@@ -479,8 +479,7 @@ fn swung_up(method: Method, seed: u64) -> f64 {
     let rollouts = Rollouts::new(&equations, &[], objective.program(), integrator, 0.02);
     let evaluate = || rollouts.block();
     let search = Planner::new(&swing_up(method), &[[-3.0, 3.0]], evaluate, &rng(seed));
-    let values = equations.values();
-    let mut rig = Environment::new(&equations, &values, integrator, 0.02);
+    let mut rig = Environment::new(&equations, integrator, 0.02);
     let (mut state, mut sum) = ([PI, 0.0], 0.0);
     for begin in (0..500).step_by(50) {
         let plan = search.plan(Start::new(&state, 0.02 * f64::from(begin)));
@@ -514,26 +513,26 @@ fn a_pendulum_is_swung_up_and_held() {
 /// The same task on a rig whose torque acts 60 ms late, for a planner that knows `model` of it.
 fn swung_up_late(rig: &Dynamics, model: &Dynamics) -> f64 {
     let objective = Objective::new("cos(q1)", 1).unwrap();
-    let rollouts = Rollouts::new(model, &[], objective.program(), Integrator::Rk4, 0.02);
+    let rollouts = Rollouts::new(model, &[], objective.program(), Integrator::RK4, 0.02);
     let settings = swing_up(Method::Icem(Icem::new(20)));
     let search = Planner::new(&settings, &[[-3.0, 3.0]], || rollouts.block(), &rng(1));
-    let mut rollout = Rollout::<f64, 1>::new(rig, &rig.values());
-    let (mut state, mut sum) = ([Row([PI]), Row([0.0])], 0.0);
+    let mut simulator = Simulator::new(rig, RK4);
+    simulator.put(&[PI, 0.0]);
+    let mut sum = 0.0;
     let time: Vec<f64> = (0..=501).map(|row| 0.02 * (f64::from(row) - 1.0)).collect();
     // Nothing was commanded before.
     let mut past = vec![vec![0.0]];
     for begin in (1..=500).step_by(10) {
-        let measured = state.map(|row| row[0]);
+        let measured = [simulator.state[0][0], simulator.state[1][0]];
         let plan = search.plan(Start::after(&measured, time[begin], &past));
         search.shift(10);
         past.extend_from_slice(&plan.inputs[..10]);
         let tau = [past.iter().map(|tau| tau[0]).collect::<Vec<f64>>()];
-        let commands = Commands::new(rig, &rig.values(), &time[..past.len()], &tau);
+        let commands = Commands::new(rig, &time[..past.len()], &tau);
         for row in begin..begin + 10 {
-            let (from, to) = (Row([time[row]]), Row([time[row + 1]]));
-            let acting = StepTorque::new([&commands], &[Row([tau[0][row]])], from, to, 5);
-            rollout.advance(&mut state, &acting.mean, from, Row([0.02]), 5);
-            sum += state[0][0].cos();
+            let (from, held) = (Row([time[row]]), [Row([tau[0][row]])]);
+            simulator.advance(&Hold::lasting([&commands], &held, from, 0.02, 5));
+            sum += simulator.state[0][0].cos();
         }
     }
     sum

@@ -1,13 +1,11 @@
 //! Simulated rigs: a model with effects that nobody is told about, driven and measured as a rig is.
 
-mod environment;
 mod excitation;
 mod file;
 mod rig;
 mod sampling;
 mod simulate;
 
-pub use environment::Environment;
 pub use excitation::Excitation;
 pub use file::{HiddenEffect, Plant, PlantError, Sensor};
 pub use rig::{Noise, Rig};

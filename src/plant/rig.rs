@@ -2,9 +2,9 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::{Environment, PlantError};
-use crate::lanes::Row;
-use crate::model::{Dynamics, Integrator, Sensors};
+use super::PlantError;
+use crate::model::Dynamics;
+use crate::sim::{Environment, Integrator};
 
 /// A plant under control: a torque is held for a step, then its state is measured.
 ///
@@ -12,7 +12,6 @@ use crate::model::{Dynamics, Integrator, Sensors};
 /// for it.
 pub struct Rig<'d> {
     environment: Environment<'d>,
-    sensors: Sensors<'d, 1>,
     noise: Noise,
     joints: usize,
     state: Vec<f64>,
@@ -31,14 +30,12 @@ pub struct Noise {
 }
 
 impl<'d> Rig<'d> {
-    /// `dynamics` with parameters `values`, in its order, from `start` (positions, then velocities) in steps of
-    /// `step_s` seconds.
+    /// A plant from `start` (positions, then velocities) in steps of `step_s` seconds.
     ///
     /// # Panics
-    /// When `values` or `start` is not of the plant's size.
+    /// When `start` is not of the plant's size.
     pub fn new(
         dynamics: &'d Dynamics,
-        values: &[f64],
         start: &[f64],
         integrator: Integrator,
         step_s: f64,
@@ -46,8 +43,7 @@ impl<'d> Rig<'d> {
     ) -> Self {
         assert_eq!(start.len(), dynamics.states(), "one value for each state");
         Self {
-            environment: Environment::new(dynamics, values, integrator, step_s),
-            sensors: Sensors::new(dynamics, values),
+            environment: Environment::new(dynamics, integrator, step_s),
             noise,
             joints: dynamics.joints,
             state: start.to_vec(),
@@ -68,13 +64,9 @@ impl<'d> Rig<'d> {
 
     /// What the sensors give for the state.
     pub fn measure(&mut self, rng: &mut impl Rng) -> Vec<f64> {
-        let state: Vec<_> = self.state.iter().map(|x| Row([*x])).collect();
-        let acting = || self.environment.acting().into_iter().map(|x| Row([x]));
-        let time = Row([self.time_s()]);
-        let shown = self.sensors.show(&state, || acting().collect(), time);
-        let angles = shown
-            .iter()
-            .map(|Row([angle])| (*angle, self.noise.position));
+        let time_s = self.time_s();
+        let shown = self.environment.angles(&self.state, time_s);
+        let angles = shown.iter().map(|angle| (*angle, self.noise.position));
         let velocities = self.state[self.joints..].iter();
         angles
             .chain(velocities.map(|velocity| (*velocity, self.noise.velocity)))

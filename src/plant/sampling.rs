@@ -1,10 +1,9 @@
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::Environment;
 use super::file::{Plant, PlantError};
 use crate::data::Trajectory;
-use crate::model::Integrator;
+use crate::sim::{Environment, Integrator};
 
 /// Random trajectories of a plant with its exact states: starts uniform in the ranges, a new torque
 /// uniform in its range at every step.
@@ -57,7 +56,7 @@ impl Plant {
         sampling
             .check(self.system.joints)
             .map_err(PlantError::Sampling)?;
-        let dynamics = self.dynamics();
+        let dynamics = self.true_dynamics();
         if !dynamics.filters.is_empty() {
             return Err(PlantError::Sampling(
                 "the plant has an effect with memory, but random trajectories start without a past; leave the \
@@ -65,9 +64,7 @@ impl Plant {
                     .into(),
             ));
         }
-        let values = self.values();
-        let mut environment =
-            Environment::new(&dynamics, &values, sampling.integrator, sampling.step_s);
+        let mut environment = Environment::new(&dynamics, sampling.integrator, sampling.step_s);
         let draws = sampling.draws(rng);
         draws
             .into_iter()
@@ -176,15 +173,16 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::{Sampling, Starts};
-    use crate::model::{Integrator, Library};
+    use crate::model::Library;
     use crate::plant::Plant;
+    use crate::sim::{Environment, Integrator};
 
     fn sampling() -> Sampling {
         Sampling {
             trajectories: 3,
             length: 2,
             step_s: 0.02,
-            integrator: Integrator::SemiImplicitEuler,
+            integrator: Integrator::SEMI_IMPLICIT_EULER,
             position: vec![[-1.0, 1.0]],
             velocity: vec![[-8.0, 8.0]],
             torque: vec![[-3.0, 3.0]],

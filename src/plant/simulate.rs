@@ -6,10 +6,9 @@ use crate::closeloop::joined;
 use crate::data::Log;
 use crate::expr::SignForm;
 use crate::lanes::Row;
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
+use crate::model::Dynamics;
+use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
-/// The rig moves in steps of this length (s), far below what any fit uses.
-const STEP_S: f64 = 1e-4;
 /// Dry friction reverses over this speed (rad/s): many times sharper than in any fit.
 const SIGN_WIDTH: f64 = 1e-3;
 
@@ -32,42 +31,26 @@ impl Plant {
     pub fn record(&self, rng: &mut impl Rng) -> Result<Log, PlantError> {
         let n = self.system.joints;
         let tones = self.excitation.draw(rng);
-        let dynamics = self.dynamics();
-        let values = self.values();
-        let mut rollout = Rollout::<f64, 1>::new(&dynamics, &values);
+        let dynamics = self.true_dynamics();
         let dt = 1.0 / self.sensor.rate_hz;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // checked to be a few thousand
-        let (rows, substeps) = (
-            (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1,
-            ((dt / STEP_S).ceil() as usize).max(1),
-        );
-        let mut state: Vec<Row<f64, 1>> = self
-            .as_read(&self.recording.start)
-            .iter()
-            .map(|value| Row([*value]))
-            .collect();
+        let rows = (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1;
+        let substeps = substeps(&Row([dt]), RIG_S);
         let mut log = Log::empty(n);
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
         let torques: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
         let tau_of_joints = by_joint(&torques, n);
-        let commands = Commands::new(&dynamics, &values, &times, &tau_of_joints);
-        let mut sensors = Sensors::<1>::new(&dynamics, &values);
+        let commands = [&Commands::new(&dynamics, &times, &tau_of_joints)];
+        let mut simulator = Simulator::new(&dynamics, RK4);
+        simulator.put(&self.as_read(&self.recording.start));
         for (row, (&time, tau)) in times.iter().zip(torques).enumerate() {
-            let before = || Commands::just_before([&commands], [row]);
-            self.measure(
-                &mut log,
-                time,
-                sensors.show(&state, before, Row([time])),
-                &tau,
-                rng,
-            );
+            let [angles, _] = simulator.shown(commands, [row]);
+            self.measure(&mut log, time, angles, &tau, rng);
             let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();
-            let torque =
-                StepTorque::new([&commands], &held, Row([time]), Row([time + dt]), substeps);
-            rollout.advance(&mut state, &torque.mean, Row([time]), Row([dt]), substeps);
-            if state.iter().any(|value| !value[0].is_finite()) {
+            simulator.advance(&Hold::lasting(commands, &held, Row([time]), dt, substeps));
+            if simulator.state.iter().any(|value| !value[0].is_finite()) {
                 return Err(PlantError::Diverged { time_s: time });
             }
         }

@@ -2,8 +2,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::Integrator;
 use crate::plant::{Sampling, Starts};
+use crate::sim::Integrator;
 
 /// What a model is trained on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

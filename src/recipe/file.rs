@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::RecipeError;
 use super::data::{Data, Logged};
 use crate::expr::suggestion;
-use crate::model::{Dynamics, Integrator, LastLayer, MlpSettings};
+use crate::model::{Dynamics, LastLayer, MlpSettings};
+use crate::sim::Integrator;
 use crate::train::{FitSettings, LearningRates};
 
 const TUNING_EPOCHS: usize = 500;
@@ -112,7 +113,7 @@ impl Recipe {
                     prior: TUNING_RATE,
                     residual: TUNING_RATE,
                 },
-                integrator: Integrator::Rk4,
+                integrator: Integrator::RK4,
                 ..FitSettings::default()
             },
             path: PathBuf::new(),

@@ -7,8 +7,9 @@ use super::data::{Data, Logged, Simulated};
 use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{Library, System, as_modelled};
+use crate::model::{Library, System};
 use crate::plant::Plant;
+use crate::sim::as_modelled;
 use crate::train::{Segments, SegmentsError};
 
 /// What a seed is used for: each purpose draws from a stream of its own, so that more draws for one do
@@ -65,11 +66,10 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
         length_s: f64::INFINITY,
     };
     let dynamics = equations(system);
-    let values = dynamics.values();
     let modelled = |log: &Log| match recipe.kind {
         // A network alone has no effects: it learns from what was commanded and shown.
         Kind::DataDriven => log.clone(),
-        Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, &values, log),
+        Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, log),
     };
     let mut training = Segments::new(system.joints, logged.steps);
     for log in &logs {

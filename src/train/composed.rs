@@ -4,7 +4,7 @@ use burn::tensor::Tensor;
 
 use super::loss::NORM_FLOOR;
 use super::{Columns, HybridModel, Prepared};
-use crate::model::Integrator;
+use crate::sim::Integrator;
 
 /// E and ||F_r||, `[2]`.
 pub(super) fn loss(

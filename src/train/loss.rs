@@ -3,7 +3,7 @@ use std::sync::Arc;
 use burn::tensor::{Tensor, TensorData};
 
 use super::{Batch, Columns, HybridModel, Prepared, TrainError, composed, fused};
-use crate::model::Integrator;
+use crate::sim::Integrator;
 
 /// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
 /// where every residual starts.

@@ -10,7 +10,8 @@ use super::{
 };
 use crate::closeloop::{LearnError, LearnSettings, LearnedResidual, ResidualLearner, ResidualTask};
 use crate::data::Trajectory;
-use crate::model::{Dynamics, Integrator, LastLayer, MlpSettings, MlpWeights, Origin, ResidualOn};
+use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Origin, ResidualOn};
+use crate::sim::Integrator;
 
 /// Trains the residual network of closing the loop.
 #[derive(Debug, Clone, Copy, Default)]
@@ -90,7 +91,7 @@ fn fit_settings(settings: &LearnSettings) -> FitSettings {
         penalty: Penalty::Fixed {
             alpha: settings.alpha,
         },
-        integrator: Integrator::Rk4,
+        integrator: Integrator::RK4,
         record_every: NonZeroUsize::new(10).expect("not zero"),
         ..FitSettings::default()
     }

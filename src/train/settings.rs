@@ -3,7 +3,7 @@ use std::num::NonZeroUsize;
 use serde::{Deserialize, Serialize};
 
 use super::{Penalty, TrainError};
-use crate::model::Integrator;
+use crate::sim::Integrator;
 
 /// Everything that decides how a fit runs. Defaults are the published ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

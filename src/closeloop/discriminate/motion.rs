@@ -2,8 +2,8 @@ use std::f64::consts::TAU;
 
 use crate::data::Log;
 use crate::identify::{Values, Window};
-use crate::lanes::Row;
-use crate::model::{Commands, Dynamics, Rollout, Sensors, StepTorque};
+use crate::model::Dynamics;
+use crate::sim::{Commands, FIT_S, Point, RK4, Simulator};
 
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,9 +17,6 @@ pub(super) struct Motion {
     /// `[row][joint]`, each held until the next row.
     pub tau: Vec<Vec<f64>>,
 }
-
-/// Steps of the simulation are no longer than this (s), as in fits.
-const LONGEST_STEP_S: f64 = 2e-3;
 
 /// Between motions of one log the rig stands for so long (s) under the torque that the next begins with: longer than
 /// any memory of its drive.
@@ -55,14 +52,8 @@ impl Record {
         for motion in motions {
             let index = record.log_of(motion.log, dynamics.joints);
             let first = append(&mut record.logs[index], motion);
-            let values = values.of_log(motion.log);
-            simulate(
-                &mut record.logs[index],
-                first,
-                &motion.start,
-                dynamics,
-                &values,
-            )?;
+            let model = Point::new(dynamics, values.of_log(motion.log));
+            simulate(&mut record.logs[index], first, &motion.start, &model)?;
             let log = &record.logs[index];
             record.motions.push(Window {
                 log: index,
@@ -137,52 +128,28 @@ fn append(log: &mut Log, motion: &Motion) -> usize {
 }
 
 /// Fill in the states of a model from row `first` to the end of a log; `None` where it diverges.
-fn simulate(
-    log: &mut Log,
-    first: usize,
-    start: &[f64],
-    dynamics: &Dynamics,
-    values: &[f64],
-) -> Option<()> {
+fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Point<'_>) -> Option<()> {
     let commanded = log.clone();
-    let commands = Commands::of_log(dynamics, values, &commanded);
-    let mut rollout = Rollout::<f64, 1>::new(dynamics, values);
-    let mut sensors = Sensors::<1>::new(dynamics, values);
-    let mut state: Vec<Row<f64, 1>> = start.iter().map(|value| Row([*value])).collect();
+    let commands = [&Commands::of_log(model, &commanded)];
+    let mut simulator = Simulator::new(model, RK4);
+    simulator.put(start);
     // The row of the pause, which nothing reads, is as the motion begins.
     let columns = log.q.iter_mut().chain(&mut log.qd);
     columns
         .zip(start)
         .for_each(|(column, value)| column.resize(first, *value));
     for row in first..log.rows() {
-        if state.iter().any(|value| !value[0].is_finite()) {
+        if row > first {
+            simulator.follow(commands, [row - 1], FIT_S);
+        }
+        if simulator.state.iter().any(|value| !value[0].is_finite()) {
             return None;
         }
-        let before = || Commands::just_before([&commands], [row]);
-        let shown = sensors.show(&state, before, Row([log.time[row]])).to_vec();
+        let shown = simulator.shown(commands, [row]).concat();
         let columns = log.q.iter_mut().chain(&mut log.qd);
-        let read = shown.iter().chain(&state[dynamics.joints..]);
         columns
-            .zip(read)
+            .zip(shown)
             .for_each(|(column, value)| column.push(value[0]));
-        let Some(&to) = log.time.get(row + 1) else {
-            break;
-        };
-        let (from, held): (f64, Vec<Row<f64, 1>>) = (
-            log.time[row],
-            log.tau.iter().map(|tau| Row([tau[row]])).collect(),
-        );
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        // a small positive number
-        let substeps = (((to - from) / LONGEST_STEP_S - 1e-6).ceil() as usize).max(1);
-        let torque = StepTorque::new([&commands], &held, Row([from]), Row([to]), substeps);
-        rollout.advance(
-            &mut state,
-            &torque.mean,
-            Row([from]),
-            Row([to - from]),
-            substeps,
-        );
     }
     Some(())
 }

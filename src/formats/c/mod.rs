@@ -12,7 +12,8 @@ pub(super) use names::Names;
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
 use crate::expr::Notation;
-use crate::model::{CommandFilter, Integrator};
+use crate::model::CommandFilter;
+use crate::sim::{Scheme, Stage};
 
 pub(super) const FORMAT: Format = Format {
     name: "c",
@@ -45,11 +46,7 @@ pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
         networks::tables(model, &names),
         equations::derivative(model, &names),
         include_str!("flow.h").to_owned(),
-        match model.integrator {
-            Integrator::SemiImplicitEuler => include_str!("semi_implicit_euler.h"),
-            Integrator::Rk4 | Integrator::Fine { .. } => include_str!("rk4.h"),
-        }
-        .to_owned(),
+        advance(model.integrator.scheme(), &names),
         include_str!("step.h").to_owned(),
     ];
     let (head, upper) = (head(model, &names), &names.upper);
@@ -57,6 +54,22 @@ pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
     Ok(format!(
         "{head}#ifndef {upper}_H\n#define {upper}_H\n\n{code}\n#undef {upper}_\n#endif\n"
     ))
+}
+
+/// The step of a scheme, and its derivatives.
+fn advance(scheme: &Scheme, names: &Names) -> String {
+    if scheme.semi_implicit {
+        return include_str!("semi_implicit.h").to_owned();
+    }
+    let list = |of: fn(&Stage) -> f64| {
+        let numbers = scheme.stages.iter().map(|stage| names.number(of(stage)));
+        numbers.collect::<Vec<_>>().join(", ")
+    };
+    include_str!("runge_kutta.h")
+        .replace("@TITLE@", scheme.title)
+        .replace("@STAGES@", &scheme.stages.len().to_string())
+        .replace("@WEIGHTS@", &list(|stage| stage.weight))
+        .replace("@REACHES@", &list(|stage| stage.reach))
 }
 
 /// The comment at the head of the file.
@@ -106,7 +119,7 @@ fn comment(text: &str) -> String {
 
 fn sizes(model: &ExportModel) -> String {
     let n = model.joints();
-    let parts = model.integrator.parts();
+    let parts = model.integrator.substeps();
     format!(
         "#define MODEL_JOINTS {n}\n#define MODEL_STATES {} /* positions, then velocities */\n\
          #define MODEL_COLUMNS {} /* states and torques, which derivatives are by */\n\

@@ -11,7 +11,8 @@ use crate::expr::{Graph, Node, Program};
 use crate::formats::verify::ReferenceModel;
 use crate::formats::{ClientError, Predictions, Samples};
 use crate::model::weights::from_bytes;
-use crate::model::{Dynamics, Filter, Integrator, ModelShape, ModelWeights};
+use crate::model::{Dynamics, Filter, ModelShape, ModelWeights};
+use crate::sim::Integrator;
 
 /// The part of a description that such a client reads.
 #[derive(Deserialize)]

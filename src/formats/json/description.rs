@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use crate::expr::{Op, Program};
 use crate::formats::discrete_filter::DiscreteFilter;
 use crate::formats::{ExportModel, ExportedEffect};
-use crate::model::{CommandFilter, Integrator, ModelShape, Parameter};
+use crate::model::{CommandFilter, ModelShape, Parameter};
+use crate::sim::Integrator;
 
 /// Version of the description's own format.
 pub(super) const VERSION: u64 = 1;
@@ -49,6 +50,13 @@ struct Equations {
     /// The same, discretised for the step of the file: `mean` torques over each substep and the lagged torque at the
     /// `end`, as coefficients of the lagged torque and of the torques at two `places`.
     held: Vec<DiscreteFilter>,
+    /// A held step is integrated in so many equal substeps, each through these stages.
+    substeps: usize,
+    /// `[time, reach, weight]` as shares of a substep: when the stage is evaluated, how far along its slope the next
+    /// one lies, and the weight of its slope.
+    stages: Vec<[f64; 3]>,
+    /// Whether positions move with the new velocities.
+    semi_implicit: bool,
     /// The rates without the networks, as formulas.
     formulas: String,
     /// Names of the inputs of the operations.
@@ -98,6 +106,7 @@ impl Equations {
             .flat_map(|stem| (1..=model.joints()).map(move |j| format!("d({stem}{j})/dt")))
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let scheme = model.integrator.scheme();
         Self {
             parameters: equations.parameters.iter().map(parameter).collect(),
             effects: model.effects.clone(),
@@ -109,6 +118,11 @@ impl Equations {
                 })
                 .collect(),
             held: DiscreteFilter::all(model),
+            substeps: model.integrator.substeps(),
+            stages: (scheme.stages.iter())
+                .map(|stage| [stage.time, stage.reach, stage.weight])
+                .collect(),
+            semi_implicit: scheme.semi_implicit,
             formulas: program.text(&names),
             inputs: program.inputs().to_vec(),
             operations: operations(program),

@@ -5,7 +5,7 @@ use super::derivative::Derivative;
 use super::proto::Graph;
 use crate::formats::ExportModel;
 use crate::formats::discrete_filter::{Combination, DiscreteFilter};
-use crate::model::Integrator;
+use crate::sim::Scheme;
 
 /// Inputs of a graph, as columns.
 pub struct Inputs {
@@ -43,19 +43,18 @@ pub fn graph(model: &ExportModel) -> Graph {
     let mut step = Step {
         builder: &mut builder,
         derivative,
-        h: model.step_s,
+        h: model.step_s / acting.len() as f64,
     };
-    let next = match model.integrator {
-        Integrator::SemiImplicitEuler => step.semi_implicit(&inputs, &acting[0]),
-        Integrator::Rk4 | Integrator::Fine { .. } => {
-            step.h /= acting.len() as f64;
-            let mut state = inputs.state.clone();
-            for (k, torque) in acting.iter().enumerate() {
-                state = step.rk4(&state, torque, inputs.time.as_ref(), k);
-            }
-            state
-        }
-    };
+    let mut next = inputs.state.clone();
+    for (k, torque) in acting.iter().enumerate() {
+        next = step.substep(
+            model.integrator.scheme(),
+            &next,
+            torque,
+            inputs.time.as_ref(),
+            k,
+        );
+    }
     let next = builder.concat(&next, &inputs.state[0]);
     builder.output("next_state", &next, 2 * n, "as `state`, a step later");
     builder.finish("step")
@@ -64,7 +63,7 @@ pub fn graph(model: &ExportModel) -> Graph {
 /// The torque that acts over each substep. The memory of delays and lags is one more input and output.
 fn act(builder: &mut Builder, model: &ExportModel, inputs: &Inputs) -> Vec<Vec<Value>> {
     let filters = DiscreteFilter::all(model);
-    let mut acting = vec![inputs.torque.clone(); model.integrator.parts()];
+    let mut acting = vec![inputs.torque.clone(); model.integrator.substeps()];
     let width: usize = filters.iter().map(DiscreteFilter::memory).sum();
     if width == 0 {
         return acting;
@@ -116,54 +115,34 @@ struct Step<'b, 'm> {
 }
 
 impl Step<'_, '_> {
-    /// v' = v + h f_v, q' = q + h (f_q + h f_v)
-    fn semi_implicit(&mut self, inputs: &Inputs, torque: &[Value]) -> Vec<Value> {
-        let time = inputs.time.as_ref();
-        let rates = self
-            .derivative
-            .write(self.builder, &inputs.state, torque, time);
-        let n = torque.len();
-        let gains: Vec<Value> = rates[n..].iter().map(|f| self.times(self.h, f)).collect();
-        let (q, v) = inputs.state.split_at(n);
-        let mut next = Vec::new();
-        for ((q, f), gain) in q.iter().zip(&rates).zip(&gains) {
-            let speed = self.builder.apply("Add", &[f, gain]);
-            next.push(self.along(q, self.h, &speed));
-        }
-        for (v, gain) in v.iter().zip(&gains) {
-            next.push(self.builder.apply("Add", &[v, gain]));
-        }
-        next
-    }
-
-    /// The classical Runge-Kutta method of order 4, in substep `k`.
-    fn rk4(
+    /// Substep `k` by a scheme.
+    fn substep(
         &mut self,
+        scheme: &Scheme,
         state: &[Value],
         torque: &[Value],
         time: Option<&Value>,
         k: usize,
     ) -> Vec<Value> {
-        let h = self.h;
-        let from = k as f64 * h;
-        let k1 = self.stage(state, torque, time, from);
-        let at = self.all_along(state, 0.5 * h, &k1);
-        let k2 = self.stage(&at, torque, time, from + 0.5 * h);
-        let at = self.all_along(state, 0.5 * h, &k2);
-        let k3 = self.stage(&at, torque, time, from + 0.5 * h);
-        let at = self.all_along(state, h, &k3);
-        let k4 = self.stage(&at, torque, time, from + h);
-        let slopes = (0..state.len()).map(|j| {
-            let middle = self.builder.apply("Add", &[&k2[j], &k3[j]]);
-            let ends = self.builder.apply("Add", &[&k1[j], &k4[j]]);
-            let middle = self.times(2.0, &middle);
-            self.builder.apply("Add", &[&ends, &middle])
-        });
-        let slopes: Vec<Value> = slopes.collect();
-        self.all_along(state, h / 6.0, &slopes)
+        let begin = k as f64 * self.h;
+        let (mut inner, mut next, mut rates) = (state.to_vec(), state.to_vec(), Vec::new());
+        for (place, stage) in scheme.stages.iter().enumerate() {
+            rates = self.rates(&inner, torque, time, begin + stage.time * self.h);
+            next = self.along(&next, stage.weight * self.h, &rates);
+            if place + 1 < scheme.stages.len() {
+                inner = self.along(state, stage.reach * self.h, &rates);
+            }
+        }
+        if scheme.semi_implicit {
+            let n = torque.len();
+            // The velocities' gain moves the positions, too: h^2 f_v.
+            let moved = self.along(&next[..n], self.h * self.h, &rates[n..]);
+            next.splice(..n, moved);
+        }
+        next
     }
 
-    fn stage(
+    fn rates(
         &mut self,
         state: &[Value],
         torque: &[Value],
@@ -178,19 +157,15 @@ impl Step<'_, '_> {
             .write(self.builder, state, torque, time.as_ref())
     }
 
-    fn all_along(&mut self, state: &[Value], h: f64, slopes: &[Value]) -> Vec<Value> {
-        let pairs = state.iter().zip(slopes);
-        pairs.map(|(x, slope)| self.along(x, h, slope)).collect()
-    }
-
     /// x + h * slope
-    fn along(&mut self, x: &Value, h: f64, slope: &Value) -> Value {
-        let part = self.times(h, slope);
-        self.builder.apply("Add", &[x, &part])
-    }
-
-    fn times(&mut self, factor: f64, value: &Value) -> Value {
-        let factor = self.builder.constant(factor);
-        self.builder.apply("Mul", &[&factor, value])
+    fn along(&mut self, x: &[Value], h: f64, slopes: &[Value]) -> Vec<Value> {
+        let h = self.builder.constant(h);
+        let pairs = x.iter().zip(slopes);
+        pairs
+            .map(|(x, slope)| {
+                let part = self.builder.apply("Mul", &[&h, slope]);
+                self.builder.apply("Add", &[x, &part])
+            })
+            .collect()
     }
 }

@@ -14,7 +14,8 @@ use super::verify::{Client, PythonClient};
 use super::{ExportError, ExportModel, File, Format};
 use crate::control::Task;
 use crate::expr::Program;
-use crate::model::{Angles, Integrator, MlpWeights, ResidualOn};
+use crate::model::{Angles, MlpWeights, ResidualOn};
+use crate::sim::Scheme;
 use notation::{Python, literal};
 
 pub(super) const FORMAT: Format = Format {
@@ -33,8 +34,8 @@ pub(super) const FORMAT: Format = Format {
 };
 
 const STEP: &str = include_str!("step.py");
-const SEMI_IMPLICIT_EULER: &str = include_str!("semi_implicit_euler.py");
-const RK4: &str = include_str!("rk4.py");
+const SEMI_IMPLICIT: &str = include_str!("semi_implicit.py");
+const RUNGE_KUTTA: &str = include_str!("runge_kutta.py");
 const ENVIRONMENT: &str = include_str!("environment.py");
 
 fn not_carried(model: &ExportModel) -> Vec<String> {
@@ -75,10 +76,7 @@ fn module(model: &ExportModel, task: Option<&Task>) -> String {
     let mut out = head(model);
     constants(&mut out, model);
     derivative(&mut out, model);
-    out += match model.integrator {
-        Integrator::SemiImplicitEuler => SEMI_IMPLICIT_EULER,
-        Integrator::Rk4 | Integrator::Fine { .. } => RK4,
-    };
+    out += &advance(model.integrator.scheme());
     out += STEP;
     if let Some(task) = task {
         reward(&mut out, task);
@@ -115,8 +113,22 @@ fn head(model: &ExportModel) -> String {
     )
 }
 
+/// The step of a scheme.
+fn advance(scheme: &Scheme) -> String {
+    if scheme.semi_implicit {
+        return SEMI_IMPLICIT.to_owned();
+    }
+    let stages = scheme.stages.iter().map(|stage| {
+        let numbers = [stage.time, stage.reach, stage.weight].map(literal);
+        format!("({})", numbers.join(", "))
+    });
+    RUNGE_KUTTA
+        .replace("@TITLE@", scheme.title)
+        .replace("@STAGES@", &stages.collect::<Vec<_>>().join(", "))
+}
+
 fn constants(out: &mut String, model: &ExportModel) {
-    let substeps = model.integrator.parts();
+    let substeps = model.integrator.substeps();
     let _ = write!(
         out,
         "\nJOINTS = {}\n# How long a torque is held, in s.\nSTEP = {}\nSUBSTEPS = {substeps}\n",

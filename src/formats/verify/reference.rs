@@ -1,6 +1,6 @@
 use super::{Predictions, Samples};
-use crate::model::{Dynamics, Integrator, MlpWeights, NetworkError, with_residual};
-use crate::plant::Environment;
+use crate::model::{Dynamics, MlpWeights, NetworkError, with_residual};
+use crate::sim::{Environment, Integrator};
 
 /// A whole model, networks included, and how it is stepped: the program's own predictions, in f64.
 #[derive(Debug, Clone)]
@@ -64,7 +64,6 @@ impl ReferenceModel {
 
     /// At rest: no torque has been commanded so far.
     fn environment(&self) -> Environment<'_> {
-        let values = self.whole.values();
-        Environment::new(&self.whole, &values, self.integrator, self.step_s)
+        Environment::new(&self.whole, self.integrator, self.step_s)
     }
 }

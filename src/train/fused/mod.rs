@@ -6,7 +6,6 @@ mod operation;
 mod part;
 mod plan;
 mod record;
-mod scheme;
 mod tapes;
 mod work;
 mod worker;

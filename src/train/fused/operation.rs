@@ -14,10 +14,9 @@ use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 
 use super::plan::{KEPT, Plan};
-use super::scheme::Scheme;
 use super::work::Work;
 use super::{Blocks, Crew};
-use crate::model::Integrator;
+use crate::sim::Integrator;
 use crate::train::HybridModel;
 
 /// E and ||F_r||, `[2]`.
@@ -33,7 +32,7 @@ pub(in crate::train) fn loss(
     let plan = Plan {
         frame: model.frame().clone(),
         blocks: blocks.clone(),
-        scheme: Scheme::of(integrator),
+        integrator,
         precision: precision.clone(),
         kept: KEPT,
     };

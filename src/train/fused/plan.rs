@@ -2,8 +2,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Blocks;
-use super::scheme::Scheme;
 use crate::batch::{Network, Rows};
+use crate::sim::Integrator;
 use crate::train::Frame;
 
 /// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
@@ -18,7 +18,7 @@ pub(super) const KEPT: usize = (1 << 30) / size_of::<Rows>();
 pub(super) struct Plan {
     pub frame: Arc<Frame>,
     pub blocks: Arc<Blocks>,
-    pub scheme: Scheme,
+    pub integrator: Integrator,
     /// 1 / scale of each state's error.
     pub precision: Arc<[f32]>,
     /// Records of more rows than these together are not kept: the way back then begins with the way there again.
@@ -36,7 +36,7 @@ pub(super) struct Numbers {
 impl Plan {
     /// Derivatives of the dynamics that a segment's rollout takes.
     pub(super) fn stages(&self) -> usize {
-        self.blocks.steps * self.scheme.substeps * self.scheme.stages.len()
+        self.blocks.steps * self.integrator.substeps() * self.integrator.scheme().stages.len()
     }
 
     /// Over how many rows and steps the means of the loss go.

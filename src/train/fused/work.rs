@@ -211,9 +211,9 @@ mod tests {
     use std::sync::Arc;
 
     use super::{Crew, Work};
-    use crate::model::{Integrator, LastLayer};
+    use crate::model::LastLayer;
+    use crate::sim::Integrator;
     use crate::train::fused::plan::{KEPT, Plan};
-    use crate::train::fused::scheme::Scheme;
     use crate::train::tests::{hybrid, transitions};
     use crate::train::{Backend, Batch};
 
@@ -232,7 +232,7 @@ mod tests {
             let plan = Plan {
                 frame: model.frame().clone(),
                 blocks: blocks.clone(),
-                scheme: Scheme::of(Integrator::Rk4),
+                integrator: Integrator::RK4,
                 precision: [1.0; 2].into(),
                 kept,
             };

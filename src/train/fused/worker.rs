@@ -3,11 +3,12 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::plan::{CHUNK, Numbers, Plan};
-use super::record::{Layout, Stage};
+use super::record::{Layout, Stage as Recorded};
 use super::tapes::Tapes;
 use crate::batch::{Network, Rows, W};
 use crate::expr::Tape;
 use crate::lanes::{Element, Vector};
+use crate::sim::Stage;
 use crate::train::Frame;
 
 /// One thread at work on a chunk of blocks.
@@ -124,7 +125,7 @@ impl<S: Simd> Worker<'_, S> {
             state.copy_from_slice(blocks.given(block, 0).state);
         }
         for step in 0..blocks.steps {
-            for substep in 0..self.plan.scheme.substeps {
+            for substep in 0..self.plan.integrator.substeps() {
                 self.substep(tapes, scratch, record, (step, substep), &mut sums[1]);
             }
             let end = self.layout.end(record, step);
@@ -163,8 +164,9 @@ impl<S: Simd> Worker<'_, S> {
         let Scratch {
             state, rates, mean, ..
         } = scratch;
-        let (scheme, states) = (self.plan.scheme, self.states());
-        for (stage, (part, weight)) in scheme.stages.iter().enumerate() {
+        let (scheme, states) = (self.plan.integrator.scheme(), self.states());
+        for (stage, Stage { time, weight, .. }) in scheme.stages.iter().enumerate() {
+            let (time, weight) = (*time as f32, *weight as f32);
             let place = Place {
                 step,
                 substep,
@@ -172,7 +174,7 @@ impl<S: Simd> Worker<'_, S> {
             };
             let mut record = self.stage(record, place);
             for (b, block) in self.chunk.clone().enumerate() {
-                let h = self.part_of_step(block, step, *part);
+                let h = self.part_of_step(block, step, time);
                 for k in b * states..(b + 1) * states {
                     let of = [&state[k], &rates[k], &h];
                     update(
@@ -193,7 +195,7 @@ impl<S: Simd> Worker<'_, S> {
             if self.is_penalised(place) {
                 self.add_residual(&record, residual);
             }
-            let weight = Vector::splat(self.simd, *weight);
+            let weight = Vector::splat(self.simd, weight);
             for (mean, rate) in mean.iter_mut().zip(&*rates) {
                 update(self.simd, mean, [rate], |mean, [rate]| {
                     if stage == 0 {
@@ -232,7 +234,7 @@ impl<S: Simd> Worker<'_, S> {
         &self,
         program: &mut Tape<f32, W>,
         place: Place,
-        record: &mut Stage,
+        record: &mut Recorded,
         rates: &mut [Rows],
     ) {
         let states = self.states();
@@ -268,7 +270,7 @@ impl<S: Simd> Worker<'_, S> {
 
     /// Add the squares of the residual's outputs.
     #[inline(always)]
-    fn add_residual(&self, record: &Stage, sum: &mut Rows) {
+    fn add_residual(&self, record: &Recorded, sum: &mut Rows) {
         let last = self.numbers.networks.len() - 1;
         let network = &self.numbers.networks[last];
         let values = record.networks[last]
@@ -318,7 +320,7 @@ impl<S: Simd> Worker<'_, S> {
                     );
                 }
             }
-            for substep in (0..self.plan.scheme.substeps).rev() {
+            for substep in (0..self.plan.integrator.substeps()).rev() {
                 self.substep_back(tapes, desk, record, (step, substep), seeds[1]);
             }
         }
@@ -334,7 +336,7 @@ impl<S: Simd> Worker<'_, S> {
         (step, substep): (usize, usize),
         seed: f32,
     ) {
-        let (scheme, states) = (self.plan.scheme, self.states());
+        let (scheme, states) = (self.plan.integrator.scheme(), self.states());
         for (b, block) in self.chunk.clone().enumerate() {
             let h = self.part_of_step(block, step, 1.0);
             let adjoint = &desk.scratch.state[b * states..][..states];
@@ -351,7 +353,8 @@ impl<S: Simd> Worker<'_, S> {
                 }
             }
         }
-        for (stage, (_, weight)) in scheme.stages.iter().enumerate().rev() {
+        for (stage, Stage { reach, weight, .. }) in scheme.stages.iter().enumerate().rev() {
+            let (reach, weight) = (*reach as f32, *weight as f32);
             let place = Place {
                 step,
                 substep,
@@ -362,10 +365,9 @@ impl<S: Simd> Worker<'_, S> {
                 rates, mean, other, ..
             } = &mut desk.scratch;
             for (b, block) in self.chunk.clone().enumerate() {
-                let after = scheme.stages.get(stage + 1).map_or(0.0, |(part, _)| *part);
-                let h = self.part_of_step(block, step, after);
+                let h = self.part_of_step(block, step, reach);
                 for k in b * states..(b + 1) * states {
-                    let weight = Vector::splat(self.simd, *weight);
+                    let weight = Vector::splat(self.simd, weight);
                     let of = [&mean[k], &other[k], &h];
                     update(self.simd, &mut rates[k], of, |_, [mean, other, h]| {
                         if last {
@@ -393,7 +395,7 @@ impl<S: Simd> Worker<'_, S> {
         &self,
         tapes: &mut Tapes,
         place: Place,
-        record: &mut Stage,
+        record: &mut Recorded,
         desk: &mut Desk,
         seed: f32,
     ) {
@@ -474,9 +476,9 @@ impl<S: Simd> Worker<'_, S> {
         for (to, from) in inputs.iter_mut().zip(state.iter().chain(given.input)) {
             *to = *from;
         }
-        let (part, _) = self.plan.scheme.stages[place.stage];
+        let time = self.plan.integrator.scheme().stages[place.stage].time as f32;
         #[allow(clippy::cast_precision_loss)] // few substeps
-        let elapsed = self.part_of_step(block, place.step, place.substep as f32 + part);
+        let elapsed = self.part_of_step(block, place.step, place.substep as f32 + time);
         let mut time = *given.time;
         update(self.simd, &mut time, [&elapsed], |time, [elapsed]| {
             time + elapsed
@@ -488,17 +490,19 @@ impl<S: Simd> Worker<'_, S> {
     #[inline(always)]
     fn part_of_step(&self, block: usize, step: usize, part: f32) -> Rows {
         #[allow(clippy::cast_precision_loss)] // few substeps
-        let part = Vector::splat(self.simd, part / self.plan.scheme.substeps as f32);
+        let part = Vector::splat(self.simd, part / self.plan.integrator.substeps() as f32);
         let mut length = *self.plan.blocks.given(block, step).dt;
         update(self.simd, &mut length, [], |dt, []| dt * part);
         length
     }
 
     #[inline(always)]
-    fn stage<'r>(&self, record: &'r mut [Rows], place: Place) -> Stage<'r> {
-        let scheme = self.plan.scheme;
-        let index =
-            (place.step * scheme.substeps + place.substep) * scheme.stages.len() + place.stage;
+    fn stage<'r>(&self, record: &'r mut [Rows], place: Place) -> Recorded<'r> {
+        let (substeps, stages) = (
+            self.plan.integrator.substeps(),
+            self.plan.integrator.scheme().stages.len(),
+        );
+        let index = (place.step * substeps + place.substep) * stages + place.stage;
         self.layout.stage(record, index, &self.numbers.networks)
     }
 

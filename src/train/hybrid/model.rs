@@ -8,9 +8,9 @@ use super::prepared::{columns, rows_of};
 use super::{Frame, HybridError, Prepared, equations};
 use crate::control::Predictor;
 use crate::model::{
-    Dynamics, Integrator, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but,
-    with_residual,
+    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
 };
+use crate::sim::Integrator;
 
 // The names by which Burn knows the tensors.
 pub(in crate::train) const PRIOR_ID: u64 = 1;

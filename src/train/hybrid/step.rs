@@ -1,7 +1,7 @@
 use burn::tensor::Tensor;
 
 use super::{Flow, Prepared};
-use crate::model::Integrator;
+use crate::sim::{Integrator, Scheme};
 
 /// One step of a batch.
 #[derive(Debug, Clone)]
@@ -25,22 +25,48 @@ impl Prepared<'_> {
     ) -> Step {
         let first = self.flow(state, input, time);
         let residual = first.residual.clone();
-        let state = match integrator {
-            Integrator::SemiImplicitEuler => semi_implicit(state, &first, dt),
-            Integrator::Rk4 => rk4(self, state, input, time, dt, first),
-            Integrator::Fine { steps } => {
-                let h = dt.clone() / f64::from(steps.get());
-                let mut now = rk4(self, state, input, time, &h, first);
-                for k in 1..steps.get() {
-                    let time = time.clone() + h.clone() * f64::from(k);
-                    let start = self.flow(&now, input, &time);
-                    now = rk4(self, &now, input, &time, &h, start);
-                }
-                now
-            }
+        let h = match integrator.substeps() {
+            1 => dt.clone(),
+            substeps => dt.clone() / substeps as f64,
         };
+        let mut state = substep(integrator.scheme(), self, state, input, time, &h, first);
+        for k in 1..integrator.substeps() {
+            let time = time.clone() + h.clone() * k as f64;
+            let start = self.flow(&state, input, &time);
+            state = substep(integrator.scheme(), self, &state, input, &time, &h, start);
+        }
         Step { state, residual }
     }
+}
+
+/// A substep of length `h`; `first` is the flow at its start.
+fn substep(
+    scheme: &Scheme,
+    model: &Prepared,
+    state: &[Tensor<1>],
+    input: &[Tensor<1>],
+    time: &Tensor<1>,
+    h: &Tensor<1>,
+    first: Flow,
+) -> Vec<Tensor<1>> {
+    if scheme.semi_implicit {
+        return semi_implicit(state, &first, h);
+    }
+    let mut rates = first.rates;
+    let mut mean: Vec<Tensor<1>> = Vec::new();
+    for (k, stage) in scheme.stages.iter().enumerate() {
+        if k > 0 {
+            let after = h.clone() * stage.time;
+            let inner = along(state, &rates, &after);
+            rates = model.flow(&inner, input, &(time.clone() + after)).rates;
+        }
+        let weighted = rates.iter().map(|rate| rate.clone() * stage.weight);
+        mean = match k {
+            0 => weighted.collect(),
+            _ => mean.into_iter().zip(weighted).map(|(a, b)| a + b).collect(),
+        };
+    }
+    along(state, &mean, h)
 }
 
 fn semi_implicit(state: &[Tensor<1>], flow: &Flow, h: &Tensor<1>) -> Vec<Tensor<1>> {
@@ -55,28 +81,6 @@ fn semi_implicit(state: &[Tensor<1>], flow: &Flow, h: &Tensor<1>) -> Vec<Tensor<
         .zip(&gains)
         .map(|(v, gain)| v.clone() + gain.clone());
     positions.chain(velocities).collect()
-}
-
-/// `first` is the flow at the start of the step.
-fn rk4(
-    model: &Prepared,
-    state: &[Tensor<1>],
-    input: &[Tensor<1>],
-    time: &Tensor<1>,
-    h: &Tensor<1>,
-    first: Flow,
-) -> Vec<Tensor<1>> {
-    let half = h.clone() * 0.5;
-    let (middle, end) = (time.clone() + half.clone(), time.clone() + h.clone());
-    let k1 = first.rates;
-    let k2 = model.flow(&along(state, &k1, &half), input, &middle).rates;
-    let k3 = model.flow(&along(state, &k2, &half), input, &middle).rates;
-    let k4 = model.flow(&along(state, &k3, h), input, &end).rates;
-    let sixth = h.clone() / 6.0;
-    let mean: Vec<Tensor<1>> = (k1.into_iter().zip(k2).zip(k3).zip(k4))
-        .map(|(((a, b), c), d)| a + (b + c) * 2.0 + d)
-        .collect();
-    along(state, &mean, &sixth)
 }
 
 /// state + h * rates

@@ -9,21 +9,12 @@ use rand::RngExt;
 
 use super::{hybrid, one_joint, parameter, rng, transitions};
 use crate::expr::SignForm;
-use crate::model::{
-    Angles, Dynamics, Integrator, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn,
-};
+use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
+use crate::sim::Integrator;
 use crate::train::hybrid::{PRIOR_ID, RESIDUAL_ID};
 use crate::train::{
     Backend, Batch, FitSettings, HybridModel, Objective, Segments, Start, Sweep, Training,
 };
-
-const INTEGRATORS: [Integrator; 3] = [
-    Integrator::SemiImplicitEuler,
-    Integrator::Rk4,
-    Integrator::Fine {
-        steps: std::num::NonZeroU32::new(3).unwrap(),
-    },
-];
 
 /// Segments of `steps` irregular steps that lead through random states.
 pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
@@ -145,7 +136,7 @@ fn the_fused_loss_is_the_composed_one_for_every_model_and_integrator() {
         for steps in [1, 3] {
             let segments = segments(joints, 37, steps);
             for model in models(joints, &Backend::NdArray.device()) {
-                for integrator in INTEGRATORS {
+                for integrator in Integrator::each() {
                     assert_agrees(&model, &segments, integrator);
                 }
             }
@@ -166,7 +157,7 @@ fn batches_of_any_size_agree() {
 fn checkpointing_of_gradients_changes_nothing() {
     let segments = segments(1, 40, 2);
     for model in models(1, &Backend::NdArray.device().gradient_checkpointing()) {
-        assert_agrees(&model, &segments, Integrator::Rk4);
+        assert_agrees(&model, &segments, Integrator::RK4);
     }
 }
 
@@ -178,7 +169,7 @@ fn equations_without_parameters_can_have_a_residual() {
     let model = HybridModel::physics(&dynamics, &Backend::NdArray.device())
         .and_then(|model| model.with_residual(&residual))
         .unwrap();
-    assert_agrees(&model, &segments, Integrator::Rk4);
+    assert_agrees(&model, &segments, Integrator::RK4);
 }
 
 #[test]
@@ -186,7 +177,7 @@ fn a_frozen_input_leaves_the_others_gradient_as_it_is() {
     let segments = segments(1, 40, 2);
     let device = Backend::NdArray.device();
     let batch = segments.all(&device);
-    let objective = Objective::new(Integrator::Rk4, None, 1).unwrap();
+    let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
     let gradients = |model: &HybridModel| {
         let loss = objective.loss(model, &batch).weighted([1.0, 1.0]);
         gradients_of(model, &loss.backward())
@@ -213,7 +204,7 @@ fn what_is_not_finite_stays_so() {
     let dynamics = one_joint("C * exp(1000 * q1 * q1)", vec![parameter("C", 3.0)]);
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
     let model = HybridModel::physics(&dynamics, &Backend::NdArray.device()).unwrap();
-    let objective = Objective::new(Integrator::Rk4, None, 1).unwrap();
+    let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
     let batch = segments.all(&model.device());
     for model in [model.clone(), model.with_residual(&residual).unwrap()] {
         let [error, _] = objective.loss(&model, &batch).numbers();

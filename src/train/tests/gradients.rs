@@ -1,7 +1,8 @@
 use burn::module::Module;
 
 use super::{hybrid, rng, transitions};
-use crate::model::{Integrator, LastLayer, MlpWeights, ModelWeights};
+use crate::model::{LastLayer, MlpWeights, ModelWeights};
+use crate::sim::Integrator;
 use crate::train::{Backend, HybridModel, Objective, Segments};
 
 /// A trajectory with irregular steps, cut into segments of three.
@@ -42,16 +43,9 @@ fn moved(weights: &ModelWeights, physical: bool, k: usize, by: f64) -> ModelWeig
 
 #[test]
 fn gradients_match_central_differences() {
-    let integrators = [
-        Integrator::SemiImplicitEuler,
-        Integrator::Rk4,
-        Integrator::Fine {
-            steps: 2.try_into().unwrap(),
-        },
-    ];
     for (backend, integrator) in Backend::ALL
         .iter()
-        .flat_map(|b| integrators.map(|i| (*b, i)))
+        .flat_map(|b| Integrator::each().into_iter().map(move |i| (*b, i)))
     {
         let segments = segments();
         let model = hybrid((8.0, 2.0), &segments, backend, LastLayer::Random);

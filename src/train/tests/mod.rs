@@ -1,10 +1,10 @@
 //! Tests of training on a simulated pendulum, whose parts they share.
 
 mod checkpoints;
+mod environment;
 mod fused;
 mod gradients;
 mod parity;
-mod plant;
 mod recovery;
 mod resume;
 mod shrinking;

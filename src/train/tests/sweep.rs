@@ -5,7 +5,8 @@ use std::ops::ControlFlow;
 
 use super::fused::{equations, network, segments};
 use super::{one_joint, parameter, rng, transitions};
-use crate::model::{Angles, Integrator, LastLayer, ResidualOn};
+use crate::model::{Angles, LastLayer, ResidualOn};
+use crate::sim::Integrator;
 use crate::train::optimizer::Stepper;
 use crate::train::{
     Backend, Batch, Batching, FitSettings, HybridModel, Objective, Penalty, Segments, Start, Sweep,
@@ -105,7 +106,7 @@ fn every_model_is_as_trained_alone() {
             let data_driven =
                 HybridModel::network("system", joints, &prior, &backend.device()).unwrap();
             for (model, last) in [(hybrid, LastLayer::Zero), (data_driven, LastLayer::Random)] {
-                for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4] {
+                for integrator in [Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4] {
                     let settings = FitSettings {
                         integrator,
                         ..settings()

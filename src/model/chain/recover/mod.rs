@@ -19,7 +19,7 @@ type Planar = Complex<f64>;
 
 /// A mechanism with the same equations of motion.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recovered {
+pub(crate) struct Recovered {
     pub joints: Vec<Joint>,
     /// m/s^2
     pub gravity: f64,
@@ -39,7 +39,7 @@ const GRAVITY: f64 = 9.81;
 ///
 /// # Errors
 /// Equations of another kind of mechanism, or of one that no bodies can have.
-pub fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, String> {
+pub(crate) fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, String> {
     let (shape, links): (Shape, fn(&[f64], f64) -> Result<Links, String>) = match prismatic {
         [false] => (Shape::turning(), links::turning),
         [true] => (Shape::sliding(), links::sliding),

@@ -3,25 +3,21 @@ use std::path::Path;
 use burn::tensor::{Tensor, TensorData};
 
 use crate::expr::SignForm;
-use crate::model::{Integrator, Library};
-use crate::plant::Environment;
+use crate::model::Library;
+use crate::sim::{Environment, Integrator};
 use crate::train::{Backend, HybridModel};
 
 #[test]
-fn a_plant_steps_as_training_does() {
+fn an_environment_steps_as_training_does() {
     let system = Library::built_in().system(Path::new("acrobot")).unwrap();
     let dynamics = system.dynamics(&[SignForm::DEFAULT; 2]);
     let device = Backend::NdArray.device();
     let model = HybridModel::physics(&dynamics, &device).unwrap();
     let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);
     let (start, tau) = ([0.5, -1.0, 2.0, -3.0], [1.0, -2.0]);
-    let fine = Integrator::Fine {
-        steps: 3.try_into().unwrap(),
-    };
-    for integrator in [Integrator::SemiImplicitEuler, Integrator::Rk4, fine] {
+    for integrator in Integrator::each() {
         let mut state = start;
-        Environment::new(&dynamics, &dynamics.values(), integrator, 0.02)
-            .step(&mut state, &tau, 0.0);
+        Environment::new(&dynamics, integrator, 0.02).step(&mut state, &tau, 0.0);
         let prepared = model.prepare();
         let (columns, inputs) = (start.map(column), tau.map(column));
         let step = prepared.step(integrator, &columns, &inputs, &column(0.0), &column(0.02));

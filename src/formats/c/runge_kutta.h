@@ -1,8 +1,8 @@
 
-/* The classical Runge-Kutta method: weight of each stage's slope, and how far the next stage is. */
-static const model_real model_weight[4] = {MODEL_(1.0) / 6, MODEL_(1.0) / 3, MODEL_(1.0) / 3,
-        MODEL_(1.0) / 6};
-static const model_real model_reach[4] = {MODEL_(0.5), MODEL_(0.5), 1, 0};
+/* The @TITLE@: weight of each stage's slope, and how far the next stage is. */
+#define MODEL_STAGES @STAGES@
+static const model_real model_weight[MODEL_STAGES] = {@WEIGHTS@};
+static const model_real model_reach[MODEL_STAGES] = {@REACHES@};
 
 static inline void model_advance(const model_parameters *parameters, model_real state[MODEL_STATES],
         const model_real torque[MODEL_JOINTS], model_real time,
@@ -12,7 +12,7 @@ static inline void model_advance(const model_parameters *parameters, model_real 
     int stage, i;
     for (i = 0; i < MODEL_STATES; i++)
         inner[i] = sum[i] = state[i];
-    for (stage = 0; stage < 4; stage++) {
+    for (stage = 0; stage < MODEL_STAGES; stage++) {
         const model_real weight = model_weight[stage] * h, reach = model_reach[stage] * h;
         model_derivative(parameters, inner, torque, now, rates);
         for (i = 0; i < MODEL_STATES; i++) {
@@ -41,7 +41,7 @@ static inline void model_advance_jacobian(const model_parameters *parameters,
         for (c = 0; c < MODEL_COLUMNS; c++)
             of_inner[i][c] = of_sum[i][c] = of_state[i][c];
     }
-    for (stage = 0; stage < 4; stage++) {
+    for (stage = 0; stage < MODEL_STAGES; stage++) {
         const model_real weight = model_weight[stage] * h, reach = model_reach[stage] * h;
         model_flow(parameters, inner, torque, now, of_inner, rates, of_rates);
         for (i = 0; i < MODEL_STATES; i++) {

@@ -1,79 +1,40 @@
-//! Effects with memory between a commanded torque and the torque that acts: pure filters of the command,
-//! independent of the rig's state.
+//! Delays and lags between commanded and acting torque: linear filters of the command, independent of the state.
 
-use serde::{Deserialize, Serialize};
-
-use super::Dynamics;
+use super::{Hold, Point};
 use crate::data::Log;
 use crate::lanes::Row;
+use crate::model::{CommandFilter, Filter};
 
-/// How a command is filtered; each kind has one parameter, in s. At zero both leave the command as it is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CommandFilter {
-    /// tau(t) -> tau(t - d)
-    Delay,
-    /// T dtau/dt + tau = commanded
-    Lag,
-}
-
-impl CommandFilter {
-    /// The filter of `tau` with its `parameter`, as text.
-    pub fn expression(self, tau: &str, parameter: &str) -> String {
-        match self {
-            Self::Delay => format!("{tau}(t - {parameter})"),
-            Self::Lag => format!("{parameter} * d({tau})/dt + {tau} = commanded"),
-        }
-    }
-
-    /// The same in LaTeX.
-    pub fn latex(self, tau: &str, parameter: &str) -> String {
-        match self {
-            Self::Delay => format!("{tau}\\left(t - {parameter}\\right)"),
-            Self::Lag => format!("{parameter} \\,\\dot{{{tau}}} + {tau} = \\text{{commanded}}"),
-        }
-    }
-}
-
-/// A filter of one joint's commanded torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Filter {
-    /// Counted from 0.
-    pub joint: usize,
-    pub kind: CommandFilter,
-    /// Index into the model's parameters.
-    pub parameter: usize,
-}
-
-/// What the filters of a model make of one history of commanded torques.
+/// A history of commanded torques, filtered by the delays and lags of a model.
 ///
-/// Between the rows of the history the command is held; before the first row it was that row's for ever,
-/// after the last it stays. Filters are linear, so that a delay and a lag on one joint have no order.
+/// Each command is held until the next row; the first one held for ever before, the last one holds for ever after. The
+/// filters are linear, so the order of a delay and a lag on one joint does not matter.
 #[derive(Debug, Clone)]
 pub struct Commands<'l> {
     time: &'l [f64],
     tau: &'l [Vec<f64>],
     joints: usize,
-    /// Filters of the model: what each stands for in the outputs of [`Commands::slopes`].
+    /// The model's filters, in the order of [`StepTorque::slopes`].
     filters: Vec<Filter>,
-    /// For each joint the filtered history, where there is a filter.
+    /// Per joint the filtered history, if the joint has a filter.
     histories: Vec<Option<History<'l>>>,
 }
 
-/// The torque over one part of a step.
+/// The acting torque over one substep.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Mean {
     /// In N m (or N).
     value: f64,
-    /// Derivatives of the value by the delay and the time constant, per s.
+    /// Derivatives of the value with respect to the delay and the time constant, per s.
     by_delay: f64,
     by_lag: f64,
 }
 
 impl<'l> Commands<'l> {
-    /// The filters of `dynamics` with parameters `values`, in its order, acting on torques `tau` (`[joint][row]`)
-    /// that are held from `time[row]` (s) on.
-    pub fn new(dynamics: &Dynamics, values: &[f64], time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
+    /// Filter the torques `tau` (`[joint][row]`), each held from `time[row]` (s) on.
+    pub fn new<'p>(model: impl Into<Point<'p>>, time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
+        let model = model.into();
+        let (dynamics, values) = (model.dynamics, model.values());
         let history = |joint: usize| {
             let own = |kind: CommandFilter| {
                 let mut filters = dynamics.filters.iter();
@@ -93,12 +54,28 @@ impl<'l> Commands<'l> {
         }
     }
 
-    /// The same for a log.
-    pub fn of_log(dynamics: &Dynamics, values: &[f64], log: &'l Log) -> Self {
-        Self::new(dynamics, values, &log.time, &log.tau)
+    /// Filter the torques of a log.
+    pub fn of_log<'p>(model: impl Into<Point<'p>>, log: &'l Log) -> Self {
+        Self::new(model, &log.time, &log.tau)
     }
 
-    /// The torque (`[joint][lane]`) that acted until a row of each history.
+    /// The time (s) of one row per lane.
+    pub(super) fn times<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Row<f64, W> {
+        Row(std::array::from_fn(|lane| commands[lane].time[rows[lane]]))
+    }
+
+    /// The commanded torques (`[joint][lane]`) held from one row per lane on.
+    pub(super) fn held<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
+        (0..commands[0].joints)
+            .map(|joint| {
+                Row(std::array::from_fn(|lane| {
+                    commands[lane].tau[joint][rows[lane]]
+                }))
+            })
+            .collect()
+    }
+
+    /// The torque (`[joint][lane]`) that acted just before one row per lane.
     pub fn just_before<const W: usize>(commands: [&Self; W], rows: [usize; W]) -> Vec<Row<f64, W>> {
         let of_lane = |joint: usize, lane: usize| {
             let (own, row) = (commands[lane], rows[lane]);
@@ -112,7 +89,7 @@ impl<'l> Commands<'l> {
             .collect()
     }
 
-    /// The log with the torque that acts in place of the commanded one: its mean from each row to the next.
+    /// The log with commanded torques replaced by the mean acting torque from each row to the next.
     #[must_use]
     pub fn acting_on(&self, log: &Log) -> Log {
         let mut acting = log.clone();
@@ -126,66 +103,69 @@ impl<'l> Commands<'l> {
     }
 }
 
-/// The torque over a step of `W` trajectories: mean and slopes over each of the step's equal parts.
+/// The torque that acts over a hold, per substep.
 #[derive(Debug, Clone, Default)]
 pub struct StepTorque<const W: usize> {
-    /// `[part * n + joint][lane]`, in N m (or N). Without filters one part stands for the whole step.
+    /// `[substep * n + joint][lane]`: mean torque in N m (or N). Without filters one entry per joint stands for all
+    /// substeps.
     pub mean: Vec<Row<f64, W>>,
-    /// `[part * filters + filter][lane]`: derivative of the mean on the filter's joint by its parameter.
+    /// `[substep * filters + filter][lane]`: derivative of the mean on the filter's joint with respect to its
+    /// parameter.
     pub slopes: Vec<Row<f64, W>>,
 }
 
 impl<const W: usize> StepTorque<W> {
-    /// From `from` to `to` (s), one each lane, in `parts` equal parts. `held` (`[joint][lane]`) is the command over
-    /// the step: it acts on joints without a filter.
+    /// The torque that acts over a hold.
     ///
-    /// Means over parts make an integration with parts accurate to second order in their length, wherever between
-    /// them the torque jumps, and its result smooth in the filters' parameters.
-    pub fn new(
-        commands: [&Commands<'_>; W],
-        held: &[Row<f64, W>],
-        from: Row<f64, W>,
-        to: Row<f64, W>,
-        parts: usize,
-    ) -> Self {
+    /// With means over substeps the integration is accurate to second order in the substep wherever the torque jumps,
+    /// and its result is smooth in the filters' parameters.
+    pub fn new(hold: &Hold<'_, W>) -> Self {
         let mut torque = Self::default();
-        torque.fill(commands, held, from, to, parts);
+        torque.fill(hold);
         torque
     }
 
-    /// As [`StepTorque::new`], in the memory of a step before.
-    pub fn fill(
-        &mut self,
-        commands: [&Commands<'_>; W],
-        held: &[Row<f64, W>],
-        from: Row<f64, W>,
-        to: Row<f64, W>,
-        parts: usize,
-    ) {
-        let model = commands[0];
+    /// As [`StepTorque::new`], reusing the memory.
+    pub fn fill(&mut self, hold: &Hold<'_, W>) {
         self.mean.clear();
         self.slopes.clear();
-        if model.filters.is_empty() {
-            self.mean.extend_from_slice(held);
-            return;
-        }
+        let filters = hold.commands[0].filters.len();
+        let parts = if filters == 0 { 1 } else { hold.substeps };
         for _ in 0..parts {
-            self.mean.extend_from_slice(held);
+            self.mean.extend_from_slice(hold.held);
         }
-        self.slopes
-            .resize(parts * model.filters.len(), Row::splat(0.0));
+        self.slopes.resize(parts * filters, Row::splat(0.0));
         for lane in 0..W {
-            for joint in 0..model.joints {
-                if let Some(history) = &commands[lane].histories[joint] {
-                    for (part, mean) in history.means(from[lane], to[lane], parts).enumerate() {
-                        self.set(lane, joint, model, part, mean);
-                    }
-                }
+            self.filter(lane, hold);
+        }
+        for (tau, force) in self.mean.iter_mut().zip(hold.force.iter().cycle()) {
+            for lane in 0..W {
+                tau[lane] += force[lane];
             }
         }
     }
 
-    /// Means over one part, one a joint, and the slopes there, one a filter.
+    /// Write the filtered torques of one lane.
+    fn filter(&mut self, lane: usize, hold: &Hold<'_, W>) {
+        let model = hold.commands[lane];
+        let (from, to) = (hold.from[lane], hold.to[lane]);
+        for (joint, history) in model.histories.iter().enumerate() {
+            let Some(history) = history else { continue };
+            for (part, mean) in history.means(from, to, hold.substeps).enumerate() {
+                self.set(lane, joint, model, part, mean);
+            }
+        }
+    }
+
+    /// The mean torque per joint over the last substep, or 0 before the first hold.
+    pub(super) fn at_end(&self, joints: usize) -> Vec<Row<f64, W>> {
+        match self.mean.len().checked_sub(joints) {
+            Some(last) => self.mean[last..].to_vec(),
+            None => vec![Row::splat(0.0); joints],
+        }
+    }
+
+    /// The mean torque per joint over one substep, and its slopes per filter.
     pub fn part(&self, joints: usize, part: usize) -> (&[Row<f64, W>], &[Row<f64, W>]) {
         let parts = self.mean.len() / joints;
         let filters = self.slopes.len() / parts;
@@ -209,27 +189,28 @@ impl<const W: usize> StepTorque<W> {
     }
 }
 
-/// One joint's command, delayed by `delay` and smoothed with the time constant `lag` (s), in closed form.
+/// The command of one joint, delayed by `delay` and lagged with the time constant `lag` (s), in closed form.
 #[derive(Debug, Clone)]
 struct History<'l> {
     delay: f64,
     lag: f64,
     time: &'l [f64],
-    /// The command from each row on.
+    /// The command held from each row on.
     command: &'l [f64],
-    /// At each row: integral of the command from the first row on, output of the lag, its derivative by `lag`.
+    /// At each row: integral of the command since the first row, output of the lag, derivative of the output with
+    /// respect to `lag`.
     integral: Vec<f64>,
     output: Vec<f64>,
     output_by_lag: Vec<f64>,
 }
 
-/// The filtered torque at one instant, seen from the left: what a delay above zero lets see.
+/// The filtered torque just before an instant.
 #[derive(Debug, Clone, Copy)]
 struct Instant {
-    /// In s, less the delay.
+    /// The instant less the delay, in s.
     time: f64,
     output: f64,
-    /// Integral of the output up to now, up to a constant.
+    /// Integral of the output up to the instant, plus an arbitrary constant.
     integral: f64,
     integral_by_lag: f64,
 }
@@ -256,10 +237,10 @@ impl<'l> History<'l> {
         history
     }
 
-    /// Output of the lag, and its derivative by the time constant, `span` seconds after a row.
+    /// Output of the lag and its derivative with respect to the time constant, `span` seconds after a row.
     fn within(&self, row: usize, span: f64) -> (f64, f64) {
         let (command, gap) = (self.command[row], self.output[row] - self.command[row]);
-        // After 700 time constants the exponential is below every number, and without a lag at once.
+        // After 700 time constants the exponential underflows. This also covers a time constant of zero.
         if span > 700.0 * self.lag {
             return (command, 0.0);
         }
@@ -287,7 +268,7 @@ impl<'l> History<'l> {
                 (output, output_by_lag, integral)
             }
         };
-        // T dx/dt + x = u, integrated once.
+        // From the integral of T dx/dt + x = u.
         Instant {
             time,
             output,
@@ -300,7 +281,7 @@ impl<'l> History<'l> {
         self.at(from).mean_until(&self.at(to))
     }
 
-    /// Means over equal parts. Neighbouring parts share the very same instant, so that a jump there counts once.
+    /// Means over equal substeps. Neighbouring substeps share the same instant, so a jump at it counts once.
     #[allow(clippy::cast_precision_loss)] // few parts
     fn means(&self, from: f64, to: f64, parts: usize) -> impl Iterator<Item = Mean> {
         let length = (to - from) / parts as f64;
@@ -320,7 +301,7 @@ impl<'l> History<'l> {
 }
 
 impl Instant {
-    /// Zero over no time, in which nothing moves.
+    /// The mean over the time until `end`, or zero if no time passes.
     fn mean_until(&self, end: &Self) -> Mean {
         let length = end.time - self.time;
         if length <= 0.0 {

@@ -1,12 +1,12 @@
 use std::borrow::Cow;
 
-use super::{Commands, Dynamics};
+use super::{Commands, Point};
 use crate::data::{Log, half_width_s, local_cubic};
 use crate::expr::Tape;
 use crate::lanes::Row;
 
-/// What the sensors of a model show of `W` trajectories: the angles of the rig itself unless an effect stands between
-/// joint and sensor.
+/// The position sensors of a model, for `W` trajectories: they measure the angles of the rig unless an effect, such as
+/// backlash, stands between joint and sensor.
 pub struct Sensors<'d, const W: usize> {
     tape: Option<Tape<'d, f64, W>>,
     joints: usize,
@@ -14,13 +14,15 @@ pub struct Sensors<'d, const W: usize> {
 }
 
 impl<'d, const W: usize> Sensors<'d, W> {
-    /// The sensors of `dynamics` with parameters `values`, in its order.
-    pub fn new(dynamics: &'d Dynamics, values: &[f64]) -> Self {
-        let joints = dynamics.joints;
-        let mut tape = dynamics.reading.as_ref().map(|reading| reading.tape());
+    /// The sensors of one model.
+    pub fn new(model: impl Into<Point<'d>>) -> Self {
+        let model = model.into();
+        let joints = model.dynamics.joints;
+        let reading = model.dynamics.reading.as_ref();
+        let mut tape = reading.map(|reading| reading.tape());
         if let Some(tape) = &mut tape {
             let own = &mut tape.inputs()[3 * joints + 1..];
-            for (slot, value) in own.iter_mut().zip(values) {
+            for (slot, value) in own.iter_mut().zip(model.values()) {
                 *slot = Row::splat(*value);
             }
         }
@@ -31,7 +33,7 @@ impl<'d, const W: usize> Sensors<'d, W> {
         }
     }
 
-    /// Let a parameter have another value in one lane.
+    /// Set the value of a parameter in one lane.
     pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
         let first = 3 * self.joints + 1;
         if let Some(tape) = &mut self.tape {
@@ -39,8 +41,8 @@ impl<'d, const W: usize> Sensors<'d, W> {
         }
     }
 
-    /// The angles (`[n][lane]`) shown of `state` (`[2n][lane]`) at `time` (s), when the torque until then was `tau`
-    /// (`[n][lane]`).
+    /// The angles (`[n][lane]`) measured in `state` (`[2n][lane]`) at `time` (s). `tau` (`[n][lane]`) is the torque that
+    /// acted until then.
     pub fn show<'s>(
         &'s mut self,
         state: &'s [Row<f64, W>],
@@ -62,8 +64,8 @@ impl<'d, const W: usize> Sensors<'d, W> {
         &self.shown
     }
 
-    /// Put the rig's own angles in place of those that sensors show in `state`. What stands between is small, and is
-    /// taken at the angles shown.
+    /// Replace the measured angles in `state` by those of the rig. Their difference is small, and is evaluated at the
+    /// measured angles.
     pub fn correct(
         &mut self,
         state: &mut [Row<f64, W>],
@@ -80,16 +82,17 @@ impl<'d, const W: usize> Sensors<'d, W> {
     }
 }
 
-/// What stands between may depend on velocities, which come from the angles found: so often they are found anew.
+/// The sensor effect may depend on velocities, which are estimated from the corrected angles: number of iterations.
 const PASSES: usize = 5;
 
-/// A log with the angles of the rig itself in place of those that sensors show, by a model with parameters `values`.
-pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) -> Cow<'l, Log> {
-    if dynamics.reading.is_none() {
+/// A log with measured angles replaced by those of the rig.
+pub fn with_own_angles<'l, 'd>(model: impl Into<Point<'d>>, log: &'l Log) -> Cow<'l, Log> {
+    let model = model.into();
+    if model.dynamics.reading.is_none() {
         return Cow::Borrowed(log);
     }
-    let commands = Commands::of_log(dynamics, values, log);
-    let mut sensors = Sensors::<1>::new(dynamics, values);
+    let commands = Commands::of_log(&model, log);
+    let mut sensors = Sensors::<1>::new(model);
     let mut own = log.clone();
     for _ in 0..PASSES {
         let speeds = speeds(&own);
@@ -106,9 +109,9 @@ pub fn with_own_angles<'l>(dynamics: &Dynamics, values: &[f64], log: &'l Log) ->
     Cow::Owned(own)
 }
 
-/// Velocities from the angles, as those that rigs report are noisy; near the log's ends as reported.
+/// Velocities estimated from the angles, because reported velocities are noisy; as reported near the log's ends.
 fn speeds(log: &Log) -> Vec<Vec<f64>> {
-    // Twice as wide as for start states: a jump by the play beside a row must not turn the sign of its velocity.
+    // Twice as wide as for start states, so that a jump by the backlash does not reverse the sign of a velocity.
     let half_width = 2.0 * half_width_s(log.median_step());
     let speed = |q: &Vec<f64>, row: usize, reported: f64| {
         local_cubic(&log.time, q, row, half_width).map_or(reported, |cubic| cubic.slope)
@@ -118,9 +121,10 @@ fn speeds(log: &Log) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// A log as a model sees it: with the angles of the rig itself, and the torques that act.
+/// A log in the quantities of the equations of motion: the angles of the rig, and the torques that act.
 #[must_use]
-pub fn as_modelled(dynamics: &Dynamics, values: &[f64], log: &Log) -> Log {
-    let own = with_own_angles(dynamics, values, log);
-    Commands::of_log(dynamics, values, log).acting_on(&own)
+pub fn as_modelled<'d>(model: impl Into<Point<'d>>, log: &Log) -> Log {
+    let model = model.into();
+    let own = with_own_angles(&model, log);
+    Commands::of_log(model, log).acting_on(&own)
 }

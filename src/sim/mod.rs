@@ -1,0 +1,21 @@
+//! Simulation: moving a model through time, in one place for fits, errors, simulated rigs and planners.
+
+mod command;
+mod environment;
+mod integrator;
+mod point;
+mod scheme;
+mod sensors;
+mod simulator;
+mod stepper;
+mod substeps;
+
+pub use command::{Commands, StepTorque};
+pub use environment::Environment;
+pub use integrator::Integrator;
+pub use point::Point;
+pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme, Stage};
+pub use sensors::{Sensors, as_modelled, with_own_angles};
+pub use simulator::{Hold, Simulator};
+pub use stepper::Stepper;
+pub use substeps::{FIT_S, PREDICTION_S, RIG_S, substeps};

@@ -1,0 +1,151 @@
+use super::{Commands, Point, Scheme, Sensors, StepTorque, Stepper, substeps};
+use crate::lanes::Row;
+
+/// `W` trajectories of one model side by side: torques are commanded and held, delays and lags make of them what acts,
+/// a scheme integrates the motion, and sensors show its angles.
+pub struct Simulator<'d, const W: usize> {
+    /// `[2n][lane]`: positions, then velocities.
+    pub state: Vec<Row<f64, W>>,
+    stepper: Stepper<'d, W>,
+    sensors: Sensors<'d, W>,
+    torque: StepTorque<W>,
+}
+
+/// A stretch of time over which commanded torques are held, one in each lane.
+#[derive(Debug, Clone, Copy)]
+pub struct Hold<'a, const W: usize> {
+    /// What each lane's model makes of its commands.
+    pub commands: [&'a Commands<'a>; W],
+    /// `[joint][lane]`, as commanded, in N m (or N).
+    pub held: &'a [Row<f64, W>],
+    /// `[joint][lane]`, added to what acts; none where empty.
+    pub force: &'a [Row<f64, W>],
+    /// Its ends and its length, in s.
+    pub from: Row<f64, W>,
+    pub to: Row<f64, W>,
+    pub length: Row<f64, W>,
+    /// The equal parts that are integrated one after the other.
+    pub substeps: usize,
+}
+
+impl<'a, const W: usize> Hold<'a, W> {
+    /// A hold between two times.
+    pub fn between(
+        commands: [&'a Commands<'a>; W],
+        held: &'a [Row<f64, W>],
+        [from, to]: [Row<f64, W>; 2],
+        substeps: usize,
+    ) -> Self {
+        Self {
+            commands,
+            held,
+            force: &[],
+            from,
+            to,
+            length: difference(&from, &to),
+            substeps,
+        }
+    }
+
+    /// A hold of `length_s` in all lanes.
+    pub fn lasting(
+        commands: [&'a Commands<'a>; W],
+        held: &'a [Row<f64, W>],
+        from: Row<f64, W>,
+        length_s: f64,
+        substeps: usize,
+    ) -> Self {
+        Self {
+            commands,
+            held,
+            force: &[],
+            from,
+            to: Row(from.map(|from| from + length_s)),
+            length: Row::splat(length_s),
+            substeps,
+        }
+    }
+}
+
+fn difference<const W: usize>(from: &Row<f64, W>, to: &Row<f64, W>) -> Row<f64, W> {
+    Row(std::array::from_fn(|lane| to[lane] - from[lane]))
+}
+
+impl<'d, const W: usize> Simulator<'d, W> {
+    /// A model at rest at zero.
+    pub fn new(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
+        let model = model.into();
+        Self {
+            state: vec![Row::splat(0.0); model.dynamics.states()],
+            sensors: Sensors::new(model.clone()),
+            stepper: Stepper::new(model, scheme),
+            torque: StepTorque::default(),
+        }
+    }
+
+    /// The same from a state (`[2n][lane]`: positions, then velocities).
+    #[must_use]
+    pub fn starting_at(mut self, state: impl IntoIterator<Item = Row<f64, W>>) -> Self {
+        self.state.clear();
+        self.state.extend(state);
+        self
+    }
+
+    /// Set the value of a parameter in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        self.stepper.set_in_lane(parameter, lane, value);
+        self.sensors.set_in_lane(parameter, lane, value);
+    }
+
+    /// Move the states to the end of a hold.
+    pub fn advance(&mut self, hold: &Hold<'_, W>) {
+        self.torque.fill(hold);
+        let Hold {
+            from,
+            length,
+            substeps,
+            ..
+        } = *hold;
+        self.stepper
+            .advance(&mut self.state, &self.torque.mean, from, length, substeps);
+    }
+
+    /// Move the states from a row of each lane's history of commands to the next, in substeps of at most `longest_s`.
+    pub fn follow(&mut self, commands: [&Commands<'_>; W], rows: [usize; W], longest_s: f64) {
+        let held = Commands::held(commands, rows);
+        let ends = [rows, rows.map(|row| row + 1)].map(|rows| Commands::times(commands, rows));
+        let substeps = substeps(&difference(&ends[0], &ends[1]), longest_s);
+        self.advance(&Hold::between(commands, &held, ends, substeps));
+    }
+
+    /// The angles that sensors show where each lane's history of commands has come to a row, and the velocities, both
+    /// `[n][lane]`.
+    pub fn shown(&mut self, commands: [&Commands<'_>; W], rows: [usize; W]) -> [&[Row<f64, W>]; 2] {
+        let before = || Commands::just_before(commands, rows);
+        let time = Commands::times(commands, rows);
+        let angles = self.sensors.show(&self.state, before, time);
+        [angles, &self.state[angles.len()..]]
+    }
+
+    /// The same at `time` (s), after the last hold.
+    pub fn angles_at(&mut self, time: Row<f64, W>) -> &[Row<f64, W>] {
+        let n = self.state.len() / 2;
+        self.sensors
+            .show(&self.state, || self.torque.at_end(n), time)
+    }
+
+    /// The torque (`[n][lane]`) that acted over the last part of the last hold; 0 before the first.
+    pub fn acting(&self) -> Vec<Row<f64, W>> {
+        self.torque.at_end(self.state.len() / 2)
+    }
+}
+
+impl Simulator<'_, 1> {
+    /// Let the model be in this state: positions, then velocities.
+    pub fn put(&mut self, state: &[f64]) {
+        assert_eq!(state.len(), self.state.len(), "one value for each state");
+        for (lane, value) in self.state.iter_mut().zip(state) {
+            *lane = Row([*value]);
+        }
+    }
+}

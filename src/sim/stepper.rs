@@ -1,0 +1,142 @@
+use super::{Point, Scheme};
+use crate::expr::Tape;
+use crate::lanes::{Row, Simd, WithSimd};
+
+/// Integration of `W` independent states of one model side by side, by one scheme.
+pub struct Stepper<'d, const W: usize> {
+    scheme: &'static Scheme,
+    tape: Tape<'d, f64, W>,
+    joints: usize,
+    slope: Vec<Row<f64, W>>,
+    sum: Vec<Row<f64, W>>,
+}
+
+impl<'d, const W: usize> Stepper<'d, W> {
+    /// A stepper of one model.
+    pub fn new(model: impl Into<Point<'d>>, scheme: &'static Scheme) -> Self {
+        let model = model.into();
+        let joints = model.dynamics.joints;
+        let first = 3 * joints + 1;
+        let mut tape = model.dynamics.program.tape_with_held(first);
+        for (slot, value) in tape.inputs()[first..].iter_mut().zip(model.values()) {
+            *slot = Row::splat(*value);
+        }
+        let states = || vec![Row::splat(0.0); 2 * joints];
+        Self {
+            scheme,
+            tape,
+            joints,
+            slope: states(),
+            sum: states(),
+        }
+    }
+
+    /// Set the value of a parameter in one lane.
+    pub fn set_in_lane(&mut self, parameter: usize, lane: usize, value: f64) {
+        let first = 3 * self.joints + 1;
+        self.tape.inputs()[first + parameter][lane] = value;
+    }
+
+    /// Advance `state` (`[2n][lane]`: positions, then velocities) from `time` by `length` seconds in `substeps` equal
+    /// substeps. `tau` (`[n][lane]`) acts over all of them or, where it differs, `[substep * n + joint][lane]`.
+    pub fn advance(
+        &mut self,
+        state: &mut [Row<f64, W>],
+        tau: &[Row<f64, W>],
+        time: Row<f64, W>,
+        length: Row<f64, W>,
+        substeps: usize,
+    ) {
+        Row::<f64, W>::dispatch(Advance {
+            stepper: self,
+            state,
+            tau,
+            time,
+            length,
+            substeps,
+        });
+    }
+
+    #[inline(always)]
+    fn step<S: Simd>(
+        &mut self,
+        simd: S,
+        state: &mut [Row<f64, W>],
+        time: &mut Row<f64, W>,
+        h: &Row<f64, W>,
+    ) {
+        let n = self.joints;
+        self.tape.moving()[..2 * n].copy_from_slice(state);
+        self.sum.copy_from_slice(state);
+        self.tape.moving()[3 * n] = *time;
+        for stage in self.scheme.stages {
+            self.tape.run_on(simd);
+            for (k, slope) in self.slope.iter_mut().enumerate() {
+                *slope = *self.tape.output(k);
+            }
+            let inputs = self.tape.moving();
+            for part in 0..Row::<f64, W>::parts::<S>() {
+                let h = h.get(simd, part);
+                let (weighed, reached) = (h * h.like(stage.weight), h * h.like(stage.reach));
+                let rows = self.sum.iter_mut().zip(&mut inputs[..2 * n]);
+                for (((sum, inner), now), slope) in rows.zip(&*state).zip(&self.slope) {
+                    let slope = slope.get(simd, part);
+                    sum.set(part, slope.mul_add(weighed, sum.get(simd, part)));
+                    inner.set(part, slope.mul_add(reached, now.get(simd, part)));
+                }
+                inputs[3 * n].set(part, time.get(simd, part) + reached);
+            }
+        }
+        if self.scheme.semi_implicit {
+            self.move_with_new_velocities(simd, state, h);
+        }
+        state.copy_from_slice(&self.sum);
+        for part in 0..Row::<f64, W>::parts::<S>() {
+            time.set(part, time.get(simd, part) + h.get(simd, part));
+        }
+    }
+
+    /// v' = v + h f_v, q' = q + h (f_q + h f_v)
+    #[inline(always)]
+    fn move_with_new_velocities<S: Simd>(
+        &mut self,
+        simd: S,
+        state: &[Row<f64, W>],
+        h: &Row<f64, W>,
+    ) {
+        let n = self.joints;
+        for part in 0..Row::<f64, W>::parts::<S>() {
+            let h = h.get(simd, part);
+            for j in 0..n {
+                let gain = h * self.slope[n + j].get(simd, part);
+                let moved = h * (self.slope[j].get(simd, part) + gain);
+                self.sum[j].set(part, state[j].get(simd, part) + moved);
+                self.sum[n + j].set(part, state[n + j].get(simd, part) + gain);
+            }
+        }
+    }
+}
+
+struct Advance<'a, 'd, const W: usize> {
+    stepper: &'a mut Stepper<'d, W>,
+    state: &'a mut [Row<f64, W>],
+    tau: &'a [Row<f64, W>],
+    time: Row<f64, W>,
+    length: Row<f64, W>,
+    substeps: usize,
+}
+
+impl<const W: usize> WithSimd for Advance<'_, '_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let n = self.stepper.joints;
+        #[allow(clippy::cast_precision_loss)] // few substeps
+        let h = Row(self.length.map(|length| length / self.substeps as f64));
+        for tau in self.tau.chunks(n).cycle().take(self.substeps) {
+            self.stepper.tape.moving()[2 * n..3 * n].copy_from_slice(tau);
+            self.stepper.step(simd, self.state, &mut self.time, &h);
+        }
+    }
+}
