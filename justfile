@@ -23,6 +23,10 @@ doc:
 deny:
     cargo deny check
 
+# Count instructions against the committed counts; --update writes them
+instructions *arguments:
+    benches/instructions {{arguments}}
+
 # Everything that must hold before a change is taken
 ci:
     .ci/run

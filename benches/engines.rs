@@ -9,14 +9,14 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::batch::{Rollouts, Rows};
-use residyn::closeloop::{Request, Split, close_loop};
+use residyn::closeloop::{self, Request, Split, close_loop};
 use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
+use residyn::sim::batch::{Rollouts, Rows};
 use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 const STEP_S: f64 = 0.02;
@@ -159,7 +159,7 @@ fn plan(c: &mut Criterion) {
         c.benchmark_group("plan")
             .measurement_time(Duration::from_secs(2))
             .bench_function(BenchmarkId::from_parameter(task.name), |b| {
-                planner.helped(|| {
+                planner.with_workers(|| {
                     b.iter(|| {
                         planner.forget();
                         black_box(planner.plan(start.clone()));
@@ -234,7 +234,7 @@ fn identify(c: &mut Criterion) {
     let rig = Plant::read(demo, &library).expect("the demo's rig");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));
-    let split = Split::of(logs.collect());
+    let split = Split::of(logs.collect(), &closeloop::Settings::default().split);
     let system = library
         .system(Path::new("pendulum"))
         .expect("a built-in system");

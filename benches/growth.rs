@@ -9,13 +9,13 @@ use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::batch::Rollouts;
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit};
 use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, System};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
+use residyn::sim::batch::Rollouts;
 use residyn::train::{Backend, FitSettings, HybridModel, Progress, Segments, Training};
 
 const STEP_S: f64 = 0.02;
@@ -127,7 +127,7 @@ impl Work {
         let rng = ChaCha8Rng::seed_from_u64(4);
         let planner = Planner::new(&settings, &bounds, || rollouts.block(), &rng);
         let start = Start::new(&vec![0.1; 2 * self.joints], 0.0);
-        planner.helped(|| {
+        planner.with_workers(|| {
             best(|| {
                 planner.forget();
                 seconds(|| drop(planner.plan(start.clone())))

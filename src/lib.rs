@@ -2,7 +2,7 @@
 //!
 //! A model is a file: its equations are parsed once into one small program ([`expr::Program`]), and
 //! everything else reads that program. [`closeloop`] fits a declared model to logs and names the effects
-//! that it lacks; [`evaluate`] measures how far a model runs from logs; [`plant`] simulates rigs with effects
+//! that it lacks; [`sim::metric`] measures how far a model runs from logs; [`plant`] simulates rigs with effects
 //! that nobody is told about; [`train`] trains hybrid models of physics and a network; [`plan`] finds inputs by which a
 //! model does what is wanted; [`formats`] reads and writes those of other programs. The binary
 //! `residyn` is a thin layer over these modules.
@@ -18,7 +18,7 @@
 //! use std::path::Path;
 //!
 //! use rand::SeedableRng;
-//! use residyn::evaluate::{assess, summarise};
+//! use residyn::sim::metric::{assess, summarise};
 //! use residyn::expr::SignForm;
 //! use residyn::model::Library;
 //! use residyn::plant::Plant;
@@ -38,17 +38,16 @@
 //! # }
 //! ```
 
-pub mod batch;
 pub mod bench;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod closeloop;
 pub mod control;
 pub mod data;
-pub mod evaluate;
 #[cfg(feature = "train")]
 pub mod experiment;
 pub mod expr;
+pub mod files;
 pub mod formats;
 pub mod identify;
 pub mod lanes;
@@ -57,10 +56,8 @@ pub mod mbrl;
 pub mod model;
 pub mod plan;
 pub mod plant;
-#[cfg(feature = "train")]
-pub mod recipe;
 pub mod report;
-pub mod rounds;
+pub mod runs;
 pub mod sim;
 #[cfg(feature = "train")]
 pub mod train;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
-use residyn::evaluate::assess;
 use residyn::expr::SignForm;
 use residyn::model::{FittedEffect, Library};
+use residyn::sim::metric::assess;
 
 use crate::support::{refuses, succeeds, text};
 

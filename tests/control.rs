@@ -9,7 +9,7 @@ use std::time::Duration;
 use residyn::data::{Columns, Log};
 use residyn::experiment::{Config, Session};
 use residyn::model::Library;
-use residyn::recipe::{Job, Recipe};
+use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
 
@@ -247,7 +247,7 @@ fn every_experiment_is_sound() {
             let config = Config::read(&entry.unwrap().path()).unwrap();
             assert!(config.seeds >= 10, "{}", config.path.display());
             assert!(
-                Session::open(config, &library, Backend::NdArray)
+                Session::open(config, &library, Backend::NdArray, 0)
                     .unwrap()
                     .rounds()
                     > 0
@@ -336,7 +336,7 @@ fn a_folder_keeps_to_its_experiment() {
     .unwrap();
     let message = refused(dir.path(), &command);
     assert!(
-        message.contains("x holds another experiment: ") && message.contains("epochs"),
+        message.contains("x holds another run: ") && message.contains("epochs"),
         "{message}"
     );
     fs::write(

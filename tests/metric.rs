@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use residyn::data::{Interval, Log};
-use residyn::evaluate::{Assessment, Summary, assess, calibrate, summarise};
 use residyn::expr::SignForm;
+use residyn::identify::calibrate;
 use residyn::model::{Dynamics, Library};
+use residyn::sim::metric::{Assessment, Summary, assess, summarise};
 
 use crate::common::{dynamics, empty_log, fitted, rng, simulate, system};
 use crate::oracles::{ORACLES, Oracle};

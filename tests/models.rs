@@ -8,7 +8,7 @@ use residyn::model::{
     Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights, ResidualOn,
     System,
 };
-use residyn::sim::Integrator;
+use residyn::sim::{Integrator, SCHEMES};
 use serde_json::json;
 
 use crate::common::rng;
@@ -71,7 +71,7 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
     let mut small = |joints, settings: &MlpSettings| network(joints, settings, &mut random);
     let residuals = [small(1, &rates), small(2, &forces[0]), small(2, &forces[1])];
     let priors = [small(1, &forces[1]), small(2, &rates)];
-    vec![
+    let mut models = vec![
         ("pendulum", physics(&pendulum(), euler, 0.02)),
         ("pendulum_effects", physics(&friction(), rk4, 0.01)),
         (
@@ -97,7 +97,12 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
             "cartpole_hybrid",
             hybrid(&system("cartpole", ""), &residuals[1], rk4, 0.02),
         ),
-    ]
+    ];
+    models.extend(SCHEMES.map(|scheme| {
+        let integrator = Integrator::of(scheme);
+        (scheme.name, physics(&acrobot(), integrator, 0.02))
+    }));
+    models
 }
 
 /// A built-in system with effects appended to its file.

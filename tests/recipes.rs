@@ -2,8 +2,8 @@
 
 use residyn::model::Library;
 use residyn::plant::Plant;
-use residyn::recipe::{Job, Recipe};
 use residyn::train::Backend;
+use residyn::train::recipe::{Job, Recipe};
 
 use crate::train::{configs, refused};
 

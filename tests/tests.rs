@@ -30,6 +30,7 @@ mod physics;
 mod printers;
 mod recipes;
 mod rigs;
+mod runs;
 mod shift;
 mod simulators;
 mod support;

@@ -7,7 +7,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use residyn::model::Library;
-use residyn::recipe::{Job, Outcome, Recipe};
+use residyn::runs::RunFolder;
+use residyn::train::recipe::{Job, Outcome, Recipe};
 use residyn::train::{Backend, Penalty};
 use serde_json::Value;
 
@@ -48,7 +49,8 @@ pub fn refused(dir: &Path, arguments: &[&str]) -> String {
 fn train(recipe: Recipe, backend: Backend) -> Outcome {
     let job = Job::train(recipe, &Library::built_in(), backend, 0).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    let mut training = job.begin(dir.path()).unwrap();
+    let folder = RunFolder::open(dir.path()).unwrap();
+    let mut training = job.begin(&folder).unwrap();
     let mut observer = |_: &residyn::train::Progress| ControlFlow::Continue(());
     training
         .run(&job.material.training, None, &mut observer)
@@ -62,7 +64,7 @@ fn recipe(name: &str) -> Recipe {
 
 /// How far the worst parameter is from the truth, as a share of it.
 fn worst(outcome: &Outcome) -> f64 {
-    let off = |p: &residyn::recipe::Learnt| {
+    let off = |p: &residyn::train::recipe::Learnt| {
         let truth = p.truth.unwrap();
         ((p.found - truth) / truth).abs()
     };
@@ -135,7 +137,7 @@ fn a_checkpoint_of_another_run_is_left_alone() {
     let message = refused(dir, &[command.as_slice(), &["--seed", "7"]].concat());
     assert_eq!(
         message,
-        "error: pendulum holds the checkpoint of another run: its `seed` is 0, here it is 7; give another \
+        "error: pendulum holds another run: its `seed` is 0, here it is 7; give another \
          folder with --out, or remove this one to start anew\n"
     );
     let text = std::fs::read_to_string(&config).unwrap();
@@ -189,7 +191,7 @@ fn tuning_fits_a_simulated_prior_to_the_real_plant() {
         "--out",
         "sim",
     ];
-    assert!(refused(dir, &own).contains("sim holds the checkpoint of another run"));
+    assert!(refused(dir, &own).contains("sim holds another run"));
 }
 
 #[test]

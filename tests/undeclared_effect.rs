@@ -5,13 +5,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use residyn::experiment::undeclared_effect::{Contestant, Experiment, Lab};
 use residyn::model::Library;
+use residyn::runs::RunFolder;
 use residyn::train::Backend;
 
 use crate::train::configs;
 
 fn lab(path: &Path) -> Lab {
     let experiment = Experiment::read(path).unwrap();
-    Lab::new(experiment, Library::built_in(), Backend::NdArray).unwrap()
+    Lab::new(experiment, Library::built_in(), Backend::NdArray, 0).unwrap()
 }
 
 fn smoke() -> PathBuf {
@@ -31,8 +32,9 @@ fn friction_is_named_after_an_episode_and_the_return_comes_back() {
     let dir = tempfile::tempdir().unwrap();
     let mut lab = lab(&smoke());
     let count = AtomicUsize::new(0);
+    let folder = RunFolder::open(dir.path()).unwrap();
     let outcome = lab
-        .run(dir.path(), &|_| {
+        .run(&folder, &|_| {
             count.fetch_add(1, Ordering::Relaxed);
         })
         .unwrap();
@@ -54,16 +56,14 @@ fn friction_is_named_after_an_episode_and_the_return_comes_back() {
     // What is done is not done again, and what another experiment left is not taken for it.
     let kept = dir.path().join("runs/coulomb_friction-0.json");
     let written = std::fs::metadata(&kept).unwrap().modified().unwrap();
-    assert_eq!(lab.run(dir.path(), &|_| {}).unwrap(), outcome);
+    assert_eq!(lab.run(&folder, &|_| {}).unwrap(), outcome);
     assert_eq!(
         std::fs::metadata(&kept).unwrap().modified().unwrap(),
         written
     );
     lab.experiment.fit.epochs += 1;
-    let refused = lab.run(dir.path(), &|_| {}).unwrap_err().to_string();
-    assert!(
-        refused.contains("holds another experiment: its `trial.fit.epochs` is 20, here it is 21")
-    );
+    let refused = lab.run(&folder, &|_| {}).unwrap_err().to_string();
+    assert!(refused.contains("holds another run: its `fit.epochs` is 20, here it is 21"));
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn bad_experiments_are_refused_with_their_remedy() {
         assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
         let read = Experiment::read(&path);
-        let lab = read.and_then(|e| Lab::new(e, Library::built_in(), Backend::NdArray));
+        let lab = read.and_then(|e| Lab::new(e, Library::built_in(), Backend::NdArray, 0));
         lab.err().unwrap().to_string()
     };
     let cases = [

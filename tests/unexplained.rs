@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use residyn::closeloop::{Proposal, Study, Unexplained, proposal, unexplained};
+use residyn::closeloop::{Proposal, Settings, Study, Unexplained, proposal, unexplained};
 use residyn::data::Log;
 use residyn::model::{FittedEffect, Library, System};
 use residyn::plant::Plant;
@@ -64,8 +64,9 @@ fn declared(effects: &[&str]) -> System {
 /// What the pendulum with these effects leaves unexplained of the logs, beside the pendulum without.
 fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
     let (bare, system) = (declared(&[]), declared(effects));
-    let before = Study::new(&bare, logs).fit_declared().unwrap();
-    let mut study = Study::new(&system, logs);
+    let settings = Settings::default();
+    let before = Study::new(&bare, logs, &settings).fit_declared().unwrap();
+    let mut study = Study::new(&system, logs, &settings);
     let after = study.fit_declared().unwrap();
     let probes = Library::built_in();
     unexplained(&study, probes.probes(), &before, &after, &mut rng(seed))
@@ -74,7 +75,8 @@ fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
 /// A formula for what the bare pendulum leaves of the logs.
 fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
     let system = declared(&[]);
-    let mut study = Study::new(&system, logs);
+    let settings = Settings::default();
+    let mut study = Study::new(&system, logs, &settings);
     let fitted = study.fit_declared().unwrap();
     let library = Library::built_in();
     let left = unexplained(&study, library.probes(), &fitted, &fitted, &mut rng(seed));

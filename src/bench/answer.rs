@@ -1,4 +1,4 @@
-//! What closing the loop said, in the words of the bench.
+//! The outcome of closing the loop, in the bench's own types.
 
 use super::hidden::{Label, label};
 use super::judge::{Answer, Estimate, Named, of_log};
@@ -55,7 +55,7 @@ fn named(finding: &Finding) -> Named {
             .chain(single)
             .collect(),
         p_value: finding.p_value,
-        error_reduction: finding.error_reduction,
+        error_reduction: finding.error_reduction.as_ref().ok().copied(),
     }
 }
 

@@ -1,23 +1,21 @@
-//! One cell: record its logs, close the loop, fit what a person who knew the truth would, judge.
+//! One cell: record its logs, close the loop, fit the true structure for comparison, judge.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
-use super::grid::{Cell, Simulation, Source, hash};
+use super::grid::{Cell, Simulation, Source};
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
 use super::told::told;
 use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
 use crate::data::{Log, LogError};
+use crate::files::content_hash;
 use crate::model::{Library, System};
 
-/// Errors are compared at the middle one \[s\].
-const HORIZONS_S: [f64; 3] = [0.1, 0.5, 1.0];
-
-/// What came of a cell.
+/// The result of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     pub truth: Truth,
@@ -31,7 +29,7 @@ pub struct Findings {
 pub struct Errors {
     pub before: f64,
     pub after: f64,
-    /// Of the model with the true effects, fitted to the same logs; none where the library lacks one.
+    /// Of the model with the true effects, fitted to the same logs; `None` where the library lacks one of them.
     pub told: Option<f64>,
 }
 
@@ -43,7 +41,7 @@ impl Errors {
 }
 
 impl Cell {
-    /// The logs of the cell, and what is true of them.
+    /// The logs of the cell and the truth behind them.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -66,7 +64,7 @@ impl Cell {
         let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
             .expect("the effects were checked when the grid was read");
         // Cells share neither their motions nor their noise.
-        let mut rng = ChaCha8Rng::seed_from_u64(hash(self.id.as_bytes()));
+        let mut rng = ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()));
         let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();
@@ -90,7 +88,7 @@ impl Cell {
     /// Record the logs, close the loop, judge.
     ///
     /// # Errors
-    /// A model file or log that cannot be read, or logs from which the loop cannot be closed.
+    /// A model file or log that cannot be read, or logs on which closing the loop fails.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
         let system = library.system(&self.model)?;
         let (logs, truth) = self.record(&system)?;
@@ -103,7 +101,7 @@ impl Cell {
             errors: Errors {
                 before: outcome.errors.before.position_rms(),
                 after: outcome.errors.after.position_rms(),
-                told: told(&system, library, &split, &self.effects, &HORIZONS_S),
+                told: told(&system, library, &split, &self.effects),
             },
             truth,
             answer,
@@ -111,7 +109,7 @@ impl Cell {
     }
 }
 
-/// The thing that is measured.
+/// The system under test.
 fn close(
     system: &System,
     library: &Library,

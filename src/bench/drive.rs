@@ -1,23 +1,23 @@
-/// What becomes of a commanded torque: delayed, smoothed, then shaped in the order of the fields of [`Shape`].
+/// A drive between commanded and acting torque: delay, first-order lag, then the nonlinearities of [`Shape`] in the order of its fields.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Drive {
     /// \[s\], any real number.
     pub delay: f64,
-    /// Time constant \[s\]; zero follows at once.
+    /// Time constant \[s\]; 0 for none.
     pub lag: f64,
     pub shape: Shape,
 }
 
-/// What the drive makes of a torque that it is given at this instant.
+/// Static nonlinearities of a drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
-    /// Excess share.
+    /// Relative error of the gain.
     pub gain: f64,
-    /// Torque that is swallowed \[N m\].
+    /// Half width of the dead zone \[N m\].
     pub deadzone: f64,
     /// Largest torque \[N m\].
     pub limit: f64,
-    /// How much the limit falls with speed in the direction of the torque \[N m s/rad\].
+    /// By how much the limit falls with speed in the direction of the torque \[N m s/rad\].
     pub back_emf: f64,
 }
 
@@ -42,12 +42,12 @@ impl Shape {
     }
 }
 
-/// The torque that a drive is given between two changes of its command: it tends to `target`.
+/// The lagged torque between two changes of the command: it approaches `target` exponentially.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Approach {
-    /// When it began \[s\].
+    /// Time of the last change \[s\].
     pub since: f64,
-    /// Torque then \[N m\].
+    /// Torque at that time \[N m\].
     pub from: f64,
     pub target: f64,
 }
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(whole_steps(0.02, 0.01), (2, 0.0));
         let (steps, rest) = whole_steps(0.0137, 0.01);
         assert!(steps == 1 && (rest - 0.0037).abs() < 1e-15);
-        // Rounding may take a step from the whole ones, not from the sum.
+        // Rounding may move one step between the two parts, but not change their sum.
         let (steps, rest) = whole_steps(0.03, 0.01);
         assert!((steps as f64 * 0.01 + rest - 0.03).abs() < 1e-15);
     }

@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 
 use rand::{Rng, RngExt};
 
-/// A sum of sines with random phases, each in a slice of the band of its own on a scale of octaves.
+/// A multisine with random phases: one frequency in each of equally wide slices of the band on a logarithmic scale.
 #[derive(Debug, Clone)]
 pub struct Multisine {
     /// Amplitude, angular frequency \[rad/s\], phase \[rad\].
@@ -13,7 +13,7 @@ pub struct Multisine {
 const TONES: u32 = 7;
 
 impl Multisine {
-    /// Of root mean square `size`, between two frequencies \[Hz\].
+    /// With root mean square `size`, between two frequencies \[Hz\].
     pub fn draw(size: f64, [low, high]: [f64; 2], rng: &mut impl Rng) -> Self {
         let amplitude = size * (2.0 / f64::from(TONES)).sqrt();
         let tone = |k: u32| {
@@ -31,14 +31,14 @@ impl Multisine {
         tones.map(|[a, w, p]| a * (w * time + p).sin()).sum()
     }
 
-    /// Derivative by time.
+    /// Time derivative.
     pub fn rate(&self, time: f64) -> f64 {
         let tones = self.tones.iter();
         tones.map(|[a, w, p]| a * w * (w * time + p).cos()).sum()
     }
 }
 
-/// A position controller as a simple rig has one: it knows the measured angle alone.
+/// The position controller of a simple rig: a PD controller that sees the measured angle alone.
 #[derive(Debug, Clone)]
 pub struct Controller {
     /// \[N m/rad\]
@@ -65,7 +65,7 @@ impl Controller {
         }
     }
 
-    /// The command \[N m\] at an angle measured `dt` s after the one before, towards angle and speed wanted.
+    /// The command \[N m\] for an angle measured `dt` s after the previous one, given the reference angle and speed.
     pub fn command(&mut self, measured: f64, [angle, speed]: [f64; 2], dt: f64) -> f64 {
         let raw = (measured - self.previous.unwrap_or(measured)) / dt;
         self.previous = Some(measured);

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::grid::{Cell, GridError, Group, Source, beside_or_named, id};
+use super::grid::{Cell, GridError, Group, Source, id};
 use super::hidden::Hidden;
+use crate::files::beside_or_named;
 
-/// What `cell.json` says of the logs beside it.
+/// The contents of `cell.json`: what is known of the logs beside it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Described {

@@ -6,7 +6,7 @@ pub enum Force {
     Viscous {
         b: f64,
     },
-    /// Viscous friction with a slope of its own in either direction.
+    /// Viscous friction with a different slope in each direction.
     TwoSlopes {
         b_p: f64,
         b_n: f64,
@@ -24,7 +24,7 @@ pub enum Force {
     Constant {
         tau_0: f64,
     },
-    /// Ripple over the angle; a ripple of an effect file has a whole number of periods.
+    /// Ripple over the angle; that of an effect file has a whole number of periods a turn.
     Ripple {
         amplitude: f64,
         periods: f64,

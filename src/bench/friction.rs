@@ -1,5 +1,5 @@
-/// Dry friction: a torque of a given level against the motion, and of whatever holds the joint up to that level
-/// at rest.
+/// Dry friction: a torque of a given level against the motion; at rest, whatever torque holds the joint, up to that
+/// level.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DryFriction {
     Coulomb {
@@ -10,7 +10,7 @@ pub enum DryFriction {
         f_s: f64,
         v_s: f64,
     },
-    /// A level for either direction.
+    /// A level for each direction.
     Asymmetric {
         forward: f64,
         backward: f64,
@@ -46,7 +46,7 @@ impl DryFriction {
     }
 }
 
-/// Dry friction with bristles that bend before they slip (Dahl 1968): a spring in small motion.
+/// Presliding friction (Dahl 1968): bristles that bend before they slip, a spring in small motion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Presliding {
     /// Torque when slipping \[N m\].
@@ -102,7 +102,7 @@ mod tests {
             stiffness: 10.0,
         };
         assert_eq!(friction.rate(0.0, 0.5), 0.5);
-        // Bent by level over stiffness they bend no further, and carry the level.
+        // At a deflection of level over stiffness the bristles saturate and transmit the level.
         assert!(friction.rate(0.02, 0.5).abs() < 1e-15);
         assert!((friction.torque(0.02) + 0.2).abs() < 1e-15);
     }

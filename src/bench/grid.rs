@@ -10,11 +10,12 @@ use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use super::recording::{Condition, Driving};
+use crate::files::beside_or_named;
 
 /// Why a grid cannot be run.
 #[derive(Debug, Error)]
 pub enum GridError {
-    #[error("{path}: cannot be read: {source}; give a grid with --grid", path = .path.display())]
+    #[error("{path}: cannot be read: {source}", path = .path.display())]
     Open {
         path: PathBuf,
         source: std::io::Error,
@@ -23,17 +24,17 @@ pub enum GridError {
     File { path: PathBuf, message: String },
 }
 
-/// What the cells of a series are to show.
+/// What a series of cells tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
-    /// One effect is missing: it is named.
+    /// One effect is missing and has to be named.
     Single,
-    /// Two are missing: both are named.
+    /// Two are missing and both have to be named.
     Pair,
-    /// Nothing is missing: nothing is named.
+    /// Nothing is missing and nothing may be named.
     None,
-    /// Something is missing that the library does not know: it is flagged.
+    /// Something is missing that the library does not know; it has to be flagged.
     Outside,
 }
 
@@ -69,7 +70,7 @@ struct File {
 /// One test: a rig with its effects, how its logs are taken, and a seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
-    /// Says all that tells this cell from the others of its grid.
+    /// Unique in its grid: plant, effects, condition and seed.
     pub id: String,
     pub group: Group,
     pub plant: String,
@@ -107,7 +108,7 @@ pub enum Source {
 /// All cells of a grid, in the order of its series.
 ///
 /// # Errors
-/// A file that cannot be read, or that asks for what there is not.
+/// A file that cannot be read or refers to something unknown.
 pub fn read(path: &Path) -> Result<Vec<Cell>, GridError> {
     let text = std::fs::read_to_string(path).map_err(|source| GridError::Open {
         path: path.to_owned(),
@@ -135,7 +136,7 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
     let mut ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|two| two[0] == two[1]) {
-        Some(two) => Err(wrong(format!("the cell {} stands there twice", two[0]))),
+        Some(two) => Err(wrong(format!("the cell {} occurs twice", two[0]))),
         None => Ok(all),
     }
 }
@@ -209,16 +210,6 @@ impl File {
     }
 }
 
-/// A file beside the grid or, where there is none, the name of something built in.
-pub(super) fn beside_or_named(grid: &Path, model: &Path) -> PathBuf {
-    let beside = grid.parent().unwrap_or(Path::new("")).join(model);
-    if beside.is_file() {
-        beside
-    } else {
-        model.to_owned()
-    }
-}
-
 /// `pendulum/coulomb_friction@1(F_c=0.1)/base/1`
 pub(super) fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) -> String {
     let effect = |hidden: &Hidden| {
@@ -234,13 +225,6 @@ pub(super) fn id(plant: &str, effects: &[Hidden], condition: &str, seed: u64) ->
         effects => effects.join("+"),
     };
     format!("{plant}/{effects}/{condition}/{seed}")
-}
-
-/// The 64-bit FNV-1a hash: the same on every machine and in every version.
-pub fn hash(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
-    })
 }
 
 #[cfg(test)]
@@ -317,15 +301,9 @@ mod tests {
         );
         assert_eq!(
             wrong("seeds = [1, 2]", "seeds = [1, 1]"),
-            "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 stands there twice"
+            "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 occurs twice"
         );
         assert!(wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one a joint"));
         assert!(wrong("logs = 4", "logs = 1").contains("conditions.base: needs"));
-    }
-
-    #[test]
-    fn the_hash_is_the_published_one() {
-        assert_eq!(hash(b""), 0xcbf2_9ce4_8422_2325);
-        assert_eq!(hash(b"a"), 0xaf63_dc4c_8601_ec8c);
     }
 }

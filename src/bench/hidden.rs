@@ -1,4 +1,4 @@
-//! Effects by name, as a grid writes them, and what they change in a rig.
+//! Hidden effects by name, as written in a grid, and what they change in a rig.
 
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ impl Hidden {
     }
 }
 
-/// Takes the numbers of an effect one by one.
+/// The numbers of an effect that have not been used yet.
 struct Numbers<'h> {
     of: &'h Hidden,
     left: BTreeMap<String, f64>,
@@ -63,7 +63,7 @@ impl Machine {
     /// A rig with these effects.
     ///
     /// # Errors
-    /// An effect that is not known, on a joint that there is not, or with numbers that are not its own.
+    /// An unknown effect, a joint that the rig does not have, or missing or surplus numbers.
     pub fn with(mechanics: Mechanics, effects: &[Hidden]) -> Result<Self, String> {
         let mut machine = Self::bare(mechanics);
         for effect in effects {

@@ -1,4 +1,4 @@
-//! What was named against what is true.
+//! Named effects against the true ones.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -11,10 +11,10 @@ use super::mechanics::Pair;
 use super::recording::log_name;
 use crate::closeloop::Verdict;
 
-/// What the rig hides.
+/// The effects that the rig hides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
-    /// With the true value of each parameter that an effect has.
+    /// Each with the true values of its parameters.
     pub effects: Vec<(Label, BTreeMap<String, f64>)>,
     /// True values of declared parameters, where the rig fixes them.
     pub declared: BTreeMap<String, f64>,
@@ -36,19 +36,19 @@ pub struct Named {
     pub parameters: Vec<Estimate>,
     pub p_value: f64,
     /// Share of the error that comes back without it.
-    pub error_reduction: f64,
+    pub error_reduction: Option<f64>,
 }
 
-/// What closing the loop said.
+/// The outcome of closing the loop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     pub verdict: Verdict,
     pub reason: String,
     pub named: Vec<Named>,
-    /// Whole sets of effects that are said to explain as much.
+    /// Sets of effects that are listed as alternatives.
     pub alternatives: Vec<Vec<Label>>,
     pub declared: Vec<Estimate>,
-    /// What is said to be left: its share, how probable in noise alone, and where.
+    /// The reported remainder: its share, its p-value, and what it depends on.
     pub left: f64,
     pub left_p_value: f64,
     pub left_where: String,
@@ -63,25 +63,25 @@ pub struct Coverage {
     pub covered: bool,
 }
 
-/// The answer held against the truth.
+/// The answer compared with the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judgement {
     /// The true effects were named, each on its joint, and nothing else.
     pub exact: bool,
     /// The same after swapping named effects for alternatives that were listed with them.
     pub within: bool,
-    /// Effects that were named and are not there.
+    /// Effects that were named and are absent.
     pub wrong: Vec<Label>,
-    /// Effects that are there and were not named.
+    /// Effects that are present and were not named.
     pub missed: Vec<Label>,
-    /// Something significant is said to be left.
+    /// A significant remainder is reported.
     pub flagged: bool,
     /// Named effects that cut less than half of the error.
     pub weak: Vec<Label>,
     /// Of the parameters of true effects that were named; of effects by `name`, of declared parameters as
     /// they are called.
     pub coverage: Vec<Coverage>,
-    /// The cell shows what its group is to show.
+    /// The cell meets the criterion of its group.
     pub passed: bool,
 }
 
@@ -125,7 +125,7 @@ impl Truth {
     }
 }
 
-/// Hold an answer against the truth.
+/// Compares an answer with the truth.
 pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
     let labels = |named: &Named| named.label.clone();
     let named: Vec<Label> = answer.named.iter().map(labels).collect();
@@ -145,7 +145,7 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
     let weak: Vec<Label> = answer
         .named
         .iter()
-        .filter(|effect| effect.error_reduction < HALF)
+        .filter(|effect| effect.error_reduction.is_none_or(|share| share < HALF))
         .map(labels)
         .collect();
     let passed = match group {
@@ -173,7 +173,7 @@ fn without(a: &[Label], b: &[Label]) -> Vec<Label> {
         .collect()
 }
 
-/// Intervals mean something where the model is right: those of a model with other effects are not asked for.
+/// Intervals are only meaningful for the true structure; others are not evaluated.
 fn coverage(truth: &Truth, answer: &Answer, exact: bool) -> Vec<Coverage> {
     if !exact {
         return Vec::new();
@@ -200,8 +200,8 @@ fn coverage(truth: &Truth, answer: &Answer, exact: bool) -> Vec<Coverage> {
     all
 }
 
-/// The same ripple can be written with either sign of its amplitude and any number of turns in its phase: write
-/// it as the truth does.
+/// A ripple is the same with the other sign of its amplitude and half a turn more of phase, and with any whole number
+/// of turns: this picks the form of the truth.
 fn turn_ripple(estimates: &mut [Estimate], truth: &BTreeMap<String, f64>) {
     let amplitude = estimates.iter().find(|e| e.name == "A");
     let flipped = amplitude.is_some_and(|e| e.value * truth["A"] < 0.0);
@@ -221,7 +221,7 @@ fn turn_ripple(estimates: &mut [Estimate], truth: &BTreeMap<String, f64>) {
 }
 
 impl Coverage {
-    /// None where there is no interval.
+    /// `None` without an interval.
     fn of(name: &str, truth: f64, estimate: &Estimate) -> Option<Self> {
         let [low, high] = estimate.ci95?;
         Some(Self {
@@ -247,7 +247,7 @@ mod tests {
             label: label.to_owned(),
             parameters: values.iter().map(estimate).collect(),
             p_value: 1e-6,
-            error_reduction,
+            error_reduction: Some(error_reduction),
         }
     }
 

@@ -6,15 +6,15 @@ use super::friction::{DryFriction, Presliding};
 use super::mechanics::{Mechanics, Pair};
 use super::transmission::Transmission;
 
-/// A rig with everything that nobody declared.
+/// A rig with its undeclared effects.
 #[derive(Debug, Clone)]
 pub struct Machine {
     pub mechanics: Mechanics,
-    /// Gravity is turned by this \[rad\].
+    /// Angle by which gravity is turned \[rad\].
     pub tilt: f64,
-    /// Inertia of each joint's rotor that its own joint alone sees \[kg m^2\].
+    /// Rotor inertia of each joint, which acts on that joint alone \[kg m^2\].
     pub rotor: Pair,
-    /// Each with its joint.
+    /// Each with the joint that it acts on.
     pub forces: Vec<(usize, Force)>,
     pub dry: Vec<(usize, DryFriction)>,
     pub presliding: Vec<(usize, Presliding)>,
@@ -22,8 +22,8 @@ pub struct Machine {
     pub drives: [Drive; 2],
 }
 
-/// Positions in rad, speeds in rad/s. A motor's entries mean something where there is a transmission, a
-/// bristle's where there is presliding.
+/// State of a rig: positions in rad, speeds in rad/s. Motor entries are used only behind a transmission, bristle
+/// entries only with presliding friction.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State {
     pub q: Pair,
@@ -55,10 +55,10 @@ impl State {
     }
 }
 
-/// Which way each joint slides: 1, -1, or 0 where it is held.
+/// Direction of motion of each joint: 1, -1, or 0 where friction holds it.
 pub(super) type Directions = Pair;
 
-/// What acts on the joints at one instant, all but dry friction.
+/// The torques at one instant, without dry friction.
 pub(super) struct Balance {
     mass: [Pair; 2],
     /// Torque on each joint \[N m\].
@@ -93,7 +93,7 @@ impl Machine {
         self.mechanics.declared(self.rotor[0] + motor)
     }
 
-    /// Angles that the encoders see: of the motors where there is play or give behind them.
+    /// Encoder angles: those of the motors where a transmission follows, else those of the joints.
     pub fn encoders(&self, state: &State) -> Pair {
         [0, 1].map(|j| match self.transmissions[j] {
             Some(_) => state.motor_q[j],
@@ -142,14 +142,14 @@ impl Machine {
         balance
     }
 
-    /// The level of all dry friction of a joint against motion in `direction` \[N m\].
+    /// Total level of dry friction of a joint against motion in `direction` \[N m\].
     fn level(&self, joint: usize, direction: f64, state: &State, load: f64) -> f64 {
         let own = self.dry.iter().filter(|(of, _)| *of == joint);
         own.map(|(_, friction)| friction.level(direction, state.q[joint], state.v[joint], load))
             .sum()
     }
 
-    /// Accelerations while the joints slide in these directions; those that are held have none.
+    /// Accelerations while the joints move in these directions; held joints have none.
     fn accelerations(
         &self,
         balance: &Balance,
@@ -188,7 +188,7 @@ impl Machine {
             .flat_map(|a| options(1).iter().map(move |b| [*a, *b]));
         let balance = self.balance(time, state, commands);
         let agrees = |directions: &Directions| self.agrees(&balance, state, *directions);
-        // The matrix is positive definite, so one choice always agrees, up to rounding at its very edge.
+        // The mass matrix is positive definite, so one choice is always consistent, up to rounding at the boundary.
         all.clone()
             .find(agrees)
             .or_else(|| all.clone().next())
@@ -209,7 +209,7 @@ impl Machine {
         })
     }
 
-    /// Derivative of the state by time, in units of the state per second.
+    /// Time derivative of the state, in its units per second.
     pub(super) fn slope(
         &self,
         time: f64,

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Numbers of the two joints. A rig of one joint carries an idle second one.
+/// One number for each of two joints; the second is idle in a rig with one joint.
 pub type Pair = [f64; 2];
 
 /// The bare mechanism: `mass(q) a + bias(q, v) = torque`, written by hand. Angles in rad, q = 0 hangs down, the
@@ -14,7 +14,7 @@ pub enum Mechanics {
     Pendulum {
         /// About the pivot \[kg m^2\].
         inertia: f64,
-        /// Mass times distance of its centre \[kg m\].
+        /// Mass times distance of the centre of mass \[kg m\].
         moment: f64,
         /// \[m/s^2\]
         g: f64,
@@ -68,7 +68,7 @@ impl Mechanics {
         }
     }
 
-    /// Torques of gravity, turned by `tilt` rad, and of inertia that hold the motion back \[N m\].
+    /// Bias torques: gravity, turned by `tilt` rad, and velocity-dependent inertial torques \[N m\].
     pub fn bias(&self, q: Pair, v: Pair, tilt: f64) -> Pair {
         match *self {
             Self::Pendulum { moment, g, .. } => [moment * g * (q[0] + tilt).sin(), 0.0],
@@ -150,7 +150,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Energy from the places and speeds of the two centres of mass \[J\]: knows no mass matrix.
+    /// Energy from positions and speeds of the two centres of mass \[J\], without the mass matrix.
     pub fn energy(mechanics: &Mechanics, q: Pair, v: Pair) -> f64 {
         match *mechanics {
             Mechanics::Pendulum { inertia, moment, g } => {

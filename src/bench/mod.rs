@@ -24,7 +24,7 @@ mod transmission;
 
 pub use cell::{Errors, Findings};
 pub use files::recorded;
-pub use grid::{Cell, GridError, Group, Simulation, Source, cells, hash, read};
+pub use grid::{Cell, GridError, Group, Simulation, Source, cells, read};
 pub use hidden::{Hidden, Label};
 pub use judge::{Answer, Coverage, Estimate, Judgement, Named, Truth, judge};
 pub use machine::{Machine, State};

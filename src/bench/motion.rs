@@ -1,15 +1,15 @@
-//! Motion in fine steps: fourth-order steps while joints slide one way, halted exactly where one stops.
+//! Event-driven integration: Runge-Kutta 4 steps between stick-slip events, each located by bisection.
 
 use super::drive::Approach;
 use super::machine::{Directions, Machine, State};
 
-/// Length of a step \[s\]: halving it changes nothing that a sensor could see (tested).
+/// Step length \[s\]: halving it changes nothing that a sensor could resolve (tested).
 pub const STEP_S: f64 = 1e-4;
-/// Halvings of a step by which the instant is found at which a joint stops.
+/// Bisections by which the instant is located at which a joint stops.
 const HALVINGS: usize = 40;
 
 impl Machine {
-    /// Move for `duration` s from time `from`, commands given, in steps of at most `step_s`.
+    /// Integrates for `duration` s from time `from` under given commands, in steps of at most `step_s`.
     pub fn advance(
         &self,
         state: &mut State,
@@ -19,7 +19,7 @@ impl Machine {
         step_s: f64,
     ) {
         let mut passed = 0.0;
-        // What is left below a femtosecond is rounding.
+        // A remainder below a femtosecond is rounding.
         while duration - passed > 1e-15 {
             let step = step_s.min(duration - passed);
             passed += self.step(state, from + passed, step, commands);
@@ -57,7 +57,7 @@ impl Machine {
         length
     }
 
-    /// A step of the classical fourth-order Runge-Kutta method.
+    /// A step of the classical Runge-Kutta method of order 4.
     fn smooth(
         &self,
         t: f64,
@@ -236,12 +236,12 @@ mod tests {
         let mut state = moving([0.8, 0.4], [0.0, 0.0]);
         let before = energy(&mechanics, state.q, state.v);
         machine.advance(&mut state, 0.0, 1.0, &constant([0.0; 2]), STEP_S);
-        // A double pendulum with a stiff elbow is a pendulum: nothing is lost.
+        // A double pendulum with a locked elbow is a pendulum, without loss.
         assert_eq!((state.q[1], state.v[1]), (0.4, 0.0));
         assert!(state.v[0].abs() > 0.1);
         let after = energy(&mechanics, state.q, state.v);
         assert!((after - before).abs() < 1e-8);
-        // Held with less, the elbow gives way under the swing.
+        // With less friction the elbow slips during the swing.
         machine.dry[0].1 = DryFriction::Coulomb { level: 0.2 };
         let mut state = moving([0.8, 0.4], [0.0, 0.0]);
         machine.advance(&mut state, 0.0, 1.0, &constant([0.0; 2]), STEP_S);

@@ -1,4 +1,4 @@
-//! A rig is driven and its encoders are read: one log.
+//! Recording a log: drive the rig, read its encoders.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use super::mechanics::Pair;
 use super::motion::STEP_S;
 use crate::data::Log;
 
-/// How a rig is driven: numbers of its joints.
+/// How a rig is driven; one number a joint in every list.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Driving {
@@ -30,7 +30,7 @@ pub struct Driving {
     pub limit: Vec<f64>,
 }
 
-/// Whether the torque answers to what is measured.
+/// Open or closed loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Loop {
@@ -92,7 +92,7 @@ impl Source {
     }
 }
 
-/// Reads one encoder: offset, white noise, rounding.
+/// One encoder: offset, white noise, quantisation.
 fn read(angle: f64, condition: &Condition, rng: &mut impl Rng) -> f64 {
     let noise = Normal::new(0.0, condition.noise).expect("the grid was checked");
     let angle = angle + noise.sample(rng);
@@ -102,15 +102,15 @@ fn read(angle: f64, condition: &Condition, rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// Commands of a rig and what its drives are given of them.
+/// Commands of a rig and the part of them that has reached its drives.
 struct Wires {
-    /// One each step from the start.
+    /// One a step, from the start.
     commands: Vec<Pair>,
     given: [Approach; 2],
 }
 
 impl Wires {
-    /// The command of joint `j` that is `steps` old in step `row`; before the start there was none.
+    /// The command of joint `j` that is `steps` old in step `row`; zero before the start.
     fn command(&self, row: usize, steps: usize, j: usize) -> f64 {
         row.checked_sub(steps).map_or(0.0, |k| self.commands[k][j])
     }
@@ -177,7 +177,7 @@ impl Machine {
         log
     }
 
-    /// Move over one step of the log, halting where a delay brings in the next command.
+    /// Integrates over one step of the log, split where a delayed command changes.
     fn hold(&self, state: &mut State, wires: &mut Wires, row: usize, dt: f64) {
         let changes = [0, 1].map(|j| whole_steps(self.drives[j].delay, dt).1);
         let mut cuts = [0.0, changes[0], changes[1], dt];

@@ -1,4 +1,4 @@
-//! Many cells in a few numbers, and those as a table.
+//! The results of many cells, summarised in a table.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -11,20 +11,20 @@ use super::judge::{Coverage, Judgement};
 use crate::closeloop::Verdict;
 use crate::data::statistics::{rank_quantile, wilson};
 
-/// One cell and what came of it; one line of `cells.jsonl`.
+/// One cell and its result; one line of `cells.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// Tells one configuration of a cell from another.
+    /// Identifies the configuration of the cell.
     pub configuration: String,
-    /// Tells one build of the program from another.
+    /// Identifies the build of the program.
     pub program: String,
     pub seconds: f64,
     pub cell: Cell,
-    /// Or why the loop could not be closed.
+    /// The findings, or why closing the loop failed.
     pub findings: Result<Findings, String>,
 }
 
-/// How often something was so.
+/// A relative frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
     pub hits: usize,
@@ -39,7 +39,7 @@ impl Rate {
         })
     }
 
-    /// Share; NaN of nothing.
+    /// The share; NaN without a trial.
     #[allow(clippy::cast_precision_loss)] // counts are small
     pub fn share(self) -> f64 {
         self.hits as f64 / self.of as f64
@@ -69,17 +69,17 @@ impl Row {
     }
 }
 
-/// What a run of the grid shows.
+/// The results of a grid.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub cells: usize,
-    /// Cells from which the loop could not be closed.
+    /// Cells on which closing the loop failed, each with its error.
     pub errors: Vec<(String, String)>,
     pub rows: Vec<Row>,
     /// Error after over error of the true structure, 0.5 s ahead: median, 90 % quantile and largest over the
     /// cells with an effect that the library knows.
     pub held_out_ratio: Option<[f64; 3]>,
-    /// Cells of which the library cannot fit the true structure.
+    /// Number of cells whose true structure the library cannot express.
     pub not_told: usize,
     /// Passed, by the name of each effect that was hidden.
     pub by_effect: Vec<Row>,
@@ -91,7 +91,7 @@ pub struct Summary {
     pub seconds: Seconds,
 }
 
-/// A cell that did not show what it was to show.
+/// A cell that was not passed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     pub cell: String,
@@ -113,7 +113,7 @@ pub struct Seconds {
 /// The error after is as small as that of the true structure when it exceeds it by no more than this.
 const AS_GOOD: f64 = 1.1;
 
-/// A cell whose loop could not be closed counts as a failure wherever it counts at all.
+/// A cell on which closing the loop failed counts as not passed wherever it counts.
 struct Done<'l> {
     cell: &'l Cell,
     findings: Option<&'l Findings>,
@@ -234,7 +234,7 @@ fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
 fn by_parameter(done: &[Done<'_>]) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
     for coverage in done.iter().flat_map(Done::coverage) {
-        // Neither the joint nor the log says anything about a parameter.
+        // One row for a parameter, whatever its joint and log.
         let name = coverage.name.split('[').next().unwrap_or_default();
         let name = match name.split_once('@') {
             Some((effect, rest)) => {
@@ -252,7 +252,7 @@ fn counted(groups: BTreeMap<String, Vec<bool>>) -> Vec<Row> {
     groups.into_iter().map(row).collect()
 }
 
-/// Cells that could not be run are listed by their errors.
+/// `None` for a passed cell, and for one that could not be run, which is listed by its error.
 fn failure(d: &Done<'_>) -> Option<Failure> {
     let Findings {
         answer,

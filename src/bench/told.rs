@@ -1,20 +1,15 @@
-//! The fit of a person who knows the truth: what any search could reach at best.
+//! The fit of the true structure: the best that any search could reach.
 
 use super::hidden::Hidden;
-use crate::closeloop::{Split, Study};
-use crate::evaluate::{Assessment, assess};
+use crate::closeloop::{Settings, Split, Study};
 use crate::model::{FittedEffect, Library, System};
+use crate::sim::metric::{Assessment, assess};
 
 /// Error of the model with the true effects, fitted from their true values to the logs that the search had:
-/// position, all joints together, at the middle horizon \[rad\]. None where the library lacks one of them.
-pub fn told(
-    system: &System,
-    library: &Library,
-    split: &Split,
-    effects: &[Hidden],
-    horizons_s: &[f64],
-) -> Option<f64> {
-    let mut study = Study::new(system, &split.train);
+/// position, all joints together, at the middle horizon \[rad\]. `None` where the library lacks one of them.
+pub fn told(system: &System, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
+    let settings = Settings::default();
+    let mut study = Study::new(system, &split.train, &settings);
     let declared = study.fit_declared().ok()?;
     let truth: Vec<FittedEffect> = effects
         .iter()
@@ -24,11 +19,16 @@ pub fn told(
     let model = study.refit(&truth, &declared.declared, locals, None).ok()?;
     let tests = split.test.iter();
     let values: Vec<Vec<f64>> = tests.map(|log| model.values_in(log)).collect();
-    let errors: Assessment = assess(&model.dynamics, |log| &values[log], &split.test, horizons_s);
+    let errors: Assessment = assess(
+        &model.dynamics,
+        |log| &values[log],
+        &split.test,
+        &settings.score.horizons_s,
+    );
     Some(errors.position_rms())
 }
 
-/// The effect with its true values; none where there is no such effect.
+/// The effect with its true values; `None` where the library has no such effect.
 fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     if hidden.name == "parameter_shift" {
         return shift(study.system, hidden);
@@ -39,10 +39,10 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     let mut fitted = FittedEffect::absent(&effect, joint);
     for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
         slot.0 = match hidden.values.get(&parameter.name) {
-            // What differs by log is found from zero.
+            // Values per log start from zero.
             _ if parameter.per_log => 0.0,
             Some(value) => *value,
-            // A form of the effect's formula, not a number of the rig.
+            // Selects a form of the effect's formula; the rig has no such number.
             None if parameter.whole => parameter.typical,
             None => return None,
         };

@@ -1,5 +1,5 @@
-/// What lies between a motor with an inertia of its own, which carries the encoder, and the link: a spring with
-/// play. Stiff with play it is backlash; soft without play it is joint compliance.
+/// The transmission between a motor, which has its own inertia and carries the encoder, and the link: a spring-damper
+/// with play. Stiff with play it is backlash, soft without play joint compliance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transmission {
     /// Free angle between the two contacts \[rad\].
@@ -12,15 +12,15 @@ pub struct Transmission {
     pub inertia: f64,
 }
 
-/// Contacts of a gear: they give way by half a milliradian under 1 N m.
+/// Contact stiffness of a gear: half a milliradian under 1 N m.
 const CONTACT_STIFFNESS: f64 = 2000.0;
-/// Of the critical damping of motor and contact.
+/// Share of the critical damping of motor and contact.
 const DAMPING_RATIO: f64 = 0.3;
-/// Reflected inertia of the rotor behind a play: that of a small geared motor.
+/// Reflected rotor inertia of a small geared motor.
 const ROTOR_INERTIA: f64 = 0.002;
 
 impl Transmission {
-    /// Real two-sided play of `play` rad.
+    /// Two-sided play of `play` rad.
     pub fn backlash(play: f64) -> Self {
         Self::new(play, CONTACT_STIFFNESS, ROTOR_INERTIA)
     }
@@ -39,8 +39,8 @@ impl Transmission {
         }
     }
 
-    /// Torque on the link \[N m\] when the motor is `ahead` rad and gains `gaining` rad/s; contacts push, they
-    /// never pull.
+    /// Torque on the link \[N m\] when the motor leads by `ahead` rad and the lead grows at `gaining` rad/s. Contacts
+    /// push and never pull.
     pub fn torque(&self, ahead: f64, gaining: f64) -> f64 {
         let side = ahead.signum();
         let pressed = ahead.abs() - 0.5 * self.play;

@@ -7,8 +7,10 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 
 use super::{Answer, Common, inputs, progress, told};
-use crate::bench::{Cell, Line, Source, hash, markdown, read, recorded, summarise};
+use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
+use crate::files::content_id;
 use crate::model::Library;
+use crate::runs::RunFolder;
 
 /// Measure the program on simulated rigs
 #[derive(Debug, Args)]
@@ -64,13 +66,14 @@ fn effects(arguments: &Effects) -> Result<Answer> {
             arguments.out.display()
         )
     })?;
+    let folder = RunFolder::open(&arguments.out)?;
     let store = Store::open(&arguments.out)?;
     let lines = store.run(&cells)?;
     let summary = summarise(&lines);
     let text = markdown(&summary);
     let json = serde_json::to_string_pretty(&summary)? + "\n";
-    write(&arguments.out.join("summary.json"), &json)?;
-    write(&arguments.out.join("table.md"), &text)?;
+    folder.write_text("summary.json", &json)?;
+    folder.write_text("table.md", &text)?;
     inputs::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }
@@ -109,7 +112,7 @@ impl Store {
         }
         Ok(Self {
             path,
-            program: format!("{:016x}", hash(&program)),
+            program: content_id(&program),
             known,
         })
     }
@@ -175,9 +178,5 @@ fn configuration(cell: &Cell) -> Result<String> {
             bytes.extend(fs::read(log).with_context(|| log.display().to_string())?);
         }
     }
-    Ok(format!("{:016x}", hash(&bytes)))
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).with_context(|| format!("{} cannot be written", path.display()))
+    Ok(content_id(&bytes))
 }

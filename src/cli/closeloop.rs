@@ -7,11 +7,14 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Answer, Common, inputs, progress};
-use crate::closeloop::{Outcome, Reference, Request, Split, Stage, Verdict, calibrate, close_loop};
+use crate::closeloop::{
+    Outcome, Reference, Request, Settings, Split, Stage, Verdict, calibrate, close_loop,
+};
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Origin, System};
 use crate::plant::Plant;
 use crate::report;
+use crate::runs::RunFolder;
 use crate::train::ResidualTrainer;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
@@ -64,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
-    inputs::check_writable(&arguments.out)?;
+    let _folder = RunFolder::open(&arguments.out)?;
     let bar = progress::bar(Stage::ALL.len());
     let learner = ResidualTrainer {
         backend: arguments.common.device,
@@ -114,7 +117,7 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(S
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     inputs::print_notes(train.iter().chain(&test));
     let split = if test.is_empty() {
-        Split::of(train)
+        Split::of(train, &Settings::default().split)
     } else {
         Split::given(train, test)
     };
@@ -132,7 +135,10 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
         .map(record)
         .collect::<Result<Vec<_>>>()?;
     // What the plant hides stays with the plant: the loop gets the declared model and the logs.
-    Ok((plant.declared(), Split::of(logs)))
+    Ok((
+        plant.declared(),
+        Split::of(logs, &Settings::default().split),
+    ))
 }
 
 /// Models that predict the same joints, in the same units.

@@ -9,14 +9,14 @@ use serde::Serialize;
 
 use super::inputs::{self, Source};
 use super::{Answer, Common, progress};
-use crate::control::{
-    Controller, Episode, Policy, Predictor, Purpose, Task, episode, stream, with_controller,
-};
+use crate::control::{Controller, Episode, Policy, Predictor, Task, episode, with_controller};
 use crate::data::statistics::{mean, sample_deviation};
+use crate::files::write_whole;
 use crate::model::Library;
 use crate::plan::Method;
 use crate::plant::{Noise, Plant};
-use crate::report::{film, write_whole};
+use crate::report::film;
+use crate::runs::{Purpose, RunFolder, stream};
 
 /// Control a simulated plant by model-predictive control with any model
 #[derive(Debug, Args)]
@@ -106,8 +106,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             task.joints()
         );
     }
+    let _folder = arguments.out.as_deref().map(RunFolder::open).transpose()?;
     if let Some(out) = &arguments.out {
-        inputs::check_writable(out)?;
         std::fs::create_dir_all(out)
             .with_context(|| format!("{} cannot be made", out.display()))?;
     }
@@ -202,11 +202,11 @@ fn one(
     number: usize,
 ) -> Result<Entry> {
     let seed = arguments.common.seed;
-    let mut rng = stream(seed, Purpose::Judge, number);
+    let mut rng = stream(seed, Purpose::Judge(number));
     let dynamics = plant.true_dynamics();
     let start = task.draw_start(&mut rng);
     let mut rig = task.rig(plant, &dynamics, &start);
-    let draws = stream(seed, Purpose::JudgePlan, number);
+    let draws = stream(seed, Purpose::JudgePlan(number));
     with_controller(predictor, task, task.replan, &draws, |controller| {
         let mut timed = Timed {
             controller,

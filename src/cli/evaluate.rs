@@ -8,8 +8,9 @@ use serde::Serialize;
 use super::inputs::{self, Source};
 use super::{Answer, Common};
 use crate::data::{LeaveOut, Log};
-use crate::evaluate::{Offsets, Summary, assess, calibrate, summarise};
+use crate::identify::{Offsets, calibrate};
 use crate::model::{Dynamics, System};
+use crate::sim::metric::{Summary, assess, summarise};
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]

@@ -1,18 +1,19 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 
-use super::{Answer, Common, inputs, progress};
+use super::{Answer, Common, command_line, inputs, progress};
 use crate::experiment::undeclared_effect::{self, Lab, Trial};
 use crate::experiment::{Config, Experiment, Session, Step, picture};
 use crate::model::Library;
-use crate::report::write_whole;
+use crate::runs::RunFolder;
 
-/// Experiments: return against real transitions, against the receding horizon, and with effects that nobody declared
+/// Experiments: return against real transitions, against the receding horizon, and with undeclared effects
 ///
-/// The same command goes on with an experiment that was interrupted, and ends with the same numbers.
+/// Seeds are counted from --seed. The same command resumes an experiment that was interrupted, and ends with the same
+/// numbers.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn experiment physics-prior --config configs/physics-prior/pendulum.toml --out physics-prior"
@@ -20,7 +21,7 @@ use crate::report::write_whole;
 pub(super) struct Arguments {
     #[arg(value_enum)]
     name: Name,
-    /// What is compared, on which task and plant
+    /// The experiment's configuration
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// Folder for the results and all runs
@@ -40,18 +41,20 @@ enum Name {
     UndeclaredEffect,
 }
 
-/// What there is to say of an experiment.
+/// The file with the time so far, s.
+const WALL: &str = "wall_s";
+
+/// The results of an experiment, as printed and written.
 struct Finished {
     json: String,
     text: String,
-    /// Whether what it aims at was reached.
+    /// Whether its target was reached.
     answer: Answer,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let out = &arguments.out;
-    inputs::check_writable(out)?;
-    let clock = Clock::open(out)?;
+    let folder = RunFolder::open(&arguments.out)?;
+    let clock = Clock::open(&folder)?;
     let library = arguments.effects.library()?;
     let published = |experiment| published(arguments, experiment, &library, &clock);
     let finished = match arguments.name {
@@ -61,7 +64,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         Name::UndeclaredEffect => undeclared_effect(arguments, library, &clock),
     }?;
     clock.save();
-    write_whole(&out.join("results.json"), finished.json.as_bytes())?;
+    folder.write_text("results.json", &finished.json)?;
     let json = arguments.common.json;
     inputs::print(if json { &finished.json } else { &finished.text })?;
     Ok(finished.answer)
@@ -71,12 +74,13 @@ fn published(
     arguments: &Arguments,
     experiment: Experiment,
     library: &Library,
-    clock: &Clock,
+    clock: &Clock<'_>,
 ) -> Result<Finished> {
-    let (config, out) = (Config::read(&arguments.config)?, &arguments.out);
-    let session = Session::open(config, library, arguments.common.device)?;
+    let Common { device, seed, .. } = arguments.common;
+    let config = Config::read(&arguments.config)?;
+    let session = Session::open(config, library, device, seed)?;
     let bar = progress::bar(session.rounds());
-    let results = session.carry_out(experiment, out, &|step: &Step<'_>| {
+    let results = session.carry_out(experiment, clock.folder, &|step: &Step<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
         if !step.found {
@@ -84,26 +88,32 @@ fn published(
         }
     });
     bar.finish_and_clear();
-    let results = results?.finished(command(arguments, experiment.name()), clock.wall_s());
-    write_whole(&out.join("results.svg"), picture(&results)?.as_bytes())?;
+    let results = results?.finished(command_line(), clock.wall_s());
+    clock
+        .folder
+        .write_text("results.svg", &picture(&results)?)?;
     Ok(Finished {
         json: serde_json::to_string_pretty(&results)? + "\n",
         text: format!(
             "{}{}",
             results.text(),
-            files(out, &["results.json", "results.svg"])
+            files(&arguments.out, &["results.json", "results.svg"])
         ),
         answer: Answer::Yes,
     })
 }
 
-fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock) -> Result<Finished> {
-    let out = &arguments.out;
+fn undeclared_effect(
+    arguments: &Arguments,
+    library: Library,
+    clock: &Clock<'_>,
+) -> Result<Finished> {
+    let Common { device, seed, .. } = arguments.common;
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
-    let lab = Lab::new(experiment, library, arguments.common.device)?;
+    let lab = Lab::new(experiment, library, device, seed)?;
     let trials = lab.experiment.seeds * lab.plants.len() as u64;
     let bar = progress::bar(usize::try_from(trials)?);
-    let outcome = lab.run(out, &|trial: &Trial| {
+    let outcome = lab.run(clock.folder, &|trial: &Trial| {
         bar.inc(1);
         bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
         clock.save();
@@ -112,26 +122,21 @@ fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock) -> 
     let outcome = outcome?;
     let mut value = serde_json::to_value(&outcome)?;
     value["experiment"] = "undeclared-effect".into();
-    value["command"] = command(arguments, "undeclared-effect").into();
+    value["command"] = command_line().into();
     value["wall_s"] = clock.wall_s().into();
     Ok(Finished {
         json: serde_json::to_string_pretty(&value)? + "\n",
-        text: format!("{}{}", outcome.text(), files(out, &["results.json"])),
+        text: format!(
+            "{}{}",
+            outcome.text(),
+            files(&arguments.out, &["results.json"])
+        ),
         answer: if outcome.reached {
             Answer::Yes
         } else {
             Answer::No
         },
     })
-}
-
-fn command(arguments: &Arguments, name: &str) -> String {
-    let Arguments { config, out, .. } = arguments;
-    format!(
-        "residyn experiment {name} --config {} --out {}",
-        config.display(),
-        out.display()
-    )
 }
 
 fn files(out: &Path, names: &[&str]) -> String {
@@ -141,7 +146,7 @@ fn files(out: &Path, names: &[&str]) -> String {
         .collect()
 }
 
-/// For the progress bar.
+/// The text of the progress bar.
 pub(super) fn message(step: &Step<'_>) -> String {
     let Step {
         method,
@@ -153,28 +158,27 @@ pub(super) fn message(step: &Step<'_>) -> String {
     format!("rounds; {method} seed {seed}: {transitions} transitions, return {total:.1}")
 }
 
-/// The time that all sessions of an experiment took.
-struct Clock {
+/// Measures the total time of an experiment over all interruptions.
+struct Clock<'f> {
     began: Instant,
     before_s: f64,
-    path: PathBuf,
+    folder: &'f RunFolder,
 }
 
-impl Clock {
-    fn open(out: &Path) -> Result<Self> {
+impl<'f> Clock<'f> {
+    fn open(folder: &'f RunFolder) -> Result<Self> {
         let began = Instant::now();
-        let path = out.join("wall_s");
-        let before_s = match std::fs::read_to_string(&path) {
-            Ok(text) => text
+        let before_s = match folder.text(WALL)? {
+            Some(text) => text
                 .trim()
                 .parse()
-                .with_context(|| format!("{} is no number of seconds", path.display()))?,
-            Err(_) => 0.0,
+                .map_err(|_| folder.damaged(WALL, "it is no number of seconds".to_owned()))?,
+            None => 0.0,
         };
         Ok(Self {
             began,
             before_s,
-            path,
+            folder,
         })
     }
 
@@ -182,8 +186,10 @@ impl Clock {
         self.before_s + self.began.elapsed().as_secs_f64()
     }
 
-    /// A failure costs no more than a time that is too short.
+    /// If this fails, only the recorded time is too short.
     fn save(&self) {
-        let _ = write_whole(&self.path, format!("{}\n", self.wall_s()).as_bytes());
+        let _ = self
+            .folder
+            .write_text(WALL, &format!("{}\n", self.wall_s()));
     }
 }

@@ -1,4 +1,4 @@
-//! What `train` and `tune` share: run a job with a bar and checkpoints, print what came of it.
+//! Shared by `train` and `tune`: run a job with a progress bar and checkpoints, and print the results.
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -9,13 +9,14 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use super::{Answer, Common, inputs, progress};
-use crate::recipe::Job;
+use crate::runs::RunFolder;
+use crate::train::recipe::Job;
 use crate::train::{Progress, Training, save};
 
 /// Where and how often to save.
 #[derive(Debug, Args)]
 pub(super) struct Saving {
-    /// Folder of the checkpoint; an interrupted run in it goes on where its last checkpoint left it
+    /// Folder of the checkpoint; a run that was interrupted is resumed from its last checkpoint
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Epochs between checkpoints; one is also written when 10 s have passed
@@ -23,11 +24,11 @@ pub(super) struct Saving {
     save_every: NonZeroUsize,
 }
 
-/// So much work at most is lost when a run is interrupted.
+/// The most work that an interruption can lose.
 const LONGEST_UNSAVED: Duration = Duration::from_secs(10);
 
 impl Saving {
-    /// The folder asked for, or a name made from that of what the run begins with.
+    /// The folder asked for, or one named after the `source` of the run.
     pub(super) fn folder(&self, source: &Path, ending: &str) -> PathBuf {
         let named = || {
             let stem = source.file_stem().unwrap_or_default();
@@ -37,13 +38,13 @@ impl Saving {
     }
 }
 
-/// Run `job` to its end and print the outcome.
+/// Runs a job to its end and prints the results.
 pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common) -> Result<Answer> {
-    inputs::check_writable(dir)?;
+    let folder = RunFolder::open(dir)?;
     for note in &job.material.notes {
         eprintln!("note: {note}");
     }
-    let mut training = job.begin(dir)?;
+    let mut training = job.begin(&folder)?;
     if training.epoch() > 0 {
         eprintln!(
             "note: {} goes on from epoch {}",

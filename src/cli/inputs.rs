@@ -108,20 +108,3 @@ pub(super) fn print(text: &str) -> Result<()> {
         _ => Ok(()),
     }
 }
-
-/// Check that results can be written before long work begins.
-pub(super) fn check_writable(folder: &Path) -> Result<()> {
-    let parent = folder
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let remedy = "give a folder that can be written with --out";
-    if folder.exists() && !folder.is_dir() {
-        anyhow::bail!("{} is a file; {remedy}", folder.display());
-    }
-    std::fs::create_dir_all(parent)
-        .with_context(|| format!("{} cannot be made; {remedy}", parent.display()))?;
-    tempfile::tempfile_in(parent)
-        .map(drop)
-        .with_context(|| format!("{} cannot be written; {remedy}", parent.display()))
-}

@@ -9,12 +9,13 @@ use serde_json::json;
 use super::experiment::message;
 use super::{Answer, Common, inputs, progress};
 use crate::experiment::{Config, Session, Step};
-use crate::mbrl::{Folder, Round};
+use crate::mbrl::Round;
 use crate::report::EventFile;
+use crate::runs::RunFolder;
 
-/// Model-based reinforcement learning: train, control, add what was seen, and again
+/// Model-based reinforcement learning: train a model, control the plant with it, add the new data, repeat
 ///
-/// One run of one method of an experiment's configuration, with --seed. The same command goes on with a run that was
+/// One run of one method of an experiment's configuration, with --seed. The same command resumes a run that was
 /// interrupted, and ends with the same numbers.
 #[derive(Debug, Args)]
 #[command(
@@ -24,13 +25,13 @@ pub(super) struct Arguments {
     /// An experiment's configuration
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// Which of its methods
+    /// One of its methods
     #[arg(long, value_name = "NAME", default_value = "hybrid")]
     method: String,
-    /// Folder for rounds.jsonl, the stretches of motion as logs, and the last model as a checkpoint
+    /// Folder for rounds.jsonl, the recorded motion as logs, and the last model as a checkpoint
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder for an event file of the rounds done now, for TensorBoard
+    /// Folder for a TensorBoard event file of the rounds that this command carries out
     #[arg(long, value_name = "DIR")]
     tensorboard: Option<PathBuf>,
     #[command(flatten)]
@@ -48,9 +49,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         effects,
         common,
     } = arguments;
-    inputs::check_writable(out)?;
+    let folder = RunFolder::open(out)?;
     let library = effects.library()?;
-    let session = Session::open(Config::read(config)?, &library, common.device)?;
+    let session = Session::open(Config::read(config)?, &library, common.device, common.seed)?;
     let events = match tensorboard {
         Some(folder) => Some(Mutex::new(EventFile::create(folder, now_s())?)),
         None => None,
@@ -58,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let rounds = Mutex::new(Vec::new());
     let failed = Mutex::new(None);
     let bar = progress::bar(session.rounds_of(method));
-    let ended = session.run_alone(method, common.seed, out, &|step: &Step<'_>| {
+    let ended = session.run_alone(method, &folder, &|step: &Step<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
         locked(&rounds).push(step.round.clone());
@@ -69,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     });
     bar.finish_and_clear();
-    ended?;
+    let checkpoint = ended?;
     if let Some(error) = locked(&failed).take() {
         return Err(error);
     }
@@ -78,7 +79,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
         inputs::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
-        let checkpoint = Folder::open(out)?.checkpoint();
         inputs::print(&table(&rounds, &checkpoint))?;
     }
     Ok(Answer::Yes)
@@ -90,7 +90,7 @@ fn locked<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
         .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
-/// Seconds since 1970, as event files have it.
+/// Seconds since 1970, as in event files.
 fn now_s() -> f64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0.0, |since| since.as_secs_f64())

@@ -1,4 +1,4 @@
-//! The command line: parse, call, print; nothing else.
+//! The command line: parse the arguments, call the library, print the results.
 
 mod audit;
 mod bench;
@@ -14,6 +14,7 @@ mod list;
 mod mbrl;
 mod new;
 mod progress;
+mod remedy;
 mod simulate;
 mod sweep;
 mod train;
@@ -57,7 +58,7 @@ enum Command {
     Bench(bench::Arguments),
 }
 
-/// What every command takes.
+/// Arguments of every command.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Common {
     /// Print the result as JSON on standard output
@@ -66,12 +67,12 @@ pub(crate) struct Common {
     /// Seed of everything random; the same seed gives the same result on the same machine
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// What carries out tensor operations: ndarray, or cuda where the build has it
+    /// Backend of tensor operations: ndarray, or cuda in a build that has it
     #[arg(long, default_value_t)]
     device: Backend,
 }
 
-/// How a command ended that could run.
+/// The answer of a command that could run.
 enum Answer {
     Yes,
     No,
@@ -107,7 +108,25 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// An error and its causes. Where a message puts its cause between the place and the remedy, it is not told again.
+/// The command line of this process, as a shell takes it.
+fn command_line() -> String {
+    let words = std::env::args_os().skip(1);
+    let words = words.map(|word| quoted(&word.to_string_lossy()));
+    let all: Vec<String> = std::iter::once("residyn".to_owned()).chain(words).collect();
+    all.join(" ")
+}
+
+/// A word for a shell.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:@+%".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
+/// An error, its causes and what to do. A cause that the message before it contains is not repeated.
 fn told(error: &anyhow::Error) -> String {
     let mut told = String::new();
     for cause in error.chain().map(ToString::to_string) {
@@ -116,5 +135,27 @@ fn told(error: &anyhow::Error) -> String {
             told += &cause;
         }
     }
+    if let Some(remedy) = error.chain().find_map(remedy::remedy) {
+        told += "; ";
+        told += remedy;
+    }
     told
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_shell_takes_a_quoted_word_as_it_is() {
+        for (word, expected) in [
+            ("--seed", "--seed"),
+            ("a b.toml", "'a b.toml'"),
+            ("it's", r"'it'\''s'"),
+            ("", "''"),
+            ("$HOME", "'$HOME'"),
+        ] {
+            assert_eq!(quoted(word), expected);
+        }
+    }
 }

@@ -5,10 +5,10 @@ use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parse
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
+use crate::files::write_whole;
 use crate::formats::{FORMATS, Format, RobotReader};
 use crate::model::chain::model_text;
 use crate::model::{Library, System};
-use crate::report::write_whole;
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]

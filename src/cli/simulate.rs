@@ -20,13 +20,13 @@ pub(super) struct Arguments {
     /// Plant file, model file, or the name of a built-in system
     #[arg(long, value_name = "FILE")]
     plant: PathBuf,
-    /// Where to write the log
+    /// Log file to write
     #[arg(long, value_name = "LOG")]
     out: PathBuf,
     /// NAME=VALUE sets an effect's first parameter; NAME.PARAMETER=VALUE another; NAME@JOINT=VALUE on a joint
     #[arg(long, num_args = 1.., value_name = "NAME=VALUE")]
     effect: Vec<EffectSetting>,
-    /// Length in s instead of the plant's own
+    /// Length in s; the plant's own if not given
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
     #[command(flatten)]
@@ -111,7 +111,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(Answer::Yes)
 }
 
-/// Settings of one effect on one joint belong together.
+/// Adds the effects, each with all settings for it on its joint.
 fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting]) -> Result<()> {
     type Group<'s> = (&'s str, usize, Vec<(String, f64)>);
     let mut groups: Vec<Group<'_>> = Vec::new();

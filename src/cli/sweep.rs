@@ -3,17 +3,17 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args;
 
-use super::{Answer, Common, inputs, progress};
-use crate::recipe::{Job, Member, Recipe, Swept};
-use crate::report::write_whole;
+use super::{Answer, Common, command_line, inputs, progress};
+use crate::runs::RunFolder;
+use crate::train::recipe::{Job, Member, Recipe, Swept};
 use crate::train::{SweepProgress, Trained};
 
-/// Train many models by one recipe at once, from other initial networks or with other weights of the penalty
+/// Train many models by one recipe at once, with different initial weights or different weights of the penalty
 ///
-/// All models see the data of --seed. They are one batch, so that a graphics card (--device cuda) has enough to do.
+/// All models are trained on the data of --seed. They form one batch, which keeps a graphics card (--device cuda) busy.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         residyn sweep --config configs/train-pendulum.toml --seeds 100\n  \
@@ -22,16 +22,16 @@ pub(super) struct Arguments {
     /// Training recipe
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
-    /// How many models to train; their initial networks have the seeds --seed, --seed + 1, ...
+    /// Number of models; their initial weights have the seeds --seed, --seed + 1, ...
     #[arg(long, value_name = "COUNT")]
     seeds: NonZeroUsize,
-    /// Weights of the penalty, one for each model, from LOW to HIGH in equal ratios
+    /// Weights of the penalty, one per model, from LOW to HIGH in equal ratios
     #[arg(long, value_name = "LOW-HIGH")]
     alpha: Option<Alphas>,
-    /// Begin all models with the network of --seed, so that they differ in alpha alone
+    /// Give all models the initial weights of --seed, so that they differ in alpha alone
     #[arg(long, requires = "alpha")]
     one_seed: bool,
-    /// Models that are trained at once; fewer need less memory
+    /// Number of models that are trained at once; fewer need less memory
     #[arg(long, default_value = "1000", value_name = "COUNT")]
     together: NonZeroUsize,
     /// Folder of the result, sweep.json
@@ -54,7 +54,7 @@ impl FromStr for Alphas {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        // 1e-6-1e-2: the hyphen in the middle is the one with a number on either side.
+        // In 1e-6-1e-2, the separator is the hyphen with a number on either side.
         let numbers = text.match_indices('-').find_map(|(at, _)| {
             let (low, high) = (text[..at].parse().ok()?, text[at + 1..].parse().ok()?);
             Some(Self { low, high })
@@ -92,14 +92,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bail!("--alpha is a range of weights, and --seeds 1 trains one model; raise --seeds");
     }
     let library = arguments.effects.library()?;
-    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
+    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?
+        .begun_by(command_line());
+    let folder = RunFolder::open(out)?;
     let members = arguments.members();
     let begun = Instant::now();
     let trained = train(&job, &members, arguments)?;
     let swept = Swept::new(&job, &members, trained, begun.elapsed().as_secs_f64());
     let json = serde_json::to_string_pretty(&swept)? + "\n";
-    std::fs::create_dir_all(out).with_context(|| format!("{} cannot be made", out.display()))?;
-    write_whole(&out.join("sweep.json"), json.as_bytes())?;
+    folder.write_text("sweep.json", &json)?;
     inputs::print(&if common.json { json } else { swept.text() })?;
     let all_diverged = swept.totals.diverged == swept.totals.models;
     Ok(if all_diverged {
@@ -126,7 +127,6 @@ impl Arguments {
 }
 
 fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
-    inputs::check_writable(&arguments.out)?;
     for note in &job.material.notes {
         eprintln!("note: {note}");
     }

@@ -4,12 +4,12 @@ use anyhow::Result;
 use clap::Args;
 
 use super::fitting::{Saving, carry_out};
-use super::{Answer, Common, inputs};
-use crate::recipe::{Job, Recipe};
+use super::{Answer, Common, command_line, inputs};
+use crate::train::recipe::{Job, Recipe};
 
 /// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant
 ///
-/// The same command goes on with a run that was interrupted, and ends with the same numbers.
+/// The same command resumes a run that was interrupted, and ends with the same numbers.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn train --config configs/train-pendulum.toml --out pendulum --seed 1"
@@ -36,5 +36,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = effects.library()?;
     let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
     let dir = saving.folder(config, "checkpoint");
-    carry_out(&job, &dir, saving, common)
+    carry_out(&job.begun_by(command_line()), &dir, saving, common)
 }

@@ -4,27 +4,27 @@ use anyhow::Result;
 use clap::Args;
 
 use super::fitting::{Saving, carry_out};
-use super::{Answer, Common, inputs};
-use crate::recipe::{Job, Recipe};
+use super::{Answer, Common, command_line, inputs};
 use crate::train::Checkpoint;
+use crate::train::recipe::{Job, Recipe};
 
 /// Fine-tune a saved checkpoint on new data (sim-to-real)
 ///
-/// The whole model of the checkpoint keeps learning. If it has no residual network, it is given one that starts
-/// as nothing, unless the recipe's `kind` says otherwise.
+/// All parameters of the checkpoint's model are trained further. If it has no residual network, one is added that is
+/// initially zero, unless the recipe's `kind` says otherwise.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  residyn tune --checkpoint pendulum --train run1.csv run2.csv --out tuned\n  \
                   residyn tune --checkpoint pendulum --config configs/tune-pendulum.toml --out tuned"
 )]
 pub(super) struct Arguments {
-    /// Checkpoint to begin with; it is left as it is
+    /// Checkpoint to start from; it is not changed
     #[arg(long, value_name = "DIR")]
     checkpoint: PathBuf,
     /// Training recipe, without [start] and hold
     #[arg(long, value_name = "FILE", required_unless_present = "train")]
     config: Option<PathBuf>,
-    /// Logs to learn from, with the usual settings
+    /// Logs to train on, with the default settings
     #[arg(long, num_args = 1.., value_name = "LOG", conflicts_with = "config")]
     train: Vec<PathBuf>,
     #[command(flatten)]
@@ -57,5 +57,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     };
     let dir = saving.folder(from, "tuned");
-    carry_out(&job, &dir, saving, common)
+    carry_out(&job.begun_by(command_line()), &dir, saving, common)
 }

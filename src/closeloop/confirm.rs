@@ -2,9 +2,10 @@ use rayon::prelude::*;
 
 use super::fitted::Fitted;
 use super::per_log::values_on;
-use super::select::{PLAIN, gain, p_of_gains};
+use super::select::{gain, p_of_gains};
+use super::settings::ConfirmSettings;
 use super::study::Study;
-use crate::identify::{blocks, fit};
+use crate::identify::{FitError, blocks, fit};
 use crate::model::FittedEffect;
 
 /// An effect that was chosen and did not stand.
@@ -24,17 +25,12 @@ pub struct Confirmed {
     pub stretches: usize,
 }
 
-/// An effect stands that lowers the loss on data it was not chosen by, with this probability of doing so by
-/// accident, or that plainly helps: they are few, and it was significant over the whole library before.
-const CONFIRMED: f64 = 0.1;
-/// Fewer stretches than this prove nothing either way.
-const FEWEST: usize = 4;
-/// A change of the loss by less than this share: the motion does not show the effect.
-const NOT_SHOWN: f64 = 0.01;
-
-/// Ask of each effect of a model, fitted in `study`, whether it lowers the loss on data set aside, and take back
-/// those that do not, the least sure first.
-pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Confirmed {
+/// Test whether each effect of a model, fitted in `study`, lowers the loss on data set aside, and take back those that
+/// do not, the least sure first.
+///
+/// # Errors
+/// A model that diverges on the data set aside with and without each of its effects.
+pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Result<Confirmed, FitError> {
     let members = blocks(&aside.shooting);
     let stretches = members.last().map_or(0, |last| last + 1);
     let mut confirmed = Confirmed {
@@ -42,52 +38,102 @@ pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Confirmed
         taken_back: Vec::new(),
         stretches,
     };
-    if stretches < FEWEST {
+    if stretches < study.settings.confirm.fewest_stretches {
         confirmed.stretches = 0;
-        return confirmed;
+        return Ok(confirmed);
     }
-    while let Some((doubtful, without)) = most_doubtful(study, aside, &confirmed.model, &members) {
-        confirmed.taken_back.push(doubtful);
-        confirmed.model = without;
+    while let Some(least) = least_sure(study, aside, &confirmed.model, &members)? {
+        confirmed.taken_back.push(least.taken_back);
+        confirmed.model = least.without;
     }
-    confirmed
+    Ok(confirmed)
 }
 
-/// The effect that is confirmed least, if there is one that is not, and the model without it.
-fn most_doubtful(
+/// An effect that the data set aside do not confirm.
+struct Unconfirmed {
+    p_value: f64,
+    taken_back: TakenBack,
+    /// The model without it.
+    without: Fitted,
+}
+
+/// The effect that is confirmed least, if there is one that is not.
+fn least_sure(
     study: &Study<'_>,
     aside: &Study<'_>,
     model: &Fitted,
     members: &[usize],
-) -> Option<(TakenBack, Fitted)> {
-    let with = losses(aside, model, model.fit.scale, members)?;
+) -> Result<Option<Unconfirmed>, FitError> {
+    let with = losses(aside, model, model.fit.scale, members);
     let declared = study.system.effects.len();
-    let unsure: Vec<(f64, TakenBack, Fitted)> = (declared..model.effects.len())
+    let unsure: Vec<Unconfirmed> = (declared..model.effects.len())
         .into_par_iter()
-        .filter_map(|k| {
-            let mut effects = model.effects.clone();
-            let effect = effects.remove(k);
-            let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-            let less = study.refit(&effects, &model.declared, locals, scale).ok()?;
-            let without = losses(aside, &less, model.fit.scale, members)?;
-            let (p, saved) = (p_of_gains(&without, &with), gain(&without, &with));
-            (p > CONFIRMED && saved < PLAIN && saved.abs() > NOT_SHOWN).then(|| {
-                let reason = format!(
-                    "on stretches that it was not chosen by it changes the loss by {:.0} % (p = {p:.2})",
-                    -100.0 * saved
-                );
-                (p, TakenBack { effect, reason }, less)
-            })
-        })
+        .filter_map(|k| unconfirmed(study, aside, model, members, &with, k))
         .collect();
-    (unsure.into_iter())
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, taken_back, less)| (taken_back, less))
+    let least = (unsure.into_iter()).max_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    match (least, with) {
+        (None, Err(error)) => Err(error),
+        (least, _) => Ok(least),
+    }
+}
+
+/// The k-th effect of a model, if the data set aside do not confirm it. `with` is the loss of the model there.
+fn unconfirmed(
+    study: &Study<'_>,
+    aside: &Study<'_>,
+    model: &Fitted,
+    members: &[usize],
+    with: &Result<Vec<f64>, FitError>,
+    k: usize,
+) -> Option<Unconfirmed> {
+    let mut effects = model.effects.clone();
+    let effect = effects.remove(k);
+    let (locals, scale) = (model.fit.locals.clone(), model.fit.scale);
+    // A model that cannot be fitted, or diverges, without an effect needs it.
+    let without = study
+        .refit(&effects, &model.declared, locals, Some(scale))
+        .ok()?;
+    let (p_value, reason) = match with {
+        Err(_) => (
+            1.0,
+            "with it the model diverges on stretches that it was not chosen by".to_owned(),
+        ),
+        Ok(with) => {
+            let less = losses(aside, &without, scale, members).ok()?;
+            let (p, saved) = (p_of_gains(&less, with), gain(&less, with));
+            let ConfirmSettings {
+                significance,
+                not_shown,
+                ..
+            } = study.settings.confirm;
+            let stands = p <= significance
+                || saved >= study.settings.select.plain
+                || saved.abs() <= not_shown;
+            if stands {
+                return None;
+            }
+            let change = -100.0 * saved;
+            let reason = format!(
+                "on stretches that it was not chosen by it changes the loss by {change:.0} % (p = {p:.2})"
+            );
+            (p, reason)
+        }
+    };
+    Some(Unconfirmed {
+        p_value,
+        taken_back: TakenBack { effect, reason },
+        without,
+    })
 }
 
 /// Loss of a model on each stretch set aside, its parameters as they are, the start states free; so is what a log
 /// has of its own where the fit has not seen the log.
-fn losses(aside: &Study<'_>, model: &Fitted, scale: f64, members: &[usize]) -> Option<Vec<f64>> {
+fn losses(
+    aside: &Study<'_>,
+    model: &Fitted,
+    scale: f64,
+    members: &[usize],
+) -> Result<Vec<f64>, FitError> {
     let locals = aside.shooting.initial_locals(0);
     let values = values_on(aside.logs, &model.declared, &model.effects);
     let is_known = |k: &usize| values.own.iter().any(|own| own.parameter == *k);
@@ -102,11 +148,10 @@ fn losses(aside: &Study<'_>, model: &Fitted, scale: f64, members: &[usize]) -> O
         values,
         locals,
         Some(scale),
-    )
-    .ok()?;
+    )?;
     let mut losses = vec![0.0; members.last().map_or(0, |last| last + 1)];
     for (terms, &member) in found.reduced.iter().zip(members) {
         losses[member] += terms.terms.cost;
     }
-    Some(losses)
+    Ok(losses)
 }

@@ -6,9 +6,6 @@ use super::study::Study;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, identifiability};
 use crate::model::FittedEffect;
 
-/// Length in s of the windows of the first fit: even a poor start does not diverge in them.
-const SHORT_S: f64 = 0.15;
-
 impl Study<'_> {
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
     /// windows, in which even a poor start does not diverge, then over longer ones. Parameters that the
@@ -19,7 +16,8 @@ impl Study<'_> {
     /// No window, or a model that diverges even over short windows.
     pub fn fit_declared(&mut self) -> Result<Fitted, StudyError> {
         let declared: Vec<f64> = self.system.parameters.iter().map(|p| p.value).collect();
-        let short = Shooting::new(self.logs, cut(self.logs, SHORT_S), &self.shooting.noise);
+        let windows = cut(self.logs, self.settings.fit.short_window_s);
+        let short = Shooting::new(self.logs, windows, &self.shooting.noise);
         let (first, held) = self.fit_and_hold(&short, &self.system.effects, &declared)?;
         self.hold(held);
         let (second, held) = self.fit_and_hold(&self.shooting, &first.effects, &first.declared)?;

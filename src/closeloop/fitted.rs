@@ -1,8 +1,8 @@
 use super::per_log::{joined, take_over};
 use crate::data::Log;
-use crate::evaluate::{Trace, traces};
 use crate::identify::Fit;
 use crate::model::{Dynamics, FittedEffect, put_own};
+use crate::sim::metric::{Trace, traces};
 
 /// A model fitted to a study's logs.
 #[derive(Debug, Clone)]

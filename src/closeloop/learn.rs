@@ -10,47 +10,12 @@ use rand::Rng;
 use super::fitted::Fitted;
 use super::per_log::joined;
 use super::refine::Refined;
+use super::settings::LearnSettings;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{Dynamics, Origin, absorbed};
 use crate::sim::{Point, as_modelled};
-
-/// How the residual network is trained.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct LearnSettings {
-    /// Rows nearer than this are averaged, s: the network is to learn a force, not the encoder's noise.
-    pub step_s: f64,
-    /// Length of the stretches that the logs are cut into, s.
-    pub stretch_s: f64,
-    /// One stretch in so many is kept for validation, which chooses the epoch.
-    pub validate_every: usize,
-    /// Steps that the loss unrolls from each start state.
-    pub steps: usize,
-    /// About so many start states are enough for a network of some hundred weights.
-    pub segments: usize,
-    pub epochs: usize,
-    /// Of Adam, for the network; the physical parameters are held.
-    pub learning_rate: f64,
-    /// Penalty on the network's size: it takes over only what pays for it.
-    pub alpha: f64,
-}
-
-impl Default for LearnSettings {
-    fn default() -> Self {
-        Self {
-            step_s: 0.01,
-            stretch_s: 2.0,
-            validate_every: 5,
-            steps: 8,
-            segments: 1200,
-            epochs: 250,
-            learning_rate: 0.003,
-            alpha: 1e-3,
-        }
-    }
-}
 
 /// What a residual network is trained on.
 #[derive(Debug)]
@@ -116,14 +81,15 @@ pub(super) fn learn(
     let Some(learner) = learner else {
         return Ok(None);
     };
-    let task = task(&refined.study, &refined.model, LearnSettings::default());
+    let task = task(&refined.study, &refined.model);
     learner.learn(&task, rng, &mut |text| {
         let text = format!("{}, {text}", Stage::Learn.text());
         progress(Progress::within(Stage::Learn, &text));
     })
 }
 
-fn task(study: &Study<'_>, model: &Fitted, settings: LearnSettings) -> ResidualTask {
+fn task(study: &Study<'_>, model: &Fitted) -> ResidualTask {
+    let settings = study.settings.learn.clone();
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
     let (declared, effects) = absorbed(&model.declared, &model.effects);
     let equations = (study.system.dynamics_with(&effects, &study.sign))
@@ -139,7 +105,7 @@ fn task(study: &Study<'_>, model: &Fitted, settings: LearnSettings) -> ResidualT
     let stretches = (study.logs.iter().enumerate()).flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
     for (k, stretch) in stretches.enumerate() {
-        match (k + 1).is_multiple_of(settings.validate_every) {
+        match (k + 1).is_multiple_of(settings.every) {
             true => validation.push(stretch),
             false => training.push(stretch),
         }

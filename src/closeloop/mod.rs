@@ -20,28 +20,36 @@ mod request;
 mod run;
 mod score;
 mod select;
+mod settings;
 mod split;
 mod stage;
 mod study;
+#[cfg(test)]
+mod tests;
 mod verdict;
 
-pub use calibrate::{Calibration, DetectionLimit, HIDDEN, Repetition, Smallest, calibrate};
+pub use calibrate::{Calibration, DetectionLimit, Repetition, Smallest, calibrate};
 pub use confirm::TakenBack;
-pub use discriminate::{Alternative, Separation};
+pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;
 pub use find::{Found, find};
 pub use fitted::Fitted;
-pub use learn::{LearnError, LearnSettings, LearnedResidual, ResidualLearner, ResidualTask};
+pub use learn::{LearnError, LearnedResidual, ResidualLearner, ResidualTask};
 pub use outcome::{Effects, Given, Models, Outcome, Remainder};
 pub use per_log::joined;
 pub use remainder::{
-    Curve, ForceSample, NOTEWORTHY, Omnibus, Probed, Proposal, ResidualForce, SIGNIFICANT, UNKNOWN,
-    Unexplained, proposal, unexplained,
+    Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, proposal,
+    unexplained,
 };
 pub use request::{Reference, Request};
 pub use run::close_loop;
 pub use score::{Contradicted, Errors, Finding};
-pub use select::{Evidence, MOST_EFFECTS, Rival, Round};
+pub use select::{Evidence, Rival, Round};
+pub use settings::{
+    CalibrateSettings, ConfirmSettings, CurveSettings, DiscriminateSettings, FitSettings,
+    LearnSettings, ProposalSettings, RefineSettings, RemainderSettings, ScoreSettings,
+    SelectSettings, Settings, SplitSettings, VerdictSettings,
+};
 pub use split::{Split, SplitMethod};
 pub use stage::{Progress, Stage};
 pub use study::Study;

@@ -6,6 +6,7 @@ use super::learn::LearnedResidual;
 use super::remainder::{Proposal, ResidualForce, Unexplained};
 use super::score::{Contradicted, Errors, Finding};
 use super::select::Round;
+use super::settings::Settings;
 use super::split::SplitMethod;
 use super::study::Study;
 use super::verdict::Verdict;
@@ -38,6 +39,7 @@ pub struct Given {
     pub split: SplitMethod,
     /// Of the training logs, then of the test logs.
     pub audits: Vec<Audit>,
+    pub settings: Settings,
     /// For each joint whether it slides rather than turns.
     pub prismatic: Vec<bool>,
 }
@@ -87,10 +89,16 @@ pub struct Remainder {
 impl Outcome {
     /// The training logs as they were studied; `system` is the one that was declared.
     pub fn study<'a>(&'a self, system: &'a System) -> Study<'a> {
-        let train = &self.given.train;
+        let Given {
+            train,
+            audits,
+            settings,
+            ..
+        } = &self.given;
+        let audits = audits[..train.len()].to_vec();
         Study {
             identifiability: self.models.identifiability.clone(),
-            ..Study::audited(system, train, self.given.audits[..train.len()].to_vec())
+            ..Study::audited(system, train, audits, settings)
         }
     }
 }

@@ -1,13 +1,10 @@
 //! Stage 7: estimate the chosen model in fine steps.
 
 use super::fitted::Fitted;
+use super::settings::RefineSettings;
 use super::study::{Study, smooth};
-use crate::identify::{Shooting, uncertainty};
+use crate::identify::{FitError, Shooting, uncertainty};
 use crate::model::Parameter;
-
-/// The model that is reported is fitted once more in finer steps (s), with friction that reverses over half the
-/// speed: smoothing and steps shift dry friction by a few parts in a thousand, more than the noise of long logs does.
-const FINE_STEP_S: f64 = 5e-4;
 
 /// The chosen model, estimated in fine steps.
 pub(super) struct Refined<'a> {
@@ -16,16 +13,22 @@ pub(super) struct Refined<'a> {
     pub model: Fitted,
     /// All parameters of the model, with their 95 % intervals.
     pub parameters: Vec<Parameter>,
+    /// Why the model is the chosen one as it was, if the estimate failed.
+    pub failure: Option<FitError>,
 }
 
 /// Estimate the chosen model in fine steps.
 pub(super) fn refine<'a>(study: &Study<'a>, chosen: &Fitted) -> Refined<'a> {
     let fine = study.refined();
-    let model = fine.estimate(chosen);
+    let (study, model, failure) = match fine.estimate(chosen) {
+        Ok(model) => (fine, model, None),
+        Err(error) => (study.again(), chosen.clone(), Some(error)),
+    };
     Refined {
-        parameters: with_intervals(&fine, &model, &chosen.fit.values),
-        study: fine,
+        parameters: with_intervals(&study, &model, &chosen.fit.values),
+        study,
         model,
+        failure,
     }
 }
 
@@ -33,24 +36,26 @@ impl Study<'_> {
     /// The same study in finer steps, to estimate a model that has been chosen. A width of friction's reversal that
     /// the model file gives stays.
     pub fn refined(&self) -> Self {
-        let narrower = self.system.sign_width.as_ref().map_or(0.5, |_| 1.0);
+        let RefineSettings { step_s, narrower } = self.settings.refine;
+        let narrower = self.system.sign_width.as_ref().map_or(narrower, |_| 1.0);
         let sign_widths: Vec<f64> = self.sign_widths.iter().map(|w| narrower * w).collect();
         let windows = self.shooting.windows.clone();
         let shooting = Shooting::new(self.logs, windows, &self.shooting.noise);
         Self {
             sign: smooth(&sign_widths),
             sign_widths,
-            shooting: shooting.in_steps_of(FINE_STEP_S),
-            identifiability: self.identifiability.clone(),
-            ..self.on(self.logs)
+            shooting: shooting.in_steps_of(step_s),
+            ..self.again()
         }
     }
 
-    /// A chosen model estimated anew; as it was where that fails.
-    pub fn estimate(&self, chosen: &Fitted) -> Fitted {
+    /// Estimate a chosen model anew, from the values that it has.
+    ///
+    /// # Errors
+    /// As [`Study::refit`].
+    pub fn estimate(&self, chosen: &Fitted) -> Result<Fitted, FitError> {
         let locals = chosen.fit.locals.clone();
         self.refit(&chosen.effects, &chosen.declared, locals, None)
-            .unwrap_or_else(|_| chosen.clone())
     }
 }
 

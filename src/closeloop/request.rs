@@ -1,8 +1,9 @@
 use super::error::StudyError;
 use super::learn::ResidualLearner;
+use super::settings::Settings;
 use super::split::Split;
-use crate::evaluate::window_count;
 use crate::model::{Library, System};
+use crate::sim::metric::window_count;
 
 /// What closing the loop is asked for.
 #[derive(Debug, Clone)]
@@ -15,8 +16,7 @@ pub struct Request<'a> {
     pub split: Split,
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
-    /// Horizons of the reported errors in s; the error reduction of an effect is reported at the middle one.
-    pub horizons_s: [f64; 3],
+    pub settings: Settings,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
 }
@@ -31,14 +31,14 @@ pub struct Reference {
 }
 
 impl<'a> Request<'a> {
-    /// A request without a residual network and without reference models.
+    /// A request with the default settings, without a residual network and without reference models.
     pub fn new(system: &'a System, library: &'a Library, split: Split) -> Self {
         Self {
             system,
             library,
             split,
             against: Vec::new(),
-            horizons_s: [0.1, 0.5, 1.0],
+            settings: Settings::default(),
             learner: None,
         }
     }
@@ -47,7 +47,7 @@ impl<'a> Request<'a> {
     /// Test logs without a window of one of the horizons.
     pub(super) fn check(&self) -> Result<(), StudyError> {
         let has_no_window = |horizon_s: &&f64| window_count(&self.split.test, **horizon_s) == 0;
-        match self.horizons_s.iter().find(has_no_window) {
+        match self.settings.score.horizons_s.iter().find(has_no_window) {
             Some(&horizon_s) => Err(StudyError::NoTest { horizon_s }),
             None => Ok(()),
         }

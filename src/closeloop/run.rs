@@ -31,11 +31,11 @@ pub fn close_loop(
         library,
         split,
         against,
-        horizons_s,
+        settings,
         learner,
     } = request;
     progress(Stage::Audit.into());
-    let mut study = Study::new(system, &split.train);
+    let mut study = Study::new(system, &split.train, &settings);
     let test_audits = split.test.iter().map(audit);
     let audits = study.audits().iter().cloned().chain(test_audits).collect();
     let found = find(&mut study, library, rng, progress)?;
@@ -47,13 +47,13 @@ pub fn close_loop(
     progress(Stage::Score.into());
     let scorer = Scorer {
         test: &split.test,
-        horizons_s: &horizons_s,
+        settings: &settings.score,
     };
     let hybrid = learned.as_ref().map(|learned| learned.hybrid());
     let models = [&found.before, &refined.model];
     let errors = scorer.errors(system, models, hybrid, &against, rng);
-    let findings = findings(&study, &refined, &scorer, &errors.after);
-    let (verdict, reason) = verdict(&study, &found, &errors);
+    let findings = findings(&study, &found.after, &refined, &scorer, &errors.after);
+    let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     Ok(Outcome {
         verdict,
         reason,
@@ -74,6 +74,7 @@ pub fn close_loop(
             test: split.test,
             split: split.method,
             audits,
+            settings: settings.clone(),
             prismatic: system.prismatic.clone(),
         },
     })

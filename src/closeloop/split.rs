@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::settings::{Settings, SplitSettings};
 use crate::data::Log;
 
 /// Which logs a study learns from and which it is judged by.
@@ -12,7 +13,7 @@ pub struct Split {
     pub method: SplitMethod,
 }
 
-/// SplitMethod the test logs were set apart.
+/// How the test logs were set apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitMethod {
@@ -23,13 +24,6 @@ pub enum SplitMethod {
     /// The end of every log, after a gap.
     EndOfEachLog { share: f64, gap_s: f64 },
 }
-
-/// Share of the logs, or of each log, that is kept for the test.
-const TEST_SHARE: f64 = 0.25;
-/// With this many logs whole ones are kept for the test.
-const ENOUGH_LOGS: usize = 3;
-/// Time between what is learned from and what is judged by, when both come from one log.
-const GAP_S: f64 = 0.5;
 
 impl Split {
     /// The split that the user asks for.
@@ -42,9 +36,9 @@ impl Split {
     }
 
     /// Set whole trajectories apart where there are three or more, else the end of each.
-    pub fn of(mut logs: Vec<Log>) -> Self {
-        if logs.len() >= ENOUGH_LOGS {
-            let count = share_of(logs.len());
+    pub fn of(mut logs: Vec<Log>, settings: &SplitSettings) -> Self {
+        if logs.len() >= settings.whole_logs {
+            let count = settings.count_of(logs.len());
             let test = logs.split_off(logs.len() - count);
             return Self {
                 train: logs,
@@ -52,16 +46,16 @@ impl Split {
                 method: SplitMethod::LastLogs { count },
             };
         }
-        Self::ends_of(logs)
+        Self::ends_of(logs, settings)
     }
 
     /// Set the end of each log apart.
-    fn ends_of(logs: Vec<Log>) -> Self {
+    fn ends_of(logs: Vec<Log>, settings: &SplitSettings) -> Self {
         let (mut train, mut test) = (Vec::new(), Vec::new());
         for log in logs {
-            let middle = log.time[0] + (1.0 - TEST_SHARE) * log.duration();
+            let middle = log.time[0] + (1.0 - settings.test_share) * log.duration();
             train.push(between(&log, f64::NEG_INFINITY, middle));
-            test.push(between(&log, middle + GAP_S, f64::INFINITY));
+            test.push(between(&log, middle + settings.gap_s, f64::INFINITY));
         }
         // A log too short for a rest gives no test.
         test.retain(|log| log.rows() > 1);
@@ -69,33 +63,27 @@ impl Split {
             train,
             test,
             method: SplitMethod::EndOfEachLog {
-                share: TEST_SHARE,
-                gap_s: GAP_S,
+                share: settings.test_share,
+                gap_s: settings.gap_s,
             },
         }
     }
 }
 
-/// With this many logs to learn from whole ones are set aside to confirm what was learned.
-const ENOUGH_TO_SPARE: usize = 4;
-
-/// Less than this (s) is needed whole to choose effects by.
-const TOO_SHORT_TO_SPARE_S: f64 = 10.0;
-
 /// Logs to choose effects by, and others to confirm the choice: whole trajectories where there are four or
 /// more, else the end of each after a gap. The confirming ones are those of middling speed: a
 /// choice is to be confirmed within the range of motion that it was made for. Of a few seconds none are set aside.
-pub(super) fn set_aside(logs: &[Log]) -> (Vec<Log>, Vec<Log>) {
-    if logs.iter().map(Log::duration).sum::<f64>() < TOO_SHORT_TO_SPARE_S {
+pub(super) fn set_aside(logs: &[Log], settings: &Settings) -> (Vec<Log>, Vec<Log>) {
+    if logs.iter().map(Log::duration).sum::<f64>() < settings.confirm.shortest_s {
         return (logs.to_vec(), Vec::new());
     }
-    if logs.len() < ENOUGH_TO_SPARE {
-        let halves = Split::ends_of(logs.to_vec());
+    if logs.len() < settings.confirm.whole_logs {
+        let halves = Split::ends_of(logs.to_vec(), &settings.split);
         return (halves.train, halves.test);
     }
     let mut by_speed: Vec<usize> = (0..logs.len()).collect();
     by_speed.sort_by(|&a, &b| speed(&logs[a]).total_cmp(&speed(&logs[b])));
-    let count = share_of(logs.len());
+    let count = settings.split.count_of(logs.len());
     let first = (logs.len() - count) / 2;
     let confirming = &by_speed[first..first + count];
     let (aside, kept): (Vec<usize>, Vec<usize>) =
@@ -114,14 +102,16 @@ fn speed(log: &Log) -> f64 {
     log.q.iter().map(travelled).sum::<f64>() / log.duration().max(f64::MIN_POSITIVE)
 }
 
-/// SplitMethod many of so many logs are set apart.
-#[allow(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss
-)] // few logs
-fn share_of(logs: usize) -> usize {
-    ((logs as f64 * TEST_SHARE).round() as usize).max(1)
+impl SplitSettings {
+    /// How many of so many logs are set apart.
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss
+    )] // few logs
+    fn count_of(&self, logs: usize) -> usize {
+        ((logs as f64 * self.test_share).round() as usize).max(1)
+    }
 }
 
 /// The rows of a log from `start_s` to `end_s`.

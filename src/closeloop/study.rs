@@ -2,22 +2,16 @@ use std::sync::OnceLock;
 
 use super::fitted::Fitted;
 use super::per_log::values_on;
+use super::settings::{FitSettings, Settings};
 use crate::data::{Audit, Log, audit};
 use crate::expr::SignForm;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
 use crate::model::{Dynamics, FittedEffect, System};
 
-/// Length in s of the windows over which models are fitted and compared: most effects show in them.
-pub(super) const WINDOW_S: f64 = 0.5;
-
-/// Dry friction is smoothed over this share of a joint's top speed in the logs: a joint that sticks creeps at most at
-/// such a speed, a milliradian in half a second on a lab rig. A share, so that the width means the
-/// same on a slow axis and on a fast arm.
-const SIGN_WIDTH: f64 = 5e-4;
-
 /// A declared system, logs to learn from, and what both imply.
 pub struct Study<'a> {
     pub system: &'a System,
+    pub settings: &'a Settings,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
     pub(super) audits: OnceLock<Vec<Audit>>,
@@ -41,12 +35,9 @@ pub struct Sample<'a> {
     members: Vec<usize>,
 }
 
-/// Windows of a first look.
-const SAMPLE: usize = 24;
-
 impl<'a> Sample<'a> {
-    fn of(shooting: &Shooting<'a>) -> Self {
-        let every = shooting.windows.len().div_ceil(SAMPLE).max(1);
+    fn of(shooting: &Shooting<'a>, size: usize) -> Self {
+        let every = shooting.windows.len().div_ceil(size).max(1);
         let members: Vec<usize> = (0..shooting.windows.len()).step_by(every).collect();
         let windows = members.iter().map(|&w| shooting.windows[w]).collect();
         Self {
@@ -62,12 +53,24 @@ impl<'a> Sample<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn new(system: &'a System, logs: &'a [Log]) -> Self {
-        Self::audited(system, logs, logs.iter().map(audit).collect())
+    pub fn new(system: &'a System, logs: &'a [Log], settings: &'a Settings) -> Self {
+        let audits = logs.iter().map(audit).collect();
+        Self::audited(system, logs, audits, settings)
     }
 
     /// A study of logs with their audits.
-    pub(super) fn audited(system: &'a System, logs: &'a [Log], audits: Vec<Audit>) -> Self {
+    pub(super) fn audited(
+        system: &'a System,
+        logs: &'a [Log],
+        audits: Vec<Audit>,
+        settings: &'a Settings,
+    ) -> Self {
+        let FitSettings {
+            window_s,
+            sample_windows,
+            sign_width,
+            ..
+        } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
             (0..system.joints)
                 .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
@@ -91,18 +94,19 @@ impl<'a> Study<'a> {
         let by_speed = || {
             top_speed
                 .iter()
-                .map(|speed| SIGN_WIDTH * speed.max(1e-6))
+                .map(|speed| sign_width * speed.max(1e-6))
                 .collect()
         };
         let sign_widths: Vec<f64> = system.sign_width.clone().unwrap_or_else(by_speed);
-        let shooting = Shooting::new(logs, cut(logs, WINDOW_S), &noise);
+        let shooting = Shooting::new(logs, cut(logs, window_s), &noise);
         Self {
             system,
+            settings,
             logs,
             audits: audits.into(),
             sign: smooth(&sign_widths),
             sign_widths,
-            sample: Sample::of(&shooting),
+            sample: Sample::of(&shooting, sample_windows),
             shooting,
             top_speed,
             top_torque,
@@ -115,18 +119,28 @@ impl<'a> Study<'a> {
     where
         'a: 'b,
     {
-        let shooting = Shooting::new(logs, cut(logs, WINDOW_S), &self.shooting.noise);
+        let windows = cut(logs, self.settings.fit.window_s);
+        let shooting = Shooting::new(logs, windows, &self.shooting.noise);
         Study {
             system: self.system,
+            settings: self.settings,
             logs,
             audits: OnceLock::new(),
             sign: self.sign.clone(),
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
-            sample: Sample::of(&shooting),
+            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
             identifiability: Identifiability::default(),
+        }
+    }
+
+    /// This study once more.
+    pub(super) fn again(&self) -> Self {
+        Self {
+            identifiability: self.identifiability.clone(),
+            ..self.on(self.logs)
         }
     }
 

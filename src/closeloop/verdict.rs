@@ -1,4 +1,5 @@
 use super::find::Found;
+use super::refine::Refined;
 use super::remainder::{UNKNOWN, Unexplained};
 use super::score::Errors;
 use super::study::Study;
@@ -19,16 +20,14 @@ pub enum Verdict {
     Inconclusive,
 }
 
-/// Fewer windows than this allow no conclusion.
-const FEWEST_WINDOWS: usize = 8;
-
-/// Effects that raise the error on the test logs by more than noise in the windows' start states does are not
-/// to be trusted: a twentieth.
-const WORSE: f64 = 1.05;
-
 /// The verdict and the reason for it, in a sentence.
-pub(super) fn verdict(study: &Study<'_>, found: &Found, errors: &Errors) -> (Verdict, String) {
-    match inconclusive(study, found, errors) {
+pub(super) fn verdict(
+    study: &Study<'_>,
+    found: &Found,
+    refined: &Refined<'_>,
+    errors: &Errors,
+) -> (Verdict, String) {
+    match failure(found, refined).or_else(|| inconclusive(study, found, errors)) {
         Some(reason) => (Verdict::Inconclusive, reason),
         None => conclusion(added(study, found), &found.unexplained),
     }
@@ -39,12 +38,27 @@ fn added(study: &Study<'_>, found: &Found) -> usize {
     found.after.effects.len() - study.system.effects.len()
 }
 
+/// Which fit failed, if one did that the verdict rests on.
+fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
+    if let Some(error) = &found.failure {
+        return Some(format!(
+            "the effects selected on a part of the training logs could not be fitted to all of them: {error}"
+        ));
+    }
+    let error = refined.failure.as_ref()?;
+    Some(format!(
+        "the final fit in fine steps failed, the values are those of the coarser one: {error}"
+    ))
+}
+
 /// Why the logs allow no conclusion, if they do not.
 fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<String> {
+    let settings = &study.settings.verdict;
     let windows = study.shooting.windows.len();
-    if windows < FEWEST_WINDOWS {
+    if windows < settings.fewest_windows {
         return Some(format!(
-            "the training logs hold only {windows} windows of half a second; record more motion"
+            "the training logs hold only {windows} windows of {} s; record more motion",
+            study.settings.fit.window_s
         ));
     }
     let known = &study.identifiability;
@@ -54,7 +68,7 @@ fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<Str
                 .into(),
         );
     }
-    let worse = errors.after.position_rms() > WORSE * errors.before.position_rms();
+    let worse = errors.after.position_rms() > settings.worse * errors.before.position_rms();
     (added(study, found) > 0 && worse).then(|| {
         "the effects lower the loss on left-out stretches of the training logs but raise the error on the test logs: \
          do not use them before logs of more varied motion confirm them"

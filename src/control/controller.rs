@@ -3,8 +3,8 @@ use std::collections::VecDeque;
 use rand::{Rng, RngExt};
 
 use super::Task;
-use crate::batch::Block;
 use crate::plan::{Planner, Start};
+use crate::sim::batch::Block;
 
 /// Decides the torque of each step.
 pub trait Policy {

@@ -5,7 +5,6 @@ mod episode;
 mod meter;
 mod predictor;
 mod session;
-mod streams;
 mod task;
 
 pub use controller::{Controller, Policy, RandomTorque};
@@ -13,5 +12,4 @@ pub use episode::{Episode, Stretch, drive, episode};
 pub use meter::Meter;
 pub use predictor::Predictor;
 pub use session::with_controller;
-pub use streams::{Purpose, stream};
 pub use task::{Goal, PlantSettings, Task, TaskError};

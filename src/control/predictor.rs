@@ -1,7 +1,7 @@
-use crate::batch::Rollouts;
 use crate::model::{Dynamics, MlpWeights};
 use crate::plan::Objective;
 use crate::sim::Integrator;
+use crate::sim::batch::Rollouts;
 
 /// A model as the planner uses it: equations with their values, networks whose outputs are added to their derivative,
 /// and the integrator.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Meter;
+use crate::files::text_or_embedded;
 use crate::model::Dynamics;
 use crate::plan::{Objective, Settings};
 use crate::plant::{Noise, Plant, Rig};
@@ -84,11 +85,7 @@ impl Task {
     /// # Errors
     /// Unreadable file, unknown key, invalid formula or number: with place and remedy.
     pub fn read(path: &Path) -> Result<Self, TaskError> {
-        let embedded = path.to_str().filter(|_| !path.is_file()).and_then(text_of);
-        if let Some(text) = embedded {
-            return Self::from_text(path, text);
-        }
-        let text = std::fs::read_to_string(path).map_err(|error| TaskError {
+        let text = text_or_embedded(path, text_of).map_err(|error| TaskError {
             path: path.to_owned(),
             message: format!(
                 "{error}; give a task file or one of {}",

@@ -1,4 +1,4 @@
-//! Which column of a file holds which channel.
+//! The mapping from columns of a file to channels.
 
 use std::path::Path;
 
@@ -81,14 +81,14 @@ fn numbered(prefix: &str, joints: usize) -> Vec<String> {
         .collect()
 }
 
-/// The header of a file, and where it stands.
+/// The header of a file, and its line.
 pub(super) struct Header<'a> {
     pub path: &'a Path,
     pub line: usize,
     pub names: Vec<String>,
 }
 
-/// Where in a row the channels stand, as indices into the row's cells.
+/// Indices of the channels into a row's cells.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     pub time: usize,
@@ -145,7 +145,7 @@ impl Header<'_> {
     }
 
     /// A header with another number of complete joints is most likely the log of another rig. Where
-    /// only one of a joint's columns lacks, its name is the likelier fault, and `find` tells that.
+    /// only one of a joint's columns is missing, a wrong name is more likely, which `find` reports.
     fn check_joint_count(&self, joints: usize) -> Result<(), LogError> {
         let has = |name: String| self.names.contains(&name);
         let header = (1..).take_while(|joint| has(format!("q{joint}"))).count();
@@ -163,7 +163,7 @@ impl Header<'_> {
     }
 
     /// Whether no column looks like a torque. A torque under an unexpected name must not turn a
-    /// driven rig into a passive one unseen.
+    /// driven rig into a passive one silently.
     fn has_no_torque(&self) -> bool {
         let like_torque = |name: &String| {
             let name = name.to_lowercase();

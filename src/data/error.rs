@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::files::OutputError;
+
 /// Why a log could not be read or written.
 ///
 /// Each message is whole in itself: file, line (from 1, as an editor counts), column name, what is
@@ -20,13 +22,8 @@ pub enum LogError {
         why: io::Error,
     },
     /// The file cannot be written.
-    #[error("{path}: cannot be written: {why}; check that the folder exists and can be written to")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        why: io::Error,
-    },
+    #[error("{0}")]
+    Write(#[from] OutputError),
     /// The bytes are not UTF-8 text.
     #[error("{path}, line {line}: not UTF-8 text; save the log as CSV in UTF-8")]
     NotUtf8 {

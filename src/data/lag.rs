@@ -1,17 +1,17 @@
-//! By how much one channel trails another.
+//! The lag of one channel behind another.
 
 use std::ops::RangeInclusive;
 
 use super::projection::{dot, free_of, orthonormal};
 
-/// How far one series trails another, and how well they agree there.
+/// The lag of one series behind another, and their correlation at that lag.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Lag {
     /// In samples of the two series, with a fraction; positive when the effect trails the cause.
     pub samples: f64,
     /// Correlation at that lag, -1 to 1, after what the basis explains is taken out of both.
     pub correlation: f64,
-    /// Whether the correlation still rises at the end of the lags looked at. The true lag is then
+    /// Whether the correlation still rises at the end of the lags searched. The true lag is then
     /// longer, or there is none.
     pub at_edge: bool,
 }
@@ -29,7 +29,7 @@ pub(super) fn lag(
     lags: RangeInclusive<isize>,
 ) -> Option<Lag> {
     let (lead, trail) = (lags.start().unsigned_abs(), lags.end().unsigned_abs());
-    // As many rows again as the lags and the basis use up, so that the correlation means something.
+    // Twice the rows that the lags and the basis use up, for a meaningful correlation.
     if cause.len() < 2 * (lead + trail) + 4 * basis.len() + 8 {
         return None;
     }
@@ -56,8 +56,8 @@ pub(super) fn lag(
     })
 }
 
-/// Where a parabola through three equally spaced values has its top, from the middle one (-0.5 to
-/// 0.5, as the middle value is the largest).
+/// Position of the vertex of a parabola through three equally spaced values, relative to the middle one (-0.5
+/// to 0.5, as the middle value is the largest).
 fn parabola_peak([before, middle, after]: [f64; 3]) -> f64 {
     let bend = before - 2.0 * middle + after;
     if bend < 0.0 {

@@ -1,8 +1,7 @@
 //! One trajectory of a rig, in memory and as a file.
 
 use std::fmt;
-use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -11,6 +10,7 @@ use super::columns::Columns;
 use super::error::{CellFault, LogError};
 use super::signal::differences;
 use super::statistics::median;
+use crate::files::write_with;
 
 /// A span of a log's own time, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -38,8 +38,8 @@ impl fmt::Display for Interval {
 /// One trajectory of a rig with N joints.
 ///
 /// The channels are indexed `[joint][row]`; each of them has as many rows as `time`, which increases
-/// strictly. [`Log::read`] guarantees this, and that every number is finite; whoever builds a log by
-/// hand has to.
+/// strictly. [`Log::read`] guarantees this, and that every number is finite; code that
+/// builds a log itself has to as well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
     /// Where the log was read from, as the caller gave it.
@@ -59,7 +59,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// A log of so many joints without a row, for whoever records one.
+    /// A log with this number of joints and no row, for recording.
     pub fn empty(joints: usize) -> Self {
         Self {
             path: PathBuf::new(),
@@ -118,18 +118,7 @@ impl Log {
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), LogError> {
         let path = path.as_ref();
         self.check_finite(path)?;
-        let partial = partial_name(path);
-        let written = self
-            .write_rows(&partial)
-            .and_then(|()| fs::rename(&partial, path));
-        written.map_err(|why| {
-            // Best effort: the error worth telling is the first one.
-            let _ = fs::remove_file(&partial);
-            LogError::Write {
-                path: path.to_owned(),
-                why,
-            }
-        })
+        Ok(write_with(path, |out| self.write_rows(out))?)
     }
 
     /// The columns in file order.
@@ -156,8 +145,7 @@ impl Log {
         Ok(())
     }
 
-    fn write_rows(&self, path: &Path) -> io::Result<()> {
-        let mut out = BufWriter::new(fs::File::create(path)?);
+    fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {
         let names = Columns::standard(self.joints());
         let header: Vec<&str> = names.in_file_order().map(String::as_str).collect();
         writeln!(out, "{}", header.join(","))?;
@@ -170,21 +158,14 @@ impl Log {
                 .collect();
             writeln!(out, "{}", cells.join(","))?;
         }
-        out.into_inner()?.sync_all()
+        Ok(())
     }
-}
-
-/// A name beside `path`, since renaming is only atomic within one folder. The process number keeps
-/// two programs that write the same log apart.
-fn partial_name(path: &Path) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or(path.as_os_str()));
-    name.push(format!(".{}.partial", std::process::id()));
-    path.with_file_name(name)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn log() -> Log {

@@ -1,4 +1,4 @@
-//! Logs of mechanical rigs: reading them, and saying what they are good for.
+//! Logs of mechanical rigs: readers, audit, statistics.
 //!
 //! A [`Log`] is one trajectory: times, joint angles, joint velocities and joint torques, in s, rad,
 //! rad/s and N m. [`Log::read`] takes it from CSV text and refuses what it cannot read with an error

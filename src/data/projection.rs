@@ -1,4 +1,4 @@
-//! Linear regression by orthogonal columns: what of a series a basis explains, and what is left.
+//! Linear regression by orthonormal columns: the part of a series that a basis explains, and the rest.
 
 /// Columns of unit length at right angles that span the same space; those that the others span
 /// already are dropped.

@@ -1,6 +1,6 @@
 //! Reading a log from CSV text.
 //!
-//! Accepted without a word: a byte order mark, CRLF line ends, spaces around cells, quoted cells and
+//! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and
 //! blank lines. Everything else that is not a complete table of finite numbers is an error.
 
 use std::fs;
@@ -37,7 +37,7 @@ impl Log {
     }
 }
 
-/// The text of a log and where it is from.
+/// The text of a log and its path.
 struct Table<'a> {
     path: &'a Path,
     text: &'a str,
@@ -196,7 +196,7 @@ fn bare(cell: &str) -> &str {
 }
 
 fn number(cell: &str) -> Result<f64, CellFault> {
-    // As much of a wrong cell as shows what it is.
+    // The beginning of a long cell is enough to recognise it.
     let shown = || cell.chars().take(40).collect::<String>();
     match cell.parse::<f64>() {
         _ if cell.is_empty() => Err(CellFault::Empty),

@@ -1,14 +1,14 @@
 //! Robust statistics of one channel.
 //!
-//! Medians rather than means throughout: logs of real rigs carry spikes, and a statistic that a
-//! single row can move measures that row.
+//! Medians rather than means throughout: logs of real rigs contain spikes, and a single row must not move a
+//! statistic.
 
 use super::statistics::{SIGMA_PER_MAD, mad, quantile};
 
-/// Fewer rows than this show no quantisation that could be told from chance.
+/// With fewer rows quantisation cannot be told from chance.
 const MIN_ROWS_FOR_RESOLUTION: usize = 20;
 
-/// Resampling that makes more than this many values of each is not worth its memory.
+/// Resampling is refused where it would multiply the number of values by more than this.
 const MAX_FILL: f64 = 10.0;
 
 /// Differences of neighbours; one fewer than the values.
@@ -57,7 +57,7 @@ fn distinct_gaps(values: &[f64]) -> Vec<f64> {
     gaps
 }
 
-/// The quantum that explains the gaps near a given one, if the others bear it out. Some converters
+/// The quantum that explains the gaps near a given one, if the other gaps agree. Some converters
 /// skip levels, so that their commonest gaps are two and three quanta.
 fn quantum(gaps: &[f64], near: f64) -> Option<f64> {
     let equal = gaps.iter().filter(|gap| (**gap - near).abs() <= 0.1 * near);
@@ -97,7 +97,7 @@ pub(super) fn interpolate(time: &[f64], values: &[f64], at_s: f64) -> Option<f64
 }
 
 /// A series at a uniform step \[s\], linear between its rows. The step has to be positive. Empty for a
-/// series that is mostly gap, of which next to nothing would be measured.
+/// series that consists mostly of gaps.
 pub(super) fn resample(time: &[f64], values: &[f64], step_s: f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (time.first(), time.last()) else {
         return vec![];
@@ -105,7 +105,7 @@ pub(super) fn resample(time: &[f64], values: &[f64], step_s: f64) -> Vec<f64> {
     if last - first > MAX_FILL * step_s * time.len() as f64 {
         return vec![];
     }
-    // The small addition keeps the last row of a uniform series from being lost to rounding.
+    // The small addition keeps rounding from dropping the last row of a uniform series.
     let count = ((last - first) / step_s + 1e-6) as usize + 1;
     let at = |index: usize| (first + index as f64 * step_s).min(*last);
     (0..count)

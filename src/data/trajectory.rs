@@ -16,8 +16,8 @@ pub struct Trajectory {
 /// How a log becomes trajectories.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Thinning {
-    /// Rows nearer than this \[s\] are put together, their torque being the mean: a network is to learn
-    /// a force, not the encoder's noise.
+    /// Rows closer than this \[s\] are merged, with their mean torque: a network is to learn a force, not
+    /// the encoder's noise.
     pub step_s: f64,
     /// A trajectory of this length \[s\] ends and a new one begins; infinite to cut only where data are
     /// missing.

@@ -7,26 +7,26 @@ use super::ExperimentError;
 use crate::model::MlpSettings;
 use crate::train::FitSettings;
 
-/// What an experiment compares, on which task and plant.
+/// The configuration of an experiment: methods, task and plant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
-    /// A task file as seen from here, or the name of a built-in one.
+    /// A task file, relative to this file, or the name of a built-in task.
     pub task: PathBuf,
-    /// A plant file as seen from here, or the name of a built-in one.
+    /// A plant file, relative to this file, or the name of a built-in plant.
     pub plant: PathBuf,
-    /// Each method is repeated with the seeds 0, 1, ... up to this number, this not included.
+    /// Number of consecutive seeds; each method is repeated with each of them.
     pub seeds: u64,
-    /// Transitions under random torques, before there is a model.
+    /// Transitions under random torques, before the first training.
     pub random: usize,
-    /// Transitions under control between two trainings: T.
+    /// Transitions T under control between two trainings.
     pub gather: usize,
-    /// Receding horizons to be compared.
+    /// Receding horizons to compare, in steps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub replan: Vec<usize>,
     /// The methods that learn.
     pub method: Vec<MethodConfig>,
-    /// Where it was read from.
+    /// The file that it was read from.
     #[serde(skip)]
     pub path: PathBuf,
 }
@@ -36,15 +36,15 @@ pub struct Config {
 #[serde(deny_unknown_fields)]
 pub struct MethodConfig {
     pub name: String,
-    /// Its prior, where that is equations: a model file as seen from here, or the name of a built-in system.
+    /// The equations of its prior: a model file, relative to this file, or the name of a built-in system.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<PathBuf>,
-    /// Its prior, where that is a trained model: a checkpoint as seen from here.
+    /// The trained model that is its prior: a checkpoint, relative to this file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checkpoint: Option<PathBuf>,
-    /// Trainings.
+    /// Number of trainings.
     pub rounds: usize,
-    /// The network that is added to the prior, or stands alone.
+    /// The network that is added to the prior or, without a prior, is the whole model.
     pub network: MlpSettings,
     #[serde(default)]
     pub fit: FitSettings,
@@ -54,17 +54,12 @@ impl Config {
     /// Read a configuration.
     ///
     /// # Errors
-    /// Unreadable file, unknown key, numbers that make no sense: with place and remedy.
+    /// An unreadable file, an unknown key, a value out of range: with place and remedy.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
         let mut config: Self = read_toml(path)?;
         path.clone_into(&mut config.path);
         config.check().map_err(|message| config.wrong(message))?;
         Ok(config)
-    }
-
-    /// A file that it names or, where there is none, the name as it is: that of something built in.
-    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        beside_or_named(&self.path, file)
     }
 
     pub(super) fn wrong(&self, message: String) -> ExperimentError {
@@ -93,7 +88,7 @@ impl Config {
             let sound = |c: char| c.is_ascii_alphanumeric() || c == '_';
             if name.is_empty() || !name.chars().all(sound) {
                 return Err(format!(
-                    "the method {name:?} names a folder; write it in letters, digits and _"
+                    "the name {name:?} of a method becomes the name of a folder; use letters, digits and _"
                 ));
             }
             if [super::PRIOR, super::PERFECT].contains(&name.as_str())
@@ -113,7 +108,7 @@ impl Config {
     }
 }
 
-/// What a file of this kind says.
+/// Reads a configuration in TOML.
 pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
     let text = std::fs::read_to_string(path).map_err(|source| ExperimentError::Open {
         path: path.to_owned(),
@@ -123,14 +118,4 @@ pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, Experimen
         path: path.to_owned(),
         message: error.to_string(),
     })
-}
-
-/// A file that the one at `path` names or, where there is none, the name as it is: that of something built in.
-pub(super) fn beside_or_named(path: &Path, file: &Path) -> PathBuf {
-    let beside = path.parent().unwrap_or(Path::new("")).join(file);
-    if beside.exists() {
-        beside
-    } else {
-        file.to_owned()
-    }
 }

@@ -7,25 +7,20 @@ use crate::control::TaskError;
 use crate::mbrl::RunError;
 use crate::model::FileError;
 use crate::plant::PlantError;
-use crate::report::WriteError;
 use crate::report::plot::PlotError;
+use crate::runs::RunFolderError;
 use crate::train::{CheckpointError, HybridError};
 
 /// Why an experiment cannot be carried out.
 #[derive(Debug, Error)]
 pub enum ExperimentError {
-    #[error("{path}: cannot be read: {source}; give a file with --config", path = .path.display())]
+    #[error("{path}: cannot be read: {source}", path = .path.display())]
     Open {
         path: PathBuf,
         source: std::io::Error,
     },
     #[error("{path}: {message}", path = .path.display())]
     File { path: PathBuf, message: String },
-    #[error(
-        "{dir} holds another experiment: {difference}; give another folder with --out, or remove this one to start anew",
-        dir = .dir.display()
-    )]
-    Other { dir: PathBuf, difference: String },
     #[error("{method}, seed {seed}: {source}")]
     Run {
         method: String,
@@ -38,7 +33,7 @@ pub enum ExperimentError {
         seed: u64,
         source: StudyError,
     },
-    #[error(transparent)]
+    #[error("{0}")]
     Learner(#[from] RunError),
     #[error(transparent)]
     Task(#[from] TaskError),
@@ -50,8 +45,8 @@ pub enum ExperimentError {
     Hybrid(#[from] HybridError),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    #[error(transparent)]
-    Write(#[from] WriteError),
+    #[error("{0}")]
+    Folder(#[from] RunFolderError),
     #[error(transparent)]
     Plot(#[from] PlotError),
 }

@@ -1,38 +1,44 @@
-use std::path::Path;
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
+use crate::files::{beside, beside_or_named, content_id};
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
 use crate::model::{Dynamics, Library, Origin, System};
+use crate::runs::RunFolder;
 use crate::sim::Integrator;
 use crate::train::{Backend, Checkpoint, HybridModel};
 
-/// A method with all that it names read.
+/// A method with everything it refers to read.
 pub(super) struct Method {
     pub config: MethodConfig,
     pub learner: Learner,
-    /// What the model file beside its weights says, and its text.
+    /// The equations of the model file that is saved with its weights, and the file's text.
     dynamics: Dynamics,
     model_toml: String,
+    /// The files of its prior and hashes of their contents.
+    pub inputs: Vec<(PathBuf, String)>,
 }
 
-/// What came of a method with one seed.
+/// The result of a method with one seed.
 pub(super) struct Learnt {
     pub rounds: Vec<Round>,
     /// After the last round.
     pub model: HybridModel,
+    /// The checkpoint of that model.
+    pub checkpoint: PathBuf,
 }
 
-/// A round that is done.
+/// A finished round.
 #[derive(Debug, Clone, Copy)]
 pub struct Step<'s> {
     pub method: &'s str,
     pub seed: u64,
     pub round: &'s Round,
-    /// Whether it was found done.
+    /// Whether it was carried out before, by a run that was interrupted.
     pub found: bool,
 }
 
@@ -45,16 +51,19 @@ impl Method {
         backend: Backend,
     ) -> Result<Self, ExperimentError> {
         let mut model_toml = plant.declaration.clone();
+        let mut inputs = Vec::new();
         let mut dynamics = equations(plant);
         let prior = if let Some(file) = &method.model {
-            let system = library.system(&config.beside_or_named(file))?;
+            let system = library.system(&beside_or_named(&config.path, file))?;
             dynamics = equations(&system);
             model_toml.clone_from(&system.declaration);
+            inputs.push((file.clone(), content_id(model_toml.as_bytes())));
             Prior::Equations(Box::new(dynamics.clone()))
         } else if let Some(dir) = &method.checkpoint {
-            let checkpoint = Checkpoint::load(&config.beside_or_named(dir))?;
+            let checkpoint = Checkpoint::load(&beside(&config.path, dir))?;
             let model = checkpoint.model(&dynamics, &backend.device())?;
             model_toml.clone_from(&checkpoint.model_toml);
+            inputs.push((dir.clone(), checkpoint.fingerprint()));
             Prior::Trained(Box::new(model))
         } else {
             Prior::Nothing
@@ -77,28 +86,29 @@ impl Method {
             config: method.clone(),
             dynamics,
             model_toml,
+            inputs,
         })
     }
 
-    /// What it plans with before it has seen anything; none where it knows nothing.
+    /// The model it plans with before training; none without a prior.
     pub(super) fn prior(&self, integrator: Integrator) -> Result<Option<Predictor>, RunError> {
         let model = self.learner.untrained()?;
         Ok(model.map(|model| model.predictor(integrator)))
     }
 
-    /// What it plans with once it has learnt.
+    /// The model it plans with after training.
     pub(super) fn predictor(&self, model: &HybridModel) -> Predictor {
         model.predictor(self.config.fit.integrator)
     }
 
-    /// Do what is left of a run in `dir`.
+    /// Carries out the remaining rounds of a run in its folder.
     pub(super) fn learn(
         &self,
         run: &Run<'_>,
-        dir: &Path,
+        folder: RunFolder,
         observer: Observer<'_>,
     ) -> Result<Learnt, RunError> {
-        let mut folder = Folder::open(dir)?;
+        let mut folder = Folder::open(folder)?;
         let told = |round: &Round, found: bool| {
             observer(&Step {
                 method: &self.config.name,
@@ -129,6 +139,7 @@ impl Method {
         }
         Ok(Learnt {
             rounds: folder.rounds().to_vec(),
+            checkpoint: folder.checkpoint(),
             model: progress.model.expect("there is a round"),
         })
     }

@@ -1,5 +1,5 @@
-//! The published experiments: what a model must see of a plant before planning with it is worth as much as planning
-//! with the plant's own equations; and one more, [`undeclared_effect`]: what of that the closed loop finds by itself.
+//! The published experiments: how much data a model needs until planning with it is as good as planning with the plant's
+//! own equations; and [`undeclared_effect`]: how much of the return comes back when the loop is closed.
 
 mod config;
 mod error;

@@ -1,4 +1,4 @@
-//! Experiment 2: the prior is a network that was trained on a simulated plant, which lacks the friction of the real one.
+//! Experiment 2: the prior is a network trained on a simulated plant without the friction of the real one.
 
 use super::Session;
 use crate::mbrl::Prior;

@@ -1,4 +1,4 @@
-//! Experiment 1: the prior is the declared physics, which lacks the friction of the plant.
+//! Experiment 1: the prior is the declared physics, without the friction of the plant.
 
 use super::Session;
 use crate::mbrl::Prior;

@@ -4,11 +4,10 @@ use crate::report::plot::{
     learning_curves,
 };
 
-/// The figure of an experiment, as SVG text: return against real transitions or, where they are compared, against
-/// receding horizons.
+/// The figure of an experiment, as SVG text: return against real transitions or against receding horizons.
 ///
 /// # Errors
-/// None for results of an experiment.
+/// None for the results of an experiment.
 pub fn picture(results: &Results) -> Result<String, PlotError> {
     let horizons = results.receding_horizon.as_deref();
     let mut others = 0;

@@ -1,4 +1,4 @@
-//! The ablation: models that have seen the same plant, under plans that are followed for longer and longer.
+//! The ablation: models trained on the same plant, evaluated with increasing receding horizons.
 
 use super::learning::Learnt;
 use super::results::{Course, Results};
@@ -20,7 +20,7 @@ pub(super) fn check(session: &Session) -> Result<(), String> {
     }
 }
 
-/// Let what was learnt be judged under every receding horizon.
+/// Evaluates the trained models with every receding horizon.
 pub(super) fn compare(
     session: &Session,
     learnt: &[Vec<Learnt>],
@@ -35,7 +35,7 @@ pub(super) fn compare(
     for (method, runs) in session.methods.iter().zip(learnt) {
         let name = &method.config.name;
         let seen = runs[0].rounds.last().map_or(0, |round| round.transitions);
-        let course = over_horizons(&|seed| method.predictor(&runs[seed].model), seen, name)?;
+        let course = over_horizons(&|k| method.predictor(&runs[k].model), seen, name)?;
         results.methods.insert(name.clone(), course);
     }
     for (name, predictor) in session.fixed()? {

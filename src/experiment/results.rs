@@ -7,31 +7,32 @@ use serde_json::Value;
 use crate::data::statistics::{mean, sample_deviation};
 use crate::mbrl::Judged;
 
-/// The name of the plant's own equations among the methods.
+/// The method that plans with the plant's own equations.
 pub const PERFECT: &str = "perfect";
-/// The name of the prior that does not learn.
+/// The method that plans with the prior and does not learn.
 pub const PRIOR: &str = "prior";
 
-/// The share of the perfect model's return that counts as reached.
+/// The fraction of the perfect model's return that counts as reached.
 const REACHED: f64 = 0.9;
 
-/// What came of an experiment.
+/// The results of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     pub schema: u32,
     pub experiment: String,
     pub task: String,
     pub seeds: Vec<u64>,
-    /// What entries of the methods stand for, where that is not their transitions: steps carried out of each plan.
+    /// The receding horizons (steps carried out of each plan) that the entries of the methods stand for, if they do not stand
+    /// for amounts of data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub receding_horizon: Option<Vec<usize>>,
     pub methods: BTreeMap<String, Course>,
-    /// What is read off the courses of the methods that learn.
+    /// How far each of the learning methods came.
     pub reached: BTreeMap<String, Reached>,
     /// The whole configuration, as resolved.
     pub config: Value,
     pub version: String,
-    /// Of all sessions that it took, in s; whoever keeps a clock fills it in.
+    /// Total time over all interruptions, s; measured by the caller.
     pub wall_s: f64,
     pub command: String,
 }
@@ -39,27 +40,27 @@ pub struct Results {
 /// A method's return, one entry for each amount of data or each receding horizon.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Course {
-    /// Real transitions that its model was trained on.
+    /// Number of real transitions that its model was trained on.
     pub transitions: Vec<usize>,
     pub return_mean: Vec<f64>,
-    /// Over seeds, of the sample.
+    /// Sample standard deviation over the seeds.
     pub return_std: Vec<f64>,
     /// `[entry][seed]`
     pub returns: Vec<Vec<f64>>,
-    /// Whether the goal of the task held until the end: `[entry][seed]`.
+    /// Whether the goal of the task was held until the end: `[entry][seed]`.
     pub success: Vec<Vec<bool>>,
 }
 
 /// How far a method came.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
-    /// Fewest real transitions with a mean return of 90 % of the perfect model's; none where it was not reached.
+    /// Smallest number of transitions with a mean return of 90 % of the perfect model's; none if not reached.
     pub transitions_to_90_percent: Option<usize>,
-    /// Its mean return at the end over the perfect model's.
+    /// Its final mean return, as a fraction of the perfect model's.
     pub final_share_of_perfect: f64,
-    /// Seeds whose last episode is a success.
+    /// Number of seeds whose last episode is a success.
     pub final_successes: usize,
-    /// Seeds with a higher return at the end than the prior without learning; none where there is no prior.
+    /// Number of seeds whose final return is higher than that of the prior without learning; none without a prior.
     pub seeds_above_prior: Option<usize>,
 }
 
@@ -80,7 +81,7 @@ impl Results {
         }
     }
 
-    /// Fill in what is read off the courses; `command` took `wall_s` seconds.
+    /// Completes the results of `command`, which took `wall_s` seconds.
     #[must_use]
     pub fn finished(mut self, command: String, wall_s: f64) -> Self {
         let learnt = self
@@ -115,7 +116,7 @@ impl Results {
         }
     }
 
-    /// The results for people.
+    /// The results as a table for the terminal.
     pub fn text(&self) -> String {
         let mut out = format!(
             "{}, {}, {} seeds\n",
@@ -173,7 +174,7 @@ impl Course {
     }
 }
 
-/// Entries one after the other: transitions, and how the episode of each seed went.
+/// Collects entries: the number of transitions and the result of each seed.
 impl FromIterator<(usize, Vec<Judged>)> for Course {
     fn from_iter<I: IntoIterator<Item = (usize, Vec<Judged>)>>(entries: I) -> Self {
         let mut course = Self::default();

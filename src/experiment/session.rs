@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::path::PathBuf;
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -7,14 +7,14 @@ use super::learning::{Learnt, Method, Step};
 use super::results::{Course, PERFECT, PRIOR, Results};
 use super::{Config, ExperimentError, offline_prior, physics_prior, receding_horizon};
 use crate::control::{Predictor, Task};
+use crate::files::beside_or_named;
 use crate::mbrl::{Judge, Judged, Prior, Run, Schedule};
 use crate::model::{FittedEffect, Library, System};
 use crate::plant::Plant;
-use crate::recipe::first_difference;
-use crate::report::write_whole;
+use crate::runs::{Identity, RunFolder};
 use crate::train::Backend;
 
-/// The experiments by name.
+/// The published experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Experiment {
     PhysicsPrior,
@@ -22,22 +22,21 @@ pub enum Experiment {
     RecedingHorizon,
 }
 
-/// A configuration with all that it names read.
+/// A configuration with everything it refers to read.
 pub struct Session {
     pub config: Config,
     pub(super) task: Task,
     pub(super) plant: Plant,
     pub(super) methods: Vec<Method>,
     backend: Backend,
+    first_seed: u64,
 }
 
-/// Who is told of every round, those found done included.
+/// Called after every round, including those that were carried out before.
 pub type Observer<'o> = &'o (dyn Fn(&Step<'_>) + Sync);
 
-const CONFIG: &str = "experiment.json";
-
 impl Experiment {
-    /// The name that the command line takes.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::PhysicsPrior => physics_prior::NAME,
@@ -56,17 +55,18 @@ impl Experiment {
 }
 
 impl Session {
-    /// Read what `config` names.
+    /// Reads everything that `config` refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
-    /// Files that cannot be read or do not belong together.
+    /// Files that cannot be read or do not match.
     pub fn open(
         config: Config,
         library: &Library,
         backend: Backend,
+        first_seed: u64,
     ) -> Result<Self, ExperimentError> {
-        let task = Task::read(&config.beside_or_named(&config.task))?;
-        let plant = Plant::read(&config.beside_or_named(&config.plant), library)?;
+        let task = Task::read(&beside_or_named(&config.path, &config.task))?;
+        let plant = Plant::read(&beside_or_named(&config.path, &config.plant), library)?;
         if plant.system.name != task.system || plant.system.joints != task.joints() {
             return Err(config.wrong(format!(
                 "the task {} is for {}, but the plant is {}; name a plant of that system",
@@ -92,39 +92,40 @@ impl Session {
             plant,
             methods,
             backend,
+            first_seed,
         })
     }
 
-    /// Trainings of all methods and seeds.
+    /// Number of trainings of all methods and seeds.
     pub fn rounds(&self) -> usize {
         let each = self.methods.iter().map(|method| method.config.rounds);
         self.seeds().len() * each.sum::<usize>()
     }
 
-    /// Trainings of one run of a method; 0 where it is unknown.
+    /// Number of trainings of one run of a method; 0 for an unknown method.
     pub fn rounds_of(&self, method: &str) -> usize {
         self.method(method).map_or(0, |known| known.config.rounds)
     }
 
-    /// Carry out an experiment in the folder `out`, or go on with it.
+    /// Carries out an experiment in its folder, or the rest of one that was interrupted.
     ///
     /// # Errors
-    /// A configuration that is not one of this experiment, an `out` that holds another one, a run that diverges, or
-    /// files that cannot be read or written.
+    /// A configuration of another experiment, the folder of another run, a run that diverges, or files that cannot be read
+    /// or written.
     pub fn carry_out(
         &self,
         experiment: Experiment,
-        out: &Path,
+        folder: &RunFolder,
         observer: Observer<'_>,
     ) -> Result<Results, ExperimentError> {
         experiment
             .check(self)
             .map_err(|message| self.config.wrong(message))?;
-        let resolved = self.resolved(experiment.name());
-        claim(out, &resolved)?;
-        let learnt = self.learn(out, observer)?;
-        let mut results =
-            Results::new(experiment.name(), &self.task.name(), self.seeds(), resolved);
+        let run = self.identity(experiment.name(), self.resolved());
+        folder.claim(&run)?;
+        let learnt = self.learn(folder, observer)?;
+        let (name, task) = (experiment.name(), self.task.name());
+        let mut results = Results::new(name, &task, self.seeds(), run.config);
         match experiment {
             Experiment::PhysicsPrior | Experiment::OfflinePrior => {
                 self.learning_curves(&learnt, &mut results)?;
@@ -134,17 +135,17 @@ impl Session {
         Ok(results)
     }
 
-    /// One run of the loop, with the method of this name, in the folder `dir`; or what is left of it.
+    /// Carries out one run of the loop, with the method of this name and the first seed, or the rest of one that was
+    /// interrupted. Returns the path of the last model's checkpoint.
     ///
     /// # Errors
-    /// An unknown method, a `dir` that holds another run, or as [`Session::carry_out`].
+    /// An unknown method, or as [`Session::carry_out`].
     pub fn run_alone(
         &self,
         method: &str,
-        seed: u64,
-        dir: &Path,
+        folder: &RunFolder,
         observer: Observer<'_>,
-    ) -> Result<(), ExperimentError> {
+    ) -> Result<PathBuf, ExperimentError> {
         let Some(method) = self.method(method) else {
             let known: Vec<&str> = self
                 .methods
@@ -156,11 +157,11 @@ impl Session {
                 known.join(", ")
             )));
         };
-        let mut resolved = self.resolved("none");
-        resolved["seed"] = json!(seed);
+        let mut resolved = self.resolved();
         resolved["method"] = json!(method.config.name);
-        claim(dir, &resolved)?;
-        self.learn_one(method, seed, dir, observer).map(drop)
+        folder.claim(&self.identity("mbrl", resolved))?;
+        let learnt = self.learn_one(method, self.first_seed, folder.clone(), observer)?;
+        Ok(learnt.checkpoint)
     }
 
     fn method(&self, name: &str) -> Option<&Method> {
@@ -169,15 +170,26 @@ impl Session {
             .find(|method| method.config.name == name)
     }
 
-    /// Whether one of the methods has such a prior.
+    /// Whether a method has a prior of this kind.
     pub(super) fn has_prior(&self, is_such: impl Fn(&Prior) -> bool) -> bool {
         let mut methods = self.methods.iter();
         methods.any(|method| is_such(&method.learner.prior))
     }
 
-    fn resolved(&self, experiment: &str) -> Value {
+    fn identity(&self, command: &str, config: Value) -> Identity {
+        let inputs = self.methods.iter().flat_map(|method| &method.inputs);
+        Identity {
+            command: command.to_owned(),
+            seed: self.first_seed,
+            config,
+            inputs: inputs
+                .map(|(path, hash)| (path.display().to_string(), hash.clone()))
+                .collect(),
+        }
+    }
+
+    fn resolved(&self) -> Value {
         json!({
-            "experiment": experiment,
             "config": self.config,
             "task": self.task,
             "plant": {
@@ -189,7 +201,7 @@ impl Session {
         })
     }
 
-    /// The return of every method against the real transitions that it has seen.
+    /// Evaluates the return of every method against the number of real transitions.
     fn learning_curves(
         &self,
         learnt: &[Vec<Learnt>],
@@ -217,10 +229,10 @@ impl Session {
         Ok(())
     }
 
-    /// Train every method with every seed: `[method][seed]`.
+    /// Trains every method with every seed: `[method][seed]`.
     fn learn(
         &self,
-        out: &Path,
+        folder: &RunFolder,
         observer: Observer<'_>,
     ) -> Result<Vec<Vec<Learnt>>, ExperimentError> {
         let seeds = self.seeds().into_iter();
@@ -228,10 +240,8 @@ impl Session {
             .flat_map(|seed| self.methods.iter().map(move |method| (method, seed)))
             .collect();
         let learn = |(method, seed): (&Method, u64)| {
-            let dir = out
-                .join("runs")
-                .join(format!("{}-{seed:02}", method.config.name));
-            self.learn_one(method, seed, &dir, observer)
+            let own = folder.within(format!("runs/{}-{seed:02}", method.config.name));
+            self.learn_one(method, seed, own, observer)
         };
         let learnt: Vec<Learnt> = units
             .into_par_iter()
@@ -249,10 +259,10 @@ impl Session {
         &self,
         method: &Method,
         seed: u64,
-        dir: &Path,
+        folder: RunFolder,
         observer: Observer<'_>,
     ) -> Result<Learnt, ExperimentError> {
-        let learnt = method.learn(&self.run_of(method, seed), dir, observer);
+        let learnt = method.learn(&self.run_of(method, seed), folder, observer);
         learnt.map_err(|source| ExperimentError::Run {
             method: method.config.name.clone(),
             seed,
@@ -260,21 +270,20 @@ impl Session {
         })
     }
 
-    /// An episode with the model of each seed.
+    /// Evaluates a model for each seed; `predictor` is given the seed's position, from 0.
     pub(super) fn judge_all(
         &self,
         predictor: impl Fn(usize) -> Predictor + Sync,
         replan: usize,
         method: &str,
     ) -> Result<Vec<Judged>, ExperimentError> {
-        let judge = |seed: u64| {
+        let judge = |(k, seed): (usize, u64)| {
             let judge = Judge {
                 task: &self.task,
                 plant: &self.plant,
                 seed,
             };
-            #[allow(clippy::cast_possible_truncation)] // few seeds
-            let judged = judge.judge(&predictor(seed as usize), replan);
+            let judged = judge.judge(&predictor(k), replan);
             judged.map_err(|source| ExperimentError::Run {
                 method: method.to_owned(),
                 seed,
@@ -283,6 +292,7 @@ impl Session {
         };
         self.seeds()
             .into_par_iter()
+            .enumerate()
             .with_max_len(1)
             .map(judge)
             .collect()
@@ -300,13 +310,16 @@ impl Session {
         Ok(fixed)
     }
 
-    /// The plant's own equations, stepped as models are.
+    /// The plant's own equations, integrated as those of models are.
     fn perfect(&self) -> Predictor {
         Predictor::of_equations(self.plant.true_dynamics(), self.task.integrator)
     }
 
     fn seeds(&self) -> Vec<u64> {
-        (0..self.config.seeds).collect()
+        (self.first_seed..)
+            .zip(0..self.config.seeds)
+            .map(|(seed, _)| seed)
+            .collect()
     }
 
     fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {
@@ -324,35 +337,13 @@ impl Session {
     }
 }
 
-/// An effect of a plant: name, joint counted from 1, values.
+/// An effect of a plant: name, joint (from 1), values.
 fn effect(effect: &FittedEffect) -> Value {
     let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
     json!([effect.effect.name, effect.joint + 1, values])
 }
 
-/// Say in `dir` what is done there, or find that it is this.
-fn claim(dir: &Path, resolved: &Value) -> Result<(), ExperimentError> {
-    let path = dir.join(CONFIG);
-    let failed = |error: std::io::Error| ExperimentError::File {
-        path: path.clone(),
-        message: error.to_string(),
-    };
-    std::fs::create_dir_all(dir).map_err(failed)?;
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        let text = serde_json::to_string_pretty(resolved).expect("a JSON value");
-        return Ok(write_whole(&path, (text + "\n").as_bytes())?);
-    };
-    let saved: Value = serde_json::from_str(&text).map_err(|error| failed(error.into()))?;
-    match first_difference("experiment", &saved, resolved) {
-        Some(difference) => Err(ExperimentError::Other {
-            dir: dir.to_owned(),
-            difference,
-        }),
-        None => Ok(()),
-    }
-}
-
-/// The equations of a system with their declared values.
+/// The equations of a system with the declared values.
 pub(super) fn equations(system: &System) -> crate::model::Dynamics {
     system.dynamics(&system.sign())
 }

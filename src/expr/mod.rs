@@ -19,7 +19,7 @@ mod scope;
 mod steps;
 
 pub use error::{FormulaError, suggestion};
-pub use eval::{Real, Tape};
+pub use eval::Tape;
 pub use graph::{Graph, Node};
 pub use op::{Binary, Op, Unary};
 pub use parse::{Formula, parse};

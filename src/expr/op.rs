@@ -116,7 +116,7 @@ impl Op {
 }
 
 impl Unary {
-    pub(super) fn apply<T: super::Real>(self, a: T) -> T {
+    pub(super) fn apply<T: crate::lanes::Element>(self, a: T) -> T {
         match self {
             Self::Neg => -a,
             Self::Sin => a.sin(),
@@ -135,7 +135,7 @@ impl Unary {
 }
 
 impl Binary {
-    pub(super) fn apply<T: super::Real>(self, a: T, b: T) -> T {
+    pub(super) fn apply<T: crate::lanes::Element>(self, a: T, b: T) -> T {
         match self {
             Self::Add => a + b,
             Self::Sub => a - b,

@@ -1,19 +1,19 @@
-//! Where values stand while a program runs: as near together as can be, so that they stay in the fastest memory.
+//! Memory slots of intermediate values, reused as soon as possible so that they stay in the first-level cache.
 
 use super::steps::{Kind, Step};
 
 const NOWHERE: u32 = u32::MAX;
 
-/// Places of values, used again once nothing needs what stands there.
+/// Assignment of values to places; a place is free again after the last step that reads it.
 pub(super) struct Places {
-    /// By the values' own numbers.
+    /// Indexed by value.
     pub of: Vec<u32>,
     pub count: u32,
     free: Vec<u32>,
 }
 
 impl Places {
-    /// For so many values, of which the first `kept` keep their places.
+    /// For `values` values, of which the first `kept` have permanent places.
     pub fn new(values: usize, kept: usize) -> Self {
         let mut places = Self {
             of: vec![NOWHERE; values],
@@ -24,7 +24,7 @@ impl Places {
         places
     }
 
-    /// Give a value a place for ever.
+    /// Give a value a permanent place.
     pub fn keep(&mut self, value: usize) {
         if self.of[value] == NOWHERE {
             self.of[value] = self.count;
@@ -32,7 +32,7 @@ impl Places {
         }
     }
 
-    /// Let steps whose results stay for ever work on places in place of values.
+    /// Rewrite steps from values to places, where every result is permanent.
     pub fn settle(&mut self, steps: &mut [Step]) {
         for step in steps {
             for value in step.writes() {
@@ -45,7 +45,7 @@ impl Places {
         }
     }
 
-    /// The same for steps whose results, where they have no place yet, are needed until their last reader has them.
+    /// The same for steps whose results, unless permanent, are needed only until their last reader.
     pub fn pass(&mut self, steps: &mut [Step]) {
         let mut last = vec![usize::MAX; self.of.len()];
         for (index, step) in steps.iter().enumerate() {
@@ -57,7 +57,7 @@ impl Places {
             for value in step.reads().map(|value| value as usize) {
                 if last[value] == index && !is_kept[value] && self.of[value] != NOWHERE {
                     self.free.push(self.of[value]);
-                    // Two of its operands may be one value.
+                    // Two operands may be the same value.
                     self.of[value] = NOWHERE;
                 }
             }
@@ -74,7 +74,7 @@ impl Places {
 }
 
 impl Step {
-    /// The same step reading and writing elsewhere.
+    /// The same step with its operands and results renamed.
     fn between(self, read: impl Fn(u32) -> u32, write: impl Fn(u32) -> u32) -> Self {
         let count = self.reads().count();
         Self {

@@ -1,10 +1,10 @@
-//! A program as an evaluator carries it out: fewer and cheaper operations with the same results to within rounding.
+//! Optimised form of a program for evaluation: fewer and cheaper operations, the same results up to rounding.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
 use super::op::{Binary, Op, Unary};
 
-/// What a [`Step`] does with the values at `a`, `b` and `c`.
+/// The operation of a [`Step`] on the values at `a`, `b` and `c`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
     Neg,
@@ -39,7 +39,7 @@ pub(super) enum Kind {
     SubMul,
 }
 
-/// One operation, between places of values. Those of a program's operations come first, in its order.
+/// One operation; operands and results are places. The first places are those of the program's operations, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Step {
     pub kind: Kind,
@@ -47,21 +47,21 @@ pub(super) struct Step {
     pub a: u32,
     pub b: u32,
     pub c: u32,
-    /// Of the inputs that the result depends on, the first.
+    /// The lowest index of an input that the result depends on.
     pub first_input: u32,
 }
 
-/// The steps of a program, each after those that it needs.
+/// The steps of a program, each after the steps whose results it reads.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Steps {
     pub steps: Vec<Step>,
-    /// Values behind those of the program's operations: reciprocals.
+    /// Additional values after those of the program's operations: reciprocals.
     pub more: Vec<Option<f64>>,
 }
 
-/// Sums take in the products and changes of sign that only they need, sines and cosines of one angle are found
-/// together, and divisions by one value share its reciprocal. Steps of one kind stand together as far as what they
-/// need allows: an evaluator then decides once for many.
+/// Products and negations that are used only once are fused into sums, the sine and cosine of one angle are computed
+/// together, and divisions by the same value share its reciprocal. Steps of one kind are grouped as far as their
+/// dependencies allow, so that the evaluator branches once for each group.
 pub(super) fn steps(ops: &[Op], outputs: impl Iterator<Item = usize>) -> Steps {
     let mut writer = Writer::new(ops, outputs);
     for (place, op) in ops.iter().enumerate() {
@@ -75,15 +75,15 @@ pub(super) fn steps(ops: &[Op], outputs: impl Iterator<Item = usize>) -> Steps {
 
 struct Writer<'o> {
     ops: &'o [Op],
-    /// How often each operation's value is read, by others or as an output.
+    /// How often each operation's value is read, by other operations or as an output.
     uses: Vec<u32>,
-    /// How often it divides.
+    /// How often it is a divisor.
     divides: Vec<u32>,
-    /// The sine and the cosine of an angle.
+    /// The operations for the sine and the cosine of an angle.
     waves: HashMap<u32, [Option<usize>; 2]>,
     first_input: Vec<u32>,
     steps: Vec<Option<Step>>,
-    /// Where the step of an operation stands.
+    /// The index of each operation's step.
     step_of: Vec<Option<usize>>,
     reciprocals: HashMap<u32, u32>,
     more: Vec<Option<f64>>,
@@ -160,7 +160,7 @@ impl<'o> Writer<'o> {
         }));
     }
 
-    /// The first of a sine and a cosine of one angle finds both.
+    /// The first of a sine and a cosine of one angle computes both.
     fn wave(&mut self, place: usize, op: Op, angle: u32) {
         match self.waves[&angle] {
             [Some(sine), Some(cosine)] if place == sine.min(cosine) => {
@@ -197,14 +197,14 @@ impl<'o> Writer<'o> {
         }
     }
 
-    /// Take back the step at a place that nothing else needs, if it is of this kind.
+    /// Remove and return the step that writes a place, if it is of this kind and the place is read only once.
     fn take(&mut self, place: u32, kind: Kind) -> Option<Step> {
         let place = place as usize;
         let step = &mut self.steps[(*self.step_of.get(place)?)?];
         step.take_if(|step| step.kind == kind && self.uses[place] == 1)
     }
 
-    /// The place of 1 / value, where it pays.
+    /// The place of 1 / value where several divisions share it or the value is constant.
     fn reciprocal(&mut self, of: u32) -> Option<u32> {
         if let Some(known) = self.reciprocals.get(&of) {
             return Some(*known);
@@ -251,8 +251,8 @@ impl Step {
     }
 }
 
-/// The same steps, those of one kind together where they can be: of all kinds that can go on, the one of which most
-/// steps can is carried on until none is left.
+/// Topological order that groups steps of one kind: repeatedly take all ready steps of the kind of which most are
+/// ready.
 fn grouped(steps: &[Step]) -> Vec<Step> {
     let writers: HashMap<u32, usize> = (steps.iter().enumerate())
         .flat_map(|(index, step)| step.writes().map(move |place| (place, index)))

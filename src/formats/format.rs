@@ -6,9 +6,9 @@ use thiserror::Error;
 
 use super::ExportModel;
 use super::verify::{Client, ClientError, Predictions, Samples};
+use crate::files::{OutputError, write_whole};
 use crate::model::chain::Chain;
 use crate::model::{FileError, NetworkError};
-use crate::report::{WriteError, write_whole};
 
 /// A format of other programs.
 #[derive(Debug)]
@@ -58,8 +58,8 @@ pub enum ExportError {
         system: String,
         reason: String,
     },
-    #[error(transparent)]
-    Write(#[from] WriteError),
+    #[error("{0}")]
+    Write(#[from] OutputError),
     #[error(transparent)]
     Hybrid(#[from] NetworkError),
 }

@@ -7,15 +7,16 @@
 mod fit;
 mod identifiability;
 mod intervals;
+mod offsets;
 mod sensitivity;
 mod shooting;
 mod values;
-mod window;
 
+pub use crate::sim::{Window, cut, initial_state};
 pub use fit::{Fit, FitError, Reduced, as_it_stands, fit, promise};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
+pub use offsets::{CalibrateError, Offsets, calibrate};
 pub use sensitivity::Local;
 pub use shooting::{Shooting, WindowTerms};
 pub use values::{Column, Own, Values};
-pub use window::{Window, cut, initial_state};

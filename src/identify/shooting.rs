@@ -3,11 +3,10 @@ use rayon::prelude::*;
 
 use super::sensitivity::{LANES, Lane, Tangent, TangentStepper};
 use super::values::Values;
-use super::window::{Window, initial_state};
 use crate::data::{Log, half_width_s};
 use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::Dynamics;
-use crate::sim::{Commands, FIT_S, Hold, Point, RK4, Simulator, substeps};
+use crate::sim::{Commands, FIT_S, Hold, Point, RK4, Simulator, Window, initial_state, substeps};
 
 /// Residuals larger than this many scales enter the loss linearly instead of quadratically (Huber 1964). Outliers
 /// lose their influence, while only 0.3 % of a normal sample are affected.

@@ -1,6 +1,6 @@
 use crate::model::Parameter;
 
-use super::window::Window;
+use crate::sim::Window;
 
 /// The value that a parameter has in one log alone.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,22 +1,27 @@
-//! Sine, cosine, exponential and hyperbolic tangent of whole registers, within two units in the last place. Elsewhere
-//! than on vectors, and for the rarer functions, the standard library's.
+//! Sine, cosine, exponential and hyperbolic tangent of vectors, accurate to two units in the last place. Scalar code
+//! and the rarer functions use the standard library.
+//!
+//! `scripts/polynomials` computes the polynomials, and checks that the coefficients here are the ones that it finds.
 
 use pulp::Simd;
 
 use super::{Element, Vector};
 
-/// What the functions need to know of a number type. Polynomials have their lowest power first; they are the best
-/// ones of their degree by relative error (Remez 1934).
+#[cfg(test)]
+mod tests;
+
+/// Constants of a number type. Polynomials start with the lowest power; each minimises the largest relative error of
+/// its function among all polynomials of its degree (Remez 1934).
 pub trait Constants: Sized + 'static {
-    /// Added and taken off again, it rounds to whole numbers; between the two they stand in the lowest bits.
+    /// Adding and subtracting it rounds to an integer, which in between occupies the lowest bits.
     const ROUNDER: f64;
-    /// pi / 2 in parts, so that few multiples of the first ones are exact.
+    /// pi / 2 as a sum; small multiples of the first terms are exact (Cody and Waite 1980).
     const QUARTER_TURN: [f64; 3];
-    /// To this angle the parts suffice.
+    /// Largest angle that this sum reduces accurately enough, rad.
     const LARGEST_ANGLE: f64;
-    /// log 2 in parts.
+    /// log 2 as a sum.
     const LN_2: [f64; 2];
-    /// Beyond these the exponential is zero or infinite.
+    /// Arguments below the first give 0, above the second infinity.
     const EXPONENTS: [f64; 2];
     /// (sin r - r) / r^3 and (cos r - 1 + r^2 / 2) / r^4 by r^2, for r up to pi / 4.
     const SINE: &'static [f64];
@@ -42,7 +47,7 @@ impl Constants for f64 {
         0.008_333_333_333_322_108,
         -0.000_198_412_698_295_809_93,
         2.755_731_361_828_611_5e-6,
-        -2.505_074_725_744_922_6e-8,
+        -2.505_074_725_744_916_2e-8,
         1.589_619_974_905_320_6e-10,
     ];
     const COSINE: &'static [f64] = &[
@@ -78,7 +83,7 @@ impl Constants for f64 {
         -0.000_237_005_158_452_369_16,
         9.154_667_214_413_075e-5,
         -3.017_521_063_689_924e-5,
-        6.037_107_295_572_1e-6,
+        6.037_107_295_572_100_5e-6,
     ];
 }
 
@@ -104,7 +109,7 @@ impl Constants for f32 {
     ];
     const EXPONENTIAL: &'static [f64] = &[
         0.500_000_006_768_185_5,
-        0.166_666_658_660_681_72,
+        0.166_666_658_680_661_72,
         0.041_666_294_948_832_58,
         0.008_333_497_266_228_715,
         0.001_394_465_964_229_863_4,
@@ -131,7 +136,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         self.sin_cos().1
     }
 
-    /// Sine and cosine for hardly more than the price of one.
+    /// Sine and cosine; costs hardly more than one of them.
     #[inline(always)]
     pub fn sin_cos(self) -> (Self, Self) {
         if S::IS_SCALAR || self.like(T::LARGEST_ANGLE).any_less(self.abs()) {
@@ -146,14 +151,14 @@ impl<S: Simd, T: Element> Vector<S, T> {
         let angle = count.mul_add(self.like(third), rest);
         let square = angle * angle;
         let odd = (angle * square).mul_add(square.polynomial(T::SINE), angle);
-        // The halves of the cosine first: what is rounded off is small.
+        // 1 - r^2 / 2 first, with its rounding error added to the small term.
         let half = square * self.like(0.5);
         let one = self.like(1.0);
         let large = one - half;
         let small = (square * square).mul_add(square.polynomial(T::COSINE), (one - large) - half);
         let (odd, even) = (odd.with_sign_of(angle), large + small);
         let (sine, cosine) = (turns.if_bit(0, even, odd), turns.if_bit(0, odd, even));
-        // Of the four quarters of a turn the sine is turned in the last two, the cosine in the middle ones.
+        // The sine is negative in quadrants 3 and 4, the cosine in quadrants 2 and 3.
         let middle = turns + one;
         (
             turns.if_bit(1, -sine, sine),
@@ -169,7 +174,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         let (low, high) = (self.like(T::EXPONENTS[0]), self.like(T::EXPONENTS[1]));
         let inside = self.if_less(low, low, high.if_less(self, high, self));
         let (power, factor) = inside.split_exp();
-        // In two parts, as the power alone may be no number where the result is one.
+        // In two factors, since 2^k alone may overflow where the result does not.
         let rounder = self.like(T::ROUNDER);
         let half = power.mul_add(self.like(0.5), rounder) - rounder;
         factor * half.power_of_two() * (power - half).power_of_two()
@@ -218,7 +223,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         zero.if_less(self, self.like(1.0), not_positive)
     }
 
-    /// Whole k and f so that exp(self) = 2^k f.
+    /// Integer k and factor f with exp(self) = 2^k f.
     #[inline(always)]
     fn split_exp(self) -> (Self, Self) {
         let rounder = self.like(T::ROUNDER);
@@ -230,7 +235,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         (power, curved + self.like(1.0))
     }
 
-    /// Even and odd powers apart: half as long to wait for.
+    /// Even and odd powers separately, which halves the latency.
     #[inline(always)]
     fn polynomial(self, coefficients: &[f64]) -> Self {
         let (zero, square) = (self.like(0.0), self * self);
@@ -255,164 +260,5 @@ impl<S: Simd, T: Element> Vector<S, T> {
     #[inline(always)]
     fn power_of_two(self) -> Self {
         Self::new(self.simd, T::power_of_two(self.simd, self.register))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use pulp::{Arch, Simd, WithSimd};
-
-    use crate::lanes::{Element, Vector};
-
-    /// A function on vectors, and what it should be.
-    #[derive(Clone, Copy)]
-    enum Function {
-        Sin,
-        Cos,
-        Exp,
-        Tanh,
-    }
-
-    use Function::{Cos, Exp, Sin, Tanh};
-
-    impl Function {
-        fn of_number(self, x: f64) -> f64 {
-            match self {
-                Sin => x.sin(),
-                Cos => x.cos(),
-                Exp => x.exp(),
-                Tanh => x.tanh(),
-            }
-        }
-
-        fn of_vector<S: Simd, T: Element>(self, x: Vector<S, T>) -> Vector<S, T> {
-            match self {
-                Sin => x.sin(),
-                Cos => x.cos(),
-                Exp => x.exp(),
-                Tanh => x.tanh(),
-            }
-        }
-    }
-
-    struct Apply<'a, T>(Function, &'a [T]);
-
-    impl<T: Element> WithSimd for Apply<'_, T> {
-        type Output = Vec<T>;
-
-        fn with_simd<S: Simd>(self, simd: S) -> Vec<T> {
-            let mut numbers = self.1.to_vec();
-            numbers.resize(numbers.len().next_multiple_of(16), T::zero());
-            for register in T::registers_mut::<S>(&mut numbers) {
-                *register = self
-                    .0
-                    .of_vector(Vector::<S, T>::new(simd, *register))
-                    .register;
-            }
-            numbers
-        }
-    }
-
-    /// The function on every set of instructions that this processor has; on plain numbers it is the standard
-    /// library's own.
-    fn everywhere<T: Element>(function: Function, x: &[T]) -> Vec<Vec<T>> {
-        let apply = || Apply(function, x);
-        let mut all = vec![Arch::new().dispatch(apply())];
-        #[cfg(target_arch = "x86_64")]
-        all.extend(pulp::x86::V3::try_new().map(|simd| Simd::vectorize(simd, apply())));
-        all
-    }
-
-    /// Evenly spread numbers, and multiples of a quarter of pi, near to which sines and cosines vanish.
-    fn arguments(largest: f64) -> Vec<f64> {
-        let spread = (0..40_000).map(|k| largest * (f64::from(k) / 20_000.0 - 1.0));
-        let multiples = (-2000..2000).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
-        let small = (0..300).map(|k| 1.3 * 0.9_f64.powi(k));
-        let all = spread.chain(multiples).chain(small);
-        all.filter(|x| x.abs() <= largest).collect()
-    }
-
-    const CASES: [(Function, f64); 8] = [
-        (Sin, 1e5),
-        (Cos, 1e5),
-        (Sin, 10.0),
-        (Cos, 10.0),
-        (Exp, 740.0),
-        (Exp, 2.0),
-        (Tanh, 25.0),
-        (Tanh, 1.0),
-    ];
-
-    #[test]
-    fn doubles_are_within_two_units_of_the_standard_library() {
-        for (function, largest) in CASES {
-            let x = arguments(largest);
-            for found in everywhere(function, &x) {
-                for (x, found) in x.iter().zip(found) {
-                    let wanted = function.of_number(*x);
-                    let unit = wanted.abs().next_up() - wanted.abs();
-                    let off = (found - wanted).abs();
-                    assert!(
-                        found == wanted || off <= 2.0 * unit,
-                        "{x:e}: {found:e} {wanted:e}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn floats_are_within_two_units_of_the_truth() {
-        for (function, largest) in CASES {
-            let x: Vec<f32> = arguments(largest.min(100.0))
-                .iter()
-                .map(|x| *x as f32)
-                .collect();
-            for found in everywhere(function, &x) {
-                for (x, found) in x.iter().zip(found) {
-                    let wanted = function.of_number(f64::from(*x));
-                    let nearest = wanted as f32;
-                    let unit = f64::from(nearest.abs().next_up() - nearest.abs());
-                    let off = (f64::from(found) - wanted).abs();
-                    assert!(
-                        found == nearest || off <= 2.0 * unit,
-                        "{x:e}: {found:e} {wanted:e}"
-                    );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_no_number_or_beyond_all_is_as_in_the_standard_library() {
-        let x = [
-            f64::NAN,
-            f64::INFINITY,
-            -f64::INFINITY,
-            -0.0,
-            0.0,
-            1e300,
-            -1e6,
-            3e5,
-            5e-324,
-            709.7,
-            -745.0,
-        ];
-        for function in [Sin, Cos, Exp, Tanh] {
-            // Apart, as one large angle sends all lanes the long way.
-            for x in x {
-                for found in everywhere(function, &[x; 3]) {
-                    let wanted = function.of_number(x);
-                    let close = (found[0] - wanted).abs() <= 4e-16 * wanted.abs();
-                    let same = found[0] == wanted
-                        && found[0].is_sign_negative() == wanted.is_sign_negative();
-                    assert!(
-                        same || close && wanted != 0.0 || found[0].is_nan() && wanted.is_nan(),
-                        "{x} {} {wanted}",
-                        found[0]
-                    );
-                }
-            }
-        }
     }
 }

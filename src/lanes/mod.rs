@@ -1,10 +1,16 @@
-//! Many numbers at a time: vectors as wide as the processor at hand has them (AVX-512, AVX2, NEON or one by one),
-//! chosen when the program runs. What is written once here, for f32 and f64, serves every engine.
+//! Data parallelism: vectors as wide as the processor offers (AVX-512, AVX2, NEON, or single numbers), chosen at run
+//! time and written once for f32 and f64, and a pool of worker threads.
+//!
+//! Code on vectors is `#[inline(always)]` and written as plain loops. A closure or an iterator that passes vectors
+//! may become a function of its own, compiled without the processor's vector instructions, and then every vector goes
+//! through memory; `benches/instructions` finds such functions.
 
 mod math;
+mod pool;
 mod row;
 mod vector;
 
+pub use pool::WorkerPool;
 pub use row::Row;
 pub use vector::{Element, Vector};
 

@@ -2,7 +2,7 @@ use std::ops::{Deref, DerefMut};
 
 use super::{Arch, Element, Simd, Vector, WithSimd};
 
-/// `W` numbers side by side, at an address from which a processor reads whole registers at full speed.
+/// `W` numbers side by side, aligned so that whole registers load at full speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
 pub struct Row<T, const W: usize>(pub [T; W]);
@@ -15,30 +15,30 @@ impl<T: Copy, const W: usize> Row<T, W> {
 }
 
 impl<T: Element, const W: usize> Row<T, W> {
-    /// Carry out work on rows in the widest registers that they fill; on plain numbers where they fill none.
+    /// Run `work` with the widest vectors that divide a row, or with single numbers where none does.
     pub fn dispatch<F: WithSimd>(work: F) -> F::Output {
         Arch::new().dispatch(Fitting::<T, F, W>(work, std::marker::PhantomData))
     }
 
-    /// Whether rows fill registers.
+    /// Whether a row is a whole number of registers.
     #[inline(always)]
     pub fn fills<S: Simd>() -> bool {
         W.is_multiple_of(T::lanes::<S>())
     }
 
-    /// Registers of a row.
+    /// Number of registers in a row.
     #[inline(always)]
     pub fn parts<S: Simd>() -> usize {
         W / T::lanes::<S>()
     }
 
-    /// One register's part of the row.
+    /// The register number `part` of the row.
     #[inline(always)]
     pub fn get<S: Simd>(&self, simd: S, part: usize) -> Vector<S, T> {
         Vector::new(simd, T::registers::<S>(&self.0)[part])
     }
 
-    /// Replace one register's part of the row.
+    /// Overwrite the register number `part` of the row.
     #[inline(always)]
     pub fn set<S: Simd>(&mut self, part: usize, value: Vector<S, T>) {
         T::registers_mut::<S>(&mut self.0)[part] = value.register;

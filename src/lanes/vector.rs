@@ -3,16 +3,17 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use pulp::Simd;
 
 use super::math::Constants;
-use crate::expr::Real;
 
-/// A number type of which a processor holds several in one register.
-pub trait Element: Real + Constants {
+/// A number type with vector registers: f64 for identification, f32 for training and planning.
+pub trait Element:
+    num_traits::Float + num_traits::FromPrimitive + Default + Send + Sync + Constants
+{
     /// One register.
     type Register<S: Simd>: Copy;
-    /// Which lanes a comparison holds in.
+    /// The lanes in which a comparison is true.
     type Mask<S: Simd>: Copy;
 
-    /// How many fit into one register.
+    /// Numbers in one register.
     fn lanes<S: Simd>() -> usize;
     /// The numbers as registers.
     ///
@@ -31,7 +32,7 @@ pub trait Element: Real + Constants {
     fn neg<S: Simd>(simd: S, a: Self::Register<S>) -> Self::Register<S>;
     fn abs<S: Simd>(simd: S, a: Self::Register<S>) -> Self::Register<S>;
     fn sqrt<S: Simd>(simd: S, a: Self::Register<S>) -> Self::Register<S>;
-    /// a b + c, rounded once where the processor can.
+    /// a b + c, rounded once where the processor has a fused multiply-add.
     fn mul_add<S: Simd>(
         simd: S,
         a: Self::Register<S>,
@@ -47,23 +48,23 @@ pub trait Element: Real + Constants {
     ) -> Self::Register<S>;
     fn sum<S: Simd>(simd: S, a: Self::Register<S>) -> Self;
     fn equal<S: Simd>(simd: S, a: Self::Register<S>, b: Self::Register<S>) -> Self::Mask<S>;
-    /// Whether a comparison holds in some lane.
+    /// Whether a comparison is true in any lane.
     fn any<S: Simd>(simd: S, mask: Self::Mask<S>) -> bool;
-    /// Whether this bit of a number's representation is set, counted from the lowest.
+    /// Whether a bit of the representation is set; bit 0 is the lowest.
     fn bit<S: Simd>(simd: S, a: Self::Register<S>, bit: u32) -> Self::Mask<S>;
-    /// The size of `a` with the sign of `sign`.
+    /// The magnitude of `a` with the sign of `sign`.
     fn with_sign_of<S: Simd>(
         simd: S,
         a: Self::Register<S>,
         sign: Self::Register<S>,
     ) -> Self::Register<S>;
-    /// 2^k for whole k of which 2^k is a normal number.
+    /// 2^k for integers k where that is a normal number.
     fn power_of_two<S: Simd>(simd: S, k: Self::Register<S>) -> Self::Register<S>;
     /// The numbers of one register.
     fn numbers<S: Simd>(register: &mut Self::Register<S>) -> &mut [Self];
 }
 
-/// One register of numbers, with the operators of numbers.
+/// One register of numbers with arithmetic operators.
 pub struct Vector<S: Simd, T: Element> {
     pub simd: S,
     pub register: T::Register<S>,
@@ -90,7 +91,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         Self::new(simd, <T as Element>::splat(simd, value))
     }
 
-    /// A constant beside this vector.
+    /// A constant in every lane, of the same type as this vector.
     #[inline(always)]
     pub fn like(self, value: f64) -> Self {
         Self::splat(
@@ -117,7 +118,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         Self::new(self.simd, <T as Element>::sqrt(self.simd, self.register))
     }
 
-    /// The smaller; which one of two where one is not a number differs between processors.
+    /// The minimum; with a NaN the result depends on the processor.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         Self::new(
@@ -126,7 +127,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         )
     }
 
-    /// The larger; which one of two where one is not a number differs between processors.
+    /// The maximum; with a NaN the result depends on the processor.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self::new(
@@ -135,7 +136,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         )
     }
 
-    /// `then` where `self < other`, else `otherwise`; what is not a number is less than nothing.
+    /// `then` where `self < other`, else `otherwise`; false for a NaN.
     #[inline(always)]
     pub fn if_less(self, other: Self, then: Self, otherwise: Self) -> Self {
         let mask = <T as Element>::less(self.simd, self.register, other.register);
@@ -143,7 +144,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         Self::new(self.simd, chosen)
     }
 
-    /// `then` where `self == other`, else `otherwise`; what is not a number equals nothing.
+    /// `then` where `self == other`, else `otherwise`; false for a NaN.
     #[inline(always)]
     pub fn if_equal(self, other: Self, then: Self, otherwise: Self) -> Self {
         let mask = <T as Element>::equal(self.simd, self.register, other.register);
@@ -151,21 +152,21 @@ impl<S: Simd, T: Element> Vector<S, T> {
         Self::new(self.simd, chosen)
     }
 
-    /// Whether `self < other` in some lane.
+    /// Whether `self < other` in any lane.
     #[inline(always)]
     pub fn any_less(self, other: Self) -> bool {
         let mask = <T as Element>::less(self.simd, self.register, other.register);
         <T as Element>::any(self.simd, mask)
     }
 
-    /// This size with that sign.
+    /// The magnitude of `self` with the sign of `sign`.
     #[inline(always)]
     pub fn with_sign_of(self, sign: Self) -> Self {
         let register = <T as Element>::with_sign_of(self.simd, self.register, sign.register);
         Self::new(self.simd, register)
     }
 
-    /// A function of numbers, one lane after the other.
+    /// Apply a scalar function to each lane.
     #[inline(always)]
     pub fn each(mut self, function: impl Fn(T) -> T) -> Self {
         for number in T::numbers::<S>(&mut self.register) {
@@ -174,7 +175,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         self
     }
 
-    /// The same for two numbers.
+    /// Apply a scalar function of two numbers to each lane.
     #[inline(always)]
     pub fn each_with(mut self, mut other: Self, function: impl Fn(T, T) -> T) -> Self {
         let others = T::numbers::<S>(&mut other.register);
@@ -184,7 +185,7 @@ impl<S: Simd, T: Element> Vector<S, T> {
         self
     }
 
-    /// Sum over the lanes.
+    /// The sum of all lanes.
     #[inline(always)]
     pub fn sum(self) -> T {
         <T as Element>::sum(self.simd, self.register)
@@ -323,8 +324,8 @@ macro_rules! element {
 
             #[inline(always)]
             fn power_of_two<S: Simd>(simd: S, k: S::$register) -> S::$register {
-                // Added to this, the biased exponent stands in the lowest bits; multiplied as a whole number, they move
-                // to where the exponent belongs and all others out of the number.
+                // Adding LOWEST puts the biased exponent into the lowest bits; an integer multiplication moves it to
+                // the exponent field and all other bits out.
                 const PLACE: u32 = <$number>::MANTISSA_DIGITS - 1;
                 const LOWEST: $number = 1.0 / <$number>::EPSILON + (<$number>::MAX_EXP - 1) as $number;
                 let biased = simd.$to_bits(<Self as Element>::add(simd, k, simd.$splat(LOWEST)));

@@ -1,13 +1,11 @@
-use std::path::PathBuf;
-
 use thiserror::Error;
 
 use crate::data::LogError;
 use crate::plant::PlantError;
-use crate::report::WriteError;
+use crate::runs::RunFolderError;
 use crate::train::{CheckpointError, HybridError, SegmentsError, TrainError};
 
-/// Why a run of the loop cannot go on.
+/// Why a run of the loop cannot begin or be resumed.
 #[derive(Debug, Error)]
 pub enum RunError {
     #[error(transparent)]
@@ -18,13 +16,10 @@ pub enum RunError {
     Model(#[from] HybridError),
     #[error(transparent)]
     Segments(#[from] SegmentsError),
-    #[error(transparent)]
+    #[error("{0}")]
     Log(#[from] LogError),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// A file of an earlier session that does not fit.
-    #[error("{path}: {message}", path = .path.display())]
-    Saved { path: PathBuf, message: String },
+    #[error("{0}")]
+    Folder(#[from] RunFolderError),
 }

@@ -1,17 +1,17 @@
 use crate::data::Log;
 use crate::train::{Segments, SegmentsError};
 
-/// What is known of a plant: stretches of its motion, each one log.
+/// The recorded motion of a plant: stretches, one log each.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Experience {
     pub logs: Vec<Log>,
 }
 
 impl Experience {
-    /// The transitions for training, states as they were measured.
+    /// The transitions for training, with the states as measured.
     ///
     /// # Errors
-    /// Logs that do not belong together.
+    /// Logs with different numbers of joints.
     pub fn segments(&self, joints: usize) -> Result<Segments, SegmentsError> {
         let mut segments = Segments::new(joints, 1);
         for log in &self.logs {
@@ -23,7 +23,7 @@ impl Experience {
     }
 }
 
-/// Columns one row after the other.
+/// The columns, row by row.
 fn by_row(columns: &[&Vec<f64>]) -> Vec<f64> {
     let row = |k: usize| columns.iter().map(move |column| column[k]);
     (0..columns[0].len()).flat_map(row).collect()

@@ -1,55 +1,37 @@
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{Experience, Progress, Round, Run, RunError};
 use crate::data::{Columns, Log};
 use crate::model::{Dynamics, Origin};
-use crate::report::write_whole;
+use crate::runs::{RunFolder, RunFolderError};
 use crate::train::{Checkpoint, Training, save};
 
 const ROUNDS: &str = "rounds.jsonl";
 
-/// Where a run is kept: `stretch-000.csv` and on, what was seen of the plant; `rounds.jsonl`, a line for each round; and
-/// `checkpoint-001` or later, the model after the last one. A run goes on from what lies there, and ends with the same
+/// What a run keeps in its folder: `stretch-000.csv` and on, the recorded motion; `rounds.jsonl`, a line for each round;
+/// and `checkpoint-001` or later, the model after the last one. A run that is resumed from them ends with the same
 /// numbers.
 pub struct Folder {
-    dir: PathBuf,
+    folder: RunFolder,
     rounds: Vec<Round>,
 }
 
 impl Folder {
-    /// What lies in `dir`; it is made where it is missing.
+    /// Read the rounds in `folder`.
     ///
     /// # Errors
-    /// A folder that cannot be made, or a damaged file.
-    pub fn open(dir: &Path) -> Result<Self, RunError> {
-        let saved = |path: &Path| {
-            let path = path.to_owned();
-            move |message| RunError::Saved { path, message }
-        };
-        fs::create_dir_all(dir).map_err(|error| saved(dir)(error.to_string()))?;
-        let path = dir.join(ROUNDS);
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(saved(&path)(error.to_string())),
-        };
+    /// A damaged file.
+    pub fn open(folder: RunFolder) -> Result<Self, RunError> {
+        let text = folder.text(ROUNDS)?.unwrap_or_default();
         let read = |(number, line): (usize, &str)| {
-            serde_json::from_str(line).map_err(|error| {
-                saved(&path)(format!(
-                    "line {}: {error}; remove {}",
-                    number + 1,
-                    dir.display()
-                ))
-            })
+            serde_json::from_str(line)
+                .map_err(|error| folder.damaged(ROUNDS, format!("line {}: {error}", number + 1)))
         };
+        let rounds = text.lines().enumerate().map(read);
         Ok(Self {
-            rounds: text
-                .lines()
-                .enumerate()
-                .map(read)
-                .collect::<Result<_, _>>()?,
-            dir: dir.to_owned(),
+            rounds: rounds.collect::<Result<_, _>>()?,
+            folder,
         })
     }
 
@@ -58,16 +40,16 @@ impl Folder {
         &self.rounds
     }
 
-    /// Where the model after the last round is.
+    /// The checkpoint of the model after the last round.
     pub fn checkpoint(&self) -> PathBuf {
         self.checkpoint_after(self.rounds.len())
     }
 
     fn checkpoint_after(&self, rounds: usize) -> PathBuf {
-        self.dir.join(format!("checkpoint-{rounds:03}"))
+        self.folder.path().join(format!("checkpoint-{rounds:03}"))
     }
 
-    /// The run as it was left, or begun. `dynamics` is what its model file says.
+    /// The progress of the run so far; a run without rounds is started. `dynamics` are the equations of its model file.
     ///
     /// # Errors
     /// A damaged file, or a plant that diverges.
@@ -91,8 +73,8 @@ impl Folder {
         })
     }
 
-    /// Keep what a round brought. Its line comes last: without it the round is done again, from the model before it,
-    /// which therefore goes only then.
+    /// Keep the results of a round. Its line is written last: a round without a line is repeated from the model before
+    /// it, which is therefore removed after that.
     ///
     /// # Errors
     /// A folder that cannot be written.
@@ -109,23 +91,24 @@ impl Folder {
         save(&self.checkpoint(), training, origin)?;
         let line = |round| serde_json::to_string(round).expect("numbers and texts") + "\n";
         let lines: String = self.rounds.iter().map(line).collect();
-        write_whole(&self.dir.join(ROUNDS), lines.as_bytes())?;
-        self.forget_earlier()
+        self.folder.write_text(ROUNDS, &lines)?;
+        self.remove_earlier_checkpoints()
     }
 
-    fn forget_earlier(&self) -> Result<(), RunError> {
+    fn remove_earlier_checkpoints(&self) -> Result<(), RunError> {
         let earlier = (1..self.rounds.len()).map(|rounds| self.checkpoint_after(rounds));
         for path in earlier.filter(|path| path.exists()) {
-            fs::remove_dir_all(&path).map_err(|error| RunError::Saved {
-                message: error.to_string(),
+            fs::remove_dir_all(&path).map_err(|source| RunFolderError::Io {
+                action: "removed",
                 path,
+                source,
             })?;
         }
         Ok(())
     }
 
     fn stretch(&self, number: usize) -> PathBuf {
-        self.dir.join(format!("stretch-{number:03}.csv"))
+        self.folder.path().join(format!("stretch-{number:03}.csv"))
     }
 
     fn write_stretch(&self, log: &Log, number: usize) -> Result<(), RunError> {

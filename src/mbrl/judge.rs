@@ -1,11 +1,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use crate::control::{Episode, Predictor, Purpose, Task, episode, stream, with_controller};
+use crate::control::{Episode, Predictor, Task, episode, with_controller};
 use crate::plant::Plant;
+use crate::runs::{Purpose, stream};
 
-/// Lets models drive a plant in episodes that are not learnt from. Start, noise and draws of candidates are the same for
-/// every model, so that models alone make the difference.
+/// Evaluates models as controllers, in episodes that are not used for training. Initial state, sensor noise and the
+/// planner's random numbers are the same for every model, so that results differ by the model alone.
 #[derive(Debug, Clone, Copy)]
 pub struct Judge<'a> {
     pub task: &'a Task,
@@ -13,20 +14,20 @@ pub struct Judge<'a> {
     pub seed: u64,
 }
 
-/// How an episode went that is not learnt from.
+/// The result of an evaluation episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
     /// The sum of rewards.
     #[serde(rename = "return")]
     pub total: f64,
-    /// Whether the goal held until the end.
+    /// Whether the goal was held until the end.
     pub success: bool,
-    /// Candidates of all plans whose rollout diverged.
+    /// Number of candidate plans whose rollout diverged.
     pub diverged: usize,
 }
 
 impl Judge<'_> {
-    /// How an episode goes with a model, under plans that are new after `replan` steps.
+    /// Evaluates a model in an episode, planning anew every `replan` steps.
     ///
     /// # Errors
     /// A plant that diverges.
@@ -39,7 +40,7 @@ impl Judge<'_> {
         })
     }
 
-    /// The same in full, and how many candidates diverged.
+    /// The whole episode, and the number of candidate plans that diverged.
     ///
     /// # Errors
     /// A plant that diverges.
@@ -49,10 +50,10 @@ impl Judge<'_> {
         replan: usize,
     ) -> Result<(Episode, usize), RunError> {
         let dynamics = self.plant.true_dynamics();
-        let mut rng = stream(self.seed, Purpose::Judge, 0);
+        let mut rng = stream(self.seed, Purpose::Judge(0));
         let start = self.task.draw_start(&mut rng);
         let mut rig = self.task.rig(self.plant, &dynamics, &start);
-        let draws = stream(self.seed, Purpose::JudgePlan, 0);
+        let draws = stream(self.seed, Purpose::JudgePlan(0));
         with_controller(predictor, self.task, replan, &draws, |controller| {
             let episode = episode(self.task, &mut rig, controller, &mut rng)?;
             Ok((episode, controller.diverged()))

@@ -1,55 +1,55 @@
 use std::ops::ControlFlow;
 
 use super::RunError;
-use crate::control::{Purpose, stream};
 use crate::model::{Dynamics, InputScaling, LastLayer, MlpSettings, MlpWeights};
+use crate::runs::{Purpose, stream};
 use crate::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
-/// What a model knows before it has seen the plant.
+/// What a model starts from.
 #[derive(Debug, Clone)]
 pub enum Prior {
-    /// Nothing: the model is a network alone, from random numbers.
+    /// Nothing: the model is a network with random initial weights.
     Nothing,
-    /// Equations, whose parameters go on learning.
+    /// Equations, whose parameters are trained.
     Equations(Box<Dynamics>),
-    /// A trained model, which goes on learning where its learning rate lets it.
+    /// A trained model, which is trained further where its learning rate is not zero.
     Trained(Box<HybridModel>),
 }
 
-/// How a model comes of data.
+/// How models are trained on data.
 #[derive(Debug, Clone)]
 pub struct Learner {
     pub system: String,
     pub joints: usize,
     pub prior: Prior,
-    /// The network that is added to the prior, or stands alone.
+    /// The network that is added to the prior or, without a prior, is the whole model.
     pub network: MlpSettings,
     pub fit: FitSettings,
     pub backend: Backend,
 }
 
 impl Learner {
-    /// The prior as a model; none where nothing is known.
+    /// The prior as a model, if there is one.
     ///
     /// # Errors
-    /// Equations with a parameter that cannot be learnt.
+    /// Equations with a parameter that cannot be trained.
     pub fn untrained(&self) -> Result<Option<HybridModel>, RunError> {
         Ok(match &self.prior {
             Prior::Nothing => None,
             Prior::Equations(dynamics) => {
                 Some(HybridModel::physics(dynamics, &self.backend.device())?)
             }
-            // With tensors of its own: runs on several threads that share one can block each other for ever, since the
-            // autodiff backend keeps what hangs together in one graph and takes its locks in either order.
+            // With tensors of its own: threads that share a tensor can deadlock, since the autodiff backend keeps all
+            // connected tensors in one graph and does not take its locks in a fixed order.
             Prior::Trained(model) => Some(model.with_weights(&model.weights())?),
         })
     }
 
-    /// Train on `segments`, from `previous` or else from the prior. The optimiser starts anew, and the network's
-    /// features are scaled to the data at hand.
+    /// Trains on `segments`, starting from `previous` or else from the prior. The optimiser is reset, and the network's
+    /// features are scaled to these data.
     ///
     /// # Errors
-    /// Data of another system, or a loss that is no longer finite.
+    /// Data of another system, or a loss that is not finite.
     pub fn learn(
         &self,
         segments: &Segments,
@@ -62,7 +62,7 @@ impl Learner {
             Some(model) => self.rescaled(model, scaling)?,
             None => self.first(scaling, seed, round)?,
         };
-        let order = stream(seed, Purpose::Order, round);
+        let order = stream(seed, Purpose::Order(round));
         let mut training = Training::new(model, self.fit.clone(), order)?;
         training.run(segments, None, &mut |_| ControlFlow::Continue(()))?;
         Ok(training)
@@ -74,7 +74,7 @@ impl Learner {
         seed: u64,
         round: usize,
     ) -> Result<HybridModel, RunError> {
-        let mut rng = stream(seed, Purpose::Network, round);
+        let mut rng = stream(seed, Purpose::Network(round));
         let mut network =
             |last| MlpWeights::new(self.joints, &self.network, scaling.clone(), last, &mut rng);
         match self.untrained()? {

@@ -1,5 +1,5 @@
-//! Model-based reinforcement learning: train a model on what is known of a plant, control the plant with it, add what
-//! that showed to what is known, and again.
+//! Model-based reinforcement learning: train a model on the recorded motion of a plant, control the plant with it, add
+//! the new motion to the data, and repeat.
 
 mod error;
 mod experience;

@@ -1,25 +1,26 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Experience, Judge, Judged, Learner, RunError};
-use crate::control::{Predictor, Purpose, RandomTorque, Task, drive, stream, with_controller};
+use crate::control::{Predictor, RandomTorque, Task, drive, with_controller};
 use crate::data::Log;
 use crate::model::Dynamics;
 use crate::plant::{Plant, Rig};
+use crate::runs::{Purpose, stream};
 use crate::train::{HybridModel, Training};
 
-/// How much is gathered when.
+/// The amounts of data, in transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// Transitions under random torques, before there is a model.
+    /// Transitions under random torques, before the first training.
     pub random: usize,
-    /// Transitions under control between two trainings: T. An episode of the task is a whole number of them.
+    /// Transitions T under control between two trainings; must divide the steps of an episode of the task.
     pub gather: usize,
-    /// Trainings.
+    /// Number of trainings.
     pub rounds: usize,
 }
 
-/// One run of the loop on one plant, with all that decides how it goes.
+/// One run of the loop on one plant: everything that determines its results.
 pub struct Run<'a> {
     pub task: &'a Task,
     pub plant: &'a Plant,
@@ -28,7 +29,7 @@ pub struct Run<'a> {
     pub seed: u64,
 }
 
-/// How far a run is.
+/// The state of a run between two rounds.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {
     pub experience: Experience,
@@ -38,33 +39,33 @@ pub struct Progress {
     pub rounds: usize,
 }
 
-/// What a round found: one line of its record.
+/// The results of a round: one line of `rounds.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Round {
     /// Counted from 0.
     pub round: usize,
-    /// Real transitions that the model was trained on.
+    /// Number of real transitions that the model was trained on.
     pub transitions: usize,
     #[serde(flatten)]
     pub judged: Judged,
-    /// Prediction error on them after training: mean of ||s' - s_hat'||^2.
+    /// Prediction error on these transitions after training: mean of ||s' - s_hat'||^2.
     pub error: f64,
     /// ||F_r||
     pub residual_norm: f64,
-    /// Name and value of the physical parameters.
+    /// Names and values of the physical parameters.
     pub parameters: Vec<(String, f64)>,
 }
 
 impl Run<'_> {
-    /// Random data, before the first round.
+    /// Gathers data under random torques, before the first round.
     ///
     /// # Errors
     /// A plant that diverges.
     pub fn begin(&self) -> Result<Progress, RunError> {
         let dynamics = self.plant.true_dynamics();
         let mut rig = self.rig(&dynamics, 0);
-        let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random, 0));
-        let mut noise = stream(self.seed, Purpose::Gather, 0);
+        let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
+        let mut noise = stream(self.seed, Purpose::Gather(0));
         let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
         Ok(Progress {
             experience: Experience {
@@ -74,10 +75,10 @@ impl Run<'_> {
         })
     }
 
-    /// Train, judge and gather.
+    /// Carries out a round: train, judge, gather.
     ///
     /// # Errors
-    /// A loss that is no longer finite, or a plant that diverges.
+    /// A loss that is not finite, or a plant that diverges.
     pub fn round(&self, progress: &mut Progress) -> Result<(Round, Training), RunError> {
         let (round, seed) = (progress.rounds, self.seed);
         let segments = progress.experience.segments(self.task.joints())?;
@@ -113,7 +114,8 @@ impl Run<'_> {
     fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
         let dynamics = self.plant.true_dynamics();
         let mut rig = self.rig_now(&dynamics, progress)?;
-        let of_round = |purpose| stream(self.seed, purpose, progress.rounds + 1);
+        let of_round =
+            |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(progress.rounds + 1));
         let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
         let steps = self.schedule.gather;
         let stretch = with_controller(predictor, self.task, self.task.replan, &draws, |policy| {
@@ -122,8 +124,8 @@ impl Run<'_> {
         Ok(stretch.log)
     }
 
-    /// The plant where the last stretch under control left it: the torques held since the start of the episode bring it
-    /// there again. At the end of an episode it starts anew.
+    /// The plant in the state at the end of the last stretch under control, restored by replaying the torques of the
+    /// episode so far. After the end of an episode, the plant in a new initial state.
     fn rig_now<'d>(
         &self,
         dynamics: &'d Dynamics,
@@ -143,7 +145,7 @@ impl Run<'_> {
     }
 
     fn rig<'d>(&self, dynamics: &'d Dynamics, number: usize) -> Rig<'d> {
-        let mut rng = stream(self.seed, Purpose::Start, number);
+        let mut rng = stream(self.seed, Purpose::Start(number));
         let start = self.task.draw_start(&mut rng);
         self.task.rig(self.plant, dynamics, &start)
     }

@@ -9,7 +9,12 @@ use crate::control::Task;
 use crate::expr::SignForm;
 use crate::model::{Angles, Dynamics, Library, MlpSettings, Origin};
 use crate::plant::{Noise, Plant};
+use crate::runs::RunFolder;
 use crate::train::{Backend, FitSettings, Penalty};
+
+fn folder(dir: &Path) -> Folder {
+    Folder::open(RunFolder::open(dir).unwrap()).unwrap()
+}
 
 struct Setting {
     task: Task,
@@ -18,7 +23,7 @@ struct Setting {
     dynamics: Dynamics,
 }
 
-/// The pendulum with friction, noise and, as an effect with memory, a delay.
+/// The pendulum with friction, noise and a delay, which is an effect with memory.
 fn setting() -> Setting {
     let library = Library::built_in();
     let mut task = Task::read(Path::new("pendulum")).unwrap();
@@ -93,11 +98,11 @@ impl Setting {
     fn in_sessions(&self, ends: &[usize]) -> (Vec<Round>, Vec<f64>) {
         let dir = tempfile::tempdir().unwrap();
         for end in ends {
-            let mut folder = Folder::open(dir.path()).unwrap();
+            let mut folder = folder(dir.path());
             let mut progress = folder.progress(&self.run(), &self.dynamics).unwrap();
             self.rounds(&mut progress, &mut folder, *end);
         }
-        let folder = Folder::open(dir.path()).unwrap();
+        let folder = folder(dir.path());
         let progress = folder.progress(&self.run(), &self.dynamics).unwrap();
         let logs = progress.experience.logs;
         (
@@ -111,7 +116,7 @@ impl Setting {
 fn a_run_in_sessions_is_the_run_in_one() {
     let setting = setting();
     let (rounds, angles) = setting.in_sessions(&[5]);
-    // Session ends within an episode of three stretches and at its end.
+    // The run is interrupted within an episode of three stretches and at its end.
     assert_eq!(
         setting.in_sessions(&[1, 3, 5]),
         (rounds.clone(), angles.clone())
@@ -126,12 +131,12 @@ fn a_round_without_its_line_is_done_again_from_the_model_before_it() {
     let setting = setting();
     let (killed, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let go_on = |dir: &Path, until| {
-        let mut folder = Folder::open(dir).unwrap();
+        let mut folder = folder(dir);
         let mut progress = folder.progress(&setting.run(), &setting.dynamics).unwrap();
         setting.rounds(&mut progress, &mut folder, until);
         folder
     };
-    // As a kill between the third model and its line leaves it.
+    // The state after a kill between writing the third model and writing its line.
     let second = go_on(killed.path(), 2).checkpoint();
     let third = go_on(further.path(), 3).checkpoint();
     let left = killed.path().join(third.file_name().unwrap());
@@ -151,7 +156,7 @@ fn a_stretch_begins_where_the_last_one_ended() {
     let stretch = |k: usize| &angles[16 + 21 * k..][..21];
     assert_eq!(stretch(0)[20], stretch(1)[0]);
     assert_eq!(stretch(1)[20], stretch(2)[0]);
-    // Three stretches are an episode; the next one starts anew.
+    // An episode has three stretches; the next one has a new initial state.
     assert_ne!(stretch(2)[20], stretch(3)[0]);
     assert!((stretch(3)[0] - std::f64::consts::PI).abs() < 0.2);
 }

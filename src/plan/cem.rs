@@ -5,12 +5,12 @@ use super::population::Population;
 use super::proposal::Proposal;
 use super::settings::check_elite;
 
-/// The cross-entropy method (Rubinstein 1999): draw sequences from normal distributions, take mean and standard
-/// deviation of the elite, and again. The mean is the plan.
+/// The cross-entropy method (Rubinstein 1999): draw sequences from normal distributions, refit mean and standard
+/// deviation to the elite, and repeat. The mean is the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cem {
-    /// The best candidates, from which the next distributions are taken.
+    /// Number of best candidates to which the distributions are fitted.
     pub elite: usize,
 }
 

@@ -2,28 +2,28 @@ use std::f32::consts::TAU;
 
 use rand::{Rng, RngExt};
 
-use crate::batch::{Rows, W};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use crate::sim::batch::{Rows, W};
 
-/// Numbers below one that 24 random bits give: all exactly an f32.
+/// Resolution of uniform numbers from 24 random bits, all of them exact in f32.
 const UNIT: f32 = 1.0 / (1 << 24) as f32;
 
-/// Standard normal numbers, by the method of Box and Muller (1958): each pair of rows from two rows of uniform
-/// numbers. With 24 bits none is beyond 5.8 standard deviations.
+/// Standard normal numbers by the method of Box and Muller (1958): two rows from two rows of uniform numbers. With 24
+/// bits none exceeds 5.8 standard deviations.
 #[derive(Debug, Clone)]
 pub struct Gaussian {
     bits: Vec<u32>,
 }
 
 impl Gaussian {
-    /// Memory for this many rows.
+    /// A buffer for this many rows.
     pub fn new(rows: usize) -> Self {
         Self {
             bits: vec![0; 2 * rows.div_ceil(2) * W],
         }
     }
 
-    /// Write the next rows; every number from `rng`, in order.
+    /// Fill `rows`, drawing from `rng` in order.
     pub fn fill(&mut self, arch: Arch, rng: &mut impl Rng, rows: &mut [Rows]) {
         rng.fill(&mut self.bits[..]);
         arch.dispatch(Transform {
@@ -46,7 +46,7 @@ impl WithSimd for Transform<'_> {
         for (pair, bits) in self.rows.chunks_mut(2).zip(self.bits.chunks_exact(2 * W)) {
             let (mut share, mut angle) = (Rows::splat(0.0), Rows::splat(0.0));
             for lane in 0..W {
-                // Never zero, whose logarithm there is not.
+                // Never zero: the logarithm follows.
                 share[lane] = ((bits[lane] >> 8) + 1) as f32 * UNIT;
                 angle[lane] = (bits[W + lane] >> 8) as f32 * (TAU * UNIT);
             }

@@ -6,22 +6,22 @@ use super::population::Population;
 use super::proposal::Proposal;
 use super::settings::{check_elite, within};
 
-/// The improved cross-entropy method (Pinneri et al. 2020, arXiv 2008.06389): candidates scatter with coloured noise, so
-/// that they move the rig and do not shake it; the best of them stay candidates, in a search and from one to the
-/// next; distributions follow the elite with momentum. The best candidate is the plan.
+/// The improved cross-entropy method (Pinneri et al. 2020, arXiv 2008.06389): candidates have coloured noise, which
+/// moves the rig instead of shaking it; the best ones are kept, within a search and for the next; distributions
+/// follow the elite with momentum. The best candidate is the plan.
 ///
-/// The published method also lets the population shrink from one iteration to the next, and this one does not: a search
-/// costs what its settings say.
+/// Unlike in the published method the population does not shrink over the iterations: the settings state the cost of a
+/// search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Icem {
-    /// The best candidates, from which the next distributions are taken.
+    /// Number of best candidates to which the distributions are fitted.
     pub elite: usize,
     /// beta: the power of the noise falls with the frequency f as f^-beta. 0 is white noise; published are 0.25 to
     /// 3.5, the higher the slower the motion that is wanted.
     #[serde(default = "noise_exponent")]
     pub noise_exponent: f64,
-    /// The share of the elite that stays, at least the best.
+    /// The share of the elite that is kept; at least the best.
     #[serde(default = "keep")]
     pub keep: f64,
     /// alpha: the share of the old mean and standard deviation in the new.

@@ -2,9 +2,9 @@ use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
 
-/// What methods of search differ in.
+/// What distinguishes one search method from another.
 pub trait Search {
-    /// Refuse settings that a search among so many candidates cannot run with.
+    /// Refuse settings that do not fit a population of this size.
     ///
     /// # Errors
     /// One sentence that names the key, its value and what it may be.
@@ -15,11 +15,11 @@ pub trait Search {
         0.5
     }
 
-    /// How candidates scatter over `steps` of so many inputs.
+    /// The noise of candidates over `steps` steps of `inputs` inputs.
     fn noise(&self, steps: usize, inputs: usize) -> Noise {
         Noise::white(steps, inputs)
     }
 
-    /// Draw the next candidates where the last ones were good.
+    /// Update the sampling distribution from the evaluated population.
     fn learn(&self, population: &Population<'_>, proposal: &mut Proposal);
 }

@@ -1,5 +1,5 @@
-//! Planning: searches for the best sequence of inputs. It knows an objective and what may be commanded, and asks
-//! somebody else what a sequence brings.
+//! Sampling-based planning: searches for the input sequence with the highest return within bounds. Planners know no
+//! dynamics; an [`Evaluate`] computes the return of a candidate sequence.
 
 mod cem;
 mod gaussian;

@@ -1,7 +1,7 @@
 use super::Evaluate;
-use crate::batch::{Block, Rows};
+use crate::sim::batch::{Block, Rows};
 
-/// Where a plan starts: a state (positions, then velocities), a time, and the torques that were commanded before.
+/// Initial condition of a plan: state (positions, then velocities), time, and the torques commanded before.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
     state: Vec<f32>,
@@ -11,13 +11,13 @@ pub struct Start {
 }
 
 impl Start {
-    /// In f64, as the rest of the program has it. No torque was commanded before.
+    /// From f64; no torque was commanded before.
     pub fn new(state: &[f64], time_s: f64) -> Self {
         Self::after(state, time_s, &[])
     }
 
     /// After the torques `past` (`[step][joint]`, oldest first), each held for a step of the model, the last one until
-    /// `time_s`. The oldest was held for ever before; the last [`Rollouts::memory`](crate::batch::Rollouts::memory)
+    /// `time_s`. The oldest was held for ever before; the last [`Rollouts::memory`](crate::sim::batch::Rollouts::memory)
     /// of them matter.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
     pub fn after(state: &[f64], time_s: f64, past: &[Vec<f64>]) -> Self {
@@ -29,7 +29,7 @@ impl Start {
     }
 }
 
-/// A start, and what is left there of the torques before it.
+/// An initial condition with the part of the acting torques that earlier commands cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prepared {
     start: Start,

@@ -8,10 +8,9 @@ use super::settings::within;
 /// Model-predictive path-integral control (Williams et al. 2017): the next mean is that of all candidates, each with
 /// the weight exp((return - best) / scale). The standard deviation stays. The mean is the plan.
 ///
-/// A temperature in units of return would have to be found anew for every objective, rig and horizon. Here it is a
-/// share of the spread of the population's returns, of what lies between the best and the median: an objective
-/// times a factor or plus a constant leads to the same plans, and a few candidates that fail badly, as they would rule a
-/// standard deviation, change nothing.
+/// A temperature in units of return would have to be tuned for every objective, rig and horizon. Here it is a share
+/// of the spread of the population's returns, from the best to the median: scaling or shifting the objective gives
+/// the same plans, and a few very bad candidates, which would dominate a standard deviation, have no influence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mppi {

@@ -4,31 +4,31 @@ use std::sync::Arc;
 use rand::Rng;
 
 use super::gaussian::Gaussian;
-use crate::batch::{Finish, Product, Rows};
 use crate::lanes::{Arch, Simd, WithSimd};
+use crate::sim::batch::{Finish, Product, Rows};
 
-/// Standard normal numbers for sequences of candidates: how these scatter around their mean.
+/// Normal noise of unit variance for candidate sequences, white or coloured.
 #[derive(Debug, Clone)]
 pub struct Noise {
     gaussian: Gaussian,
     colour: Option<Colour>,
 }
 
-/// Sequences whose neighbours are alike: their power falls with the frequency.
+/// Temporally correlated noise: its power spectrum falls with frequency.
 #[derive(Debug, Clone)]
 struct Colour {
     steps: usize,
     inputs: usize,
-    /// What each of `steps` independent numbers adds to each step: `[number][step]`.
+    /// Contribution of each of `steps` independent numbers to each step: `[number][step]`.
     mixing: Arc<[f32]>,
     /// `[input * steps + number]`
     white: Vec<Rows>,
-    /// Of one input, `[step]`.
+    /// The coloured sequence of one input, `[step]`.
     sequence: Vec<Rows>,
 }
 
 impl Noise {
-    /// Numbers that have nothing to do with each other.
+    /// Independent numbers.
     pub fn white(steps: usize, inputs: usize) -> Self {
         Self {
             gaussian: Gaussian::new(steps * inputs),
@@ -36,8 +36,7 @@ impl Noise {
         }
     }
 
-    /// Numbers that are independent from input to input and have a spectrum f^-`exponent` over the steps (Timmer and
-    /// König 1995).
+    /// Independent between inputs, with the power spectrum f^-`exponent` over the steps (Timmer and König 1995).
     pub fn coloured(steps: usize, inputs: usize, exponent: f64) -> Self {
         let colour = Colour {
             steps,
@@ -94,8 +93,8 @@ impl WithSimd for Mix<'_> {
     }
 }
 
-/// The inverse Fourier transform, in waves of unit energy, with amplitudes f^(-exponent / 2). The constant wave
-/// has the amplitude of the slowest other one; all together the variance of a step is 1.
+/// The inverse Fourier transform with normalised waves of amplitude f^(-exponent / 2). The constant has the amplitude
+/// of the lowest frequency; the variance of every step is 1.
 #[allow(clippy::cast_possible_truncation)] // planning runs in f32
 fn mixing(steps: usize, exponent: f64) -> Vec<f32> {
     // Constant, cosine, sine, cosine, sine, ...
@@ -104,7 +103,7 @@ fn mixing(steps: usize, exponent: f64) -> Vec<f32> {
     let power: f64 = (0..steps).map(|number| amplitude(number).powi(2)).sum();
     let entry = |number: usize, step: usize| {
         let turns = (frequency(number) * step) as f64 / steps as f64;
-        // The constant wave and the fastest have no sine beside them.
+        // The constant and the highest frequency have no sine.
         let alone = (2 * frequency(number)).is_multiple_of(steps);
         let energy = if alone { 1.0 } else { 2.0 };
         let quarter = if number > 0 && number.is_multiple_of(2) {

@@ -1,7 +1,7 @@
 use crate::expr::{FormulaError, Graph, Program, Scope, SignForm, parse};
 
-/// What is to be maximised, summed over the steps of a rollout: a formula of the state that a step leads to (`q1`,
-/// `qd1`, ...), of the torque that was held over it (`tau1`, ...) and of time (`t`).
+/// The reward, summed over the steps of a rollout and maximised: a formula of the state at the end of a step (`q1`,
+/// `qd1`, ...), the torque held over it (`tau1`, ...) and time (`t`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Objective {
     program: Program,
@@ -11,7 +11,7 @@ impl Objective {
     /// The objective of `joints` joints that this formula gives, e.g. `cos(q1) - 0.01 * tau1^2`.
     ///
     /// # Errors
-    /// What is no formula, or a name that it does not know.
+    /// A syntax error, or an unknown name.
     pub fn new(formula: &str, joints: usize) -> Result<Self, FormulaError> {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);

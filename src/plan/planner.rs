@@ -6,39 +6,38 @@ use super::Settings;
 use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
-use crate::batch::{Rows, W};
-use crate::lanes::Arch;
-use crate::rounds::Rounds;
+use crate::lanes::{Arch, WorkerPool};
+use crate::sim::batch::{Rows, W};
 
-/// Who knows what sequences of inputs bring. One of them serves one block of candidates.
+/// Evaluates candidate input sequences. There is one evaluator for each block of candidates.
 pub trait Evaluate: Send {
-    /// Where a plan starts.
+    /// Initial condition of a plan.
     type Start;
-    /// The same with what all candidates need of it.
+    /// The initial condition with everything that all candidates share.
     type Prepared: Send + Sync;
 
-    /// What a plan of so many steps from `start` begins with.
+    /// Prepare a plan of `steps` steps from `start`.
     fn prepare(&self, start: Self::Start, steps: usize) -> Self::Prepared;
 
-    /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); not a number or
-    /// infinite where it cannot be told.
+    /// The return of each candidate of a block from `start` under `inputs` (`[step * n + input]`); NaN or infinite
+    /// where the rollout diverges.
     fn returns(&mut self, start: &Self::Prepared, inputs: &[Rows], returns: &mut Rows);
 }
 
 /// A search for the inputs that maximise a return, by the [`Method`](super::Method) of its settings: draw sequences,
-/// evaluate them, draw others where they were good. What is left of a plan after some steps starts the next search.
+/// evaluate them, and draw the next ones near the best. The rest of a plan is the initial guess of the next search.
 ///
-/// One who plans again and again does so within [`Planner::helped`].
+/// Plan repeatedly within [`Planner::with_workers`] to use all cores.
 ///
-/// Candidates outside of the bounds are drawn back to them before they are evaluated. The result is the same on any
+/// Candidates are clipped to the bounds before they are evaluated. The result is the same on any
 /// number of processor cores: each block of candidates has a random stream of its own.
 pub struct Planner<E: Evaluate> {
     settings: Settings,
-    // Locks, since those who help share all of it with the one who leads. Nobody waits at them.
+    // Locks, since the workers share all of it with the calling thread. They are never contended.
     start: RwLock<Option<E::Prepared>>,
     proposal: RwLock<Proposal>,
     blocks: Vec<Mutex<Candidates<E>>>,
-    rounds: Rounds,
+    pool: WorkerPool,
 }
 
 /// One block of candidates.
@@ -52,14 +51,14 @@ struct Candidates<E> {
     returns: Rows,
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// `[step][input]`
     pub inputs: Vec<Vec<f64>>,
     /// The best return of a candidate in the last iteration; minus infinity where all of them diverged.
     pub best: f64,
-    /// Candidates of all iterations whose return was not finite: they count as the worst.
+    /// Number of candidates, over all iterations, whose return was not finite; they rank last.
     pub diverged: usize,
 }
 
@@ -106,23 +105,23 @@ impl<E: Evaluate> Planner<E> {
             blocks: (0..population.div_ceil(W))
                 .map(|index| Mutex::new(block(index)))
                 .collect(),
-            rounds: Rounds::new(),
+            pool: WorkerPool::new(),
         }
     }
 
-    /// Call `lead`, while all cores stay ready for the searches in it. Outside of it a search runs on one core.
-    pub fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
-        self.rounds
-            .helped(&|index| self.draw_and_evaluate(index), lead)
+    /// Call `body` with all cores available to the searches in it. Outside of it a search runs on one core.
+    pub fn with_workers<R>(&self, body: impl FnOnce() -> R) -> R {
+        self.pool
+            .with_workers(&|index| self.draw_and_evaluate(index), body)
     }
 
-    /// Begin again in the middle of the bounds.
+    /// Discard the last plan: the next search starts from the middle of the bounds.
     pub fn forget(&self) {
         write(&self.proposal).forget();
     }
 
-    /// The first `steps` of the plan have been carried out: the next search starts from the rest, and from the
-    /// middle of the bounds behind it.
+    /// Drop the first `steps` of the plan, which have been executed: the next search starts from the rest, continued
+    /// by the middle of the bounds.
     pub fn shift(&self, steps: usize) {
         write(&self.proposal).shift(steps);
     }
@@ -141,8 +140,7 @@ impl<E: Evaluate> Planner<E> {
         let (mut best, mut diverged) = (f32::NEG_INFINITY, 0);
         for _ in 0..iterations {
             let tasks = self.blocks.len();
-            self.rounds
-                .run(tasks, &|index| self.draw_and_evaluate(index));
+            self.pool.run(tasks, &|index| self.draw_and_evaluate(index));
             let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
             let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
             let population = Population::new(evaluated, population);
@@ -177,7 +175,7 @@ impl<E: Evaluate> Candidates<E> {
     }
 }
 
-// A lock is poisoned only where a thread panicked, which ends the search.
+// A lock is poisoned only after a panic, which ends the search anyway.
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)

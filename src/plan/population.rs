@@ -1,10 +1,10 @@
-use crate::batch::{Rows, W};
+use crate::sim::batch::{Rows, W};
 
-/// The candidates of one iteration, and what they bring.
+/// The candidates of one iteration and their returns.
 pub struct Population<'a> {
     /// Of each block of candidates, `[step * n + input]`.
     inputs: Vec<&'a [Rows]>,
-    /// Finite returns and the candidates' numbers, in their order.
+    /// Finite returns with the indices of their candidates, in order.
     known: Vec<(f32, usize)>,
     size: usize,
 }
@@ -21,7 +21,7 @@ impl<'a> Population<'a> {
         }
     }
 
-    /// Candidates whose return is not finite.
+    /// Number of candidates whose return is not finite.
     pub fn diverged(&self) -> usize {
         self.size - self.known.len()
     }
@@ -39,7 +39,7 @@ impl<'a> Population<'a> {
             .map_or(f32::NEG_INFINITY, |(value, _)| *value)
     }
 
-    /// So many candidates with the highest finite returns, best first, or all where they are fewer.
+    /// The `count` candidates with the highest finite returns (or all, if fewer), best first.
     pub fn elite(&self, count: usize) -> Vec<(f32, usize)> {
         let mut ranking = self.known.clone();
         let best_first =
@@ -52,19 +52,18 @@ impl<'a> Population<'a> {
         ranking
     }
 
-    /// One number of a candidate.
+    /// One entry of a candidate's sequence.
     pub fn number(&self, candidate: usize, number: usize) -> f32 {
         self.inputs[candidate / W][number][candidate % W]
     }
 
-    /// All numbers of a candidate.
+    /// The whole sequence of a candidate.
     pub fn sequence(&self, candidate: usize) -> Vec<f32> {
         let rows = self.inputs[candidate / W].iter();
         rows.map(|row| row[candidate % W]).collect()
     }
 
-    /// The mean of each number over all candidates that did not diverge, each with the weight that its return has.
-    /// None where all diverged.
+    /// The mean sequence of all candidates that did not diverge, weighted by `weight(return)`. None where all diverged.
     pub fn mean(&self, weight: impl Fn(f32) -> f32) -> Option<Vec<f32>> {
         let mut weights = vec![Rows::splat(0.0); self.inputs.len()];
         for (value, candidate) in &self.known {

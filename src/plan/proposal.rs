@@ -1,25 +1,25 @@
 use super::method::Search;
 use super::population::Population;
-use crate::batch::{Rows, W};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
+use crate::sim::batch::{Rows, W};
 
-/// No distribution becomes narrower than this share of half an input's range: a search that has settled can still be
-/// drawn away by a better optimum.
+/// Smallest standard deviation, as a share of half an input's range, so that a converged search can still move to a
+/// better optimum.
 const LEAST_DEVIATION: f32 = 1e-3;
 
-/// From what candidates are drawn: a normal distribution for each number of a sequence, `[step * n + input]`.
+/// The sampling distribution: an independent normal distribution for each entry of a sequence, `[step * n + input]`.
 #[derive(Debug, Clone)]
 pub struct Proposal {
-    /// Of each input: lowest and highest value.
+    /// Lowest and highest value of each input.
     bounds: Vec<[f32; 2]>,
     /// The middle of the bounds at every step.
     middle: Vec<f32>,
     mean: Vec<f32>,
     deviation: Vec<f32>,
-    /// Sequences, best first, that take the place of the first candidates; those of a plan that has been carried
-    /// out in part are short, and candidates keep what was drawn behind them.
+    /// Sequences, best first, that replace the first candidates. After part of a plan has been executed they are
+    /// shorter than the horizon, and the drawn values fill the rest.
     kept: Vec<Vec<f32>>,
-    /// Whether nothing has been learnt in this search.
+    /// True until the first update of this search.
     first: bool,
 }
 
@@ -39,7 +39,7 @@ impl Proposal {
         }
     }
 
-    /// A new search around the mean, with this share of half an input's range as standard deviation.
+    /// Start a search around the mean with this standard deviation, as a share of half an input's range.
     #[allow(clippy::cast_possible_truncation)] // planning runs in f32
     pub fn begin(&mut self, deviation: f64) {
         self.first = true;
@@ -49,7 +49,7 @@ impl Proposal {
         }
     }
 
-    /// Draw the next candidates where those of `population` were good.
+    /// Update the distribution from an evaluated population.
     pub fn learn(&mut self, population: &Population<'_>, search: &dyn Search) {
         self.first = false;
         search.learn(population, self);
@@ -60,7 +60,7 @@ impl Proposal {
         self.kept.clear();
     }
 
-    /// The first `steps` have been carried out.
+    /// Drop the first `steps`, which have been executed.
     pub fn shift(&mut self, steps: usize) {
         let done = (steps * self.bounds.len()).min(self.mean.len());
         self.mean.rotate_left(done);
@@ -71,8 +71,8 @@ impl Proposal {
         }
     }
 
-    /// Mean and standard deviation become those of the elite, with `momentum` as the share of what they were.
-    /// Where all candidates diverged they stay.
+    /// Fit mean and standard deviation to the elite; `momentum` is the share of the old values. Unchanged where all
+    /// candidates diverged.
     pub fn fit(&mut self, population: &Population<'_>, elite: &[(f32, usize)], momentum: f32) {
         if elite.is_empty() {
             return;
@@ -94,19 +94,19 @@ impl Proposal {
         }
     }
 
-    /// The mean becomes that of all candidates with these weights of their returns. Where all diverged it stays.
+    /// Set the mean to the weighted mean of all candidates. Unchanged where all diverged.
     pub fn average(&mut self, population: &Population<'_>, weight: impl Fn(f32) -> f32) {
         if let Some(mean) = population.mean(weight) {
             self.mean = mean;
         }
     }
 
-    /// Sequences, best first, that are candidates again.
+    /// Sequences, best first, that become candidates again.
     pub fn keep(&mut self, sequences: Vec<Vec<f32>>) {
         self.kept = sequences;
     }
 
-    /// The best sequence that was kept, else the mean, as `[step][input]`.
+    /// The best kept sequence, or the mean if none is kept: `[step][input]`.
     pub fn plan(&self) -> Vec<Vec<f64>> {
         let steps = self.kept.first().unwrap_or(&self.mean);
         steps
@@ -115,7 +115,7 @@ impl Proposal {
             .collect()
     }
 
-    /// Standard normal numbers become the candidates of the block with this index.
+    /// Turn standard normal numbers into the candidates of the block with this index.
     pub fn place(&self, arch: Arch, block: usize, inputs: &mut [Rows]) {
         arch.dispatch(Place {
             bounds: &self.bounds,
@@ -130,8 +130,8 @@ impl Proposal {
         }
     }
 
-    /// The means that candidates of a block are drawn around. At first every other block starts from the middle of
-    /// the bounds: what is left of a plan can lead into a worse optimum than a search that knows nothing.
+    /// The mean of a block's candidates. In the first iteration every other block starts from the middle of the bounds,
+    /// because the rest of the last plan may lie near a worse optimum than a search from scratch finds.
     fn mean_of(&self, block: usize) -> &[f32] {
         if self.first && block % 2 == 1 {
             &self.middle
@@ -159,8 +159,9 @@ impl WithSimd for Place<'_> {
             .zip(self.deviation)
             .zip(self.bounds.iter().cycle());
         for (row, ((mean, deviation), bounds)) in self.inputs.iter_mut().zip(spread) {
-            let [mean, deviation, low, high] =
-                [*mean, *deviation, bounds[0], bounds[1]].map(|x| Vector::splat(simd, x));
+            let (mean, deviation) = (Vector::splat(simd, *mean), Vector::splat(simd, *deviation));
+            let [low, high] = *bounds;
+            let (low, high) = (Vector::splat(simd, low), Vector::splat(simd, high));
             for number in f32::registers_mut::<S>(&mut **row) {
                 let placed = Vector::new(simd, *number).mul_add(deviation, mean);
                 *number = placed.max(low).min(high).register;

@@ -1,19 +1,13 @@
-use std::f64::consts::{PI, TAU};
-use std::path::Path;
-
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::gaussian::Gaussian;
-use super::noise::Noise;
 use super::proposal::Proposal;
-use super::{Cem, Evaluate, Icem, Method, Mppi, Objective, Plan, Planner, Settings, Start};
-use crate::batch::{Rollouts, Rows, W};
-use crate::expr::SignForm;
-use crate::lanes::{Arch, Row};
-use crate::model::{Dynamics, FittedEffect, Library};
-use crate::sim::{Commands, Environment, Hold, Integrator, RK4, Simulator};
+use super::{Cem, Evaluate, Icem, Method, Mppi, Plan, Planner, Settings};
+use crate::lanes::Arch;
+use crate::sim::batch::{Rows, W};
+
+mod noise;
+mod swing_up;
 
 const SETTINGS: Settings = Settings {
     population: 300,
@@ -173,7 +167,7 @@ fn a_plan_does_not_depend_on_the_number_of_cores() {
     for settings in all() {
         let alone = near(&settings, &[[-3.0, 3.0]], 5).plan(0.3);
         let with_help = near(&settings, &[[-3.0, 3.0]], 5);
-        assert_eq!(with_help.helped(|| with_help.plan(0.3)), alone);
+        assert_eq!(with_help.with_workers(|| with_help.plan(0.3)), alone);
         let other = near(&settings, &[[-3.0, 3.0]], 6);
         assert_ne!(other.plan(0.3), alone);
     }
@@ -372,181 +366,4 @@ fn bad_settings_are_refused_by_name() {
     ] {
         assert_eq!(settings.check(), Err(wanted.to_owned()));
     }
-}
-
-#[test]
-fn normal_numbers_are_normal() {
-    let (mut rng, mut rows) = (rng(7), vec![Rows::splat(0.0); 3]);
-    let mut gaussian = Gaussian::new(rows.len());
-    let mut all = Vec::new();
-    for _ in 0..2000 {
-        gaussian.fill(Arch::new(), &mut rng, &mut rows);
-        all.extend(rows.iter().flat_map(|row| row.0.map(f64::from)));
-    }
-    let count = all.len() as f64;
-    let moment = |k: i32| all.iter().map(|x| x.powi(k)).sum::<f64>() / count;
-    // Five standard errors of each moment of 192 000 numbers.
-    for (k, (wanted, variance)) in [(0.0, 1.0), (1.0, 2.0), (0.0, 15.0), (3.0, 96.0)]
-        .into_iter()
-        .enumerate()
-    {
-        let found = moment(k as i32 + 1);
-        let error = 5.0 * f64::sqrt(variance / count);
-        assert!((found - wanted).abs() < error, "moment {}: {found}", k + 1);
-    }
-    all.sort_by(f64::total_cmp);
-    let normal = Normal::standard();
-    let distance = (all.iter().enumerate())
-        .map(|(k, x)| (normal.cdf(*x) - k as f64 / count).abs())
-        .fold(0.0, f64::max);
-    // Kolmogorov and Smirnov's statistic at one in a thousand.
-    assert!(distance < 1.95 / count.sqrt(), "{distance}");
-    // Neighbours, in lanes and in rows, have nothing to do with each other.
-    let product = rows
-        .windows(2)
-        .flat_map(|pair| (0..W).map(move |l| pair[0][l] * pair[1][l]));
-    assert!(product.sum::<f32>().abs() < 5.0 * (2.0 * W as f32).sqrt());
-}
-
-#[test]
-fn coloured_numbers_have_their_spectrum() {
-    const STEPS: usize = 15;
-    const EXPONENT: f64 = 2.0;
-    let (mut rng, mut rows) = (rng(10), vec![Rows::splat(0.0); 2 * STEPS]);
-    let mut noise = Noise::coloured(STEPS, 2, EXPONENT);
-    let blocks = 500;
-    let count = (blocks * W) as f64;
-    let (mut power, mut variance, mut shared) = ([0.0; 8], [0.0; STEPS], 0.0);
-    for _ in 0..blocks {
-        noise.fill(Arch::new(), &mut rng, &mut rows);
-        for lane in 0..W {
-            let of = |input: usize| -> Vec<f64> {
-                let own = rows.iter().skip(input).step_by(2);
-                own.map(|row| f64::from(row[lane])).collect()
-            };
-            let (sequence, other) = (of(0), of(1));
-            for (frequency, power) in power.iter_mut().enumerate() {
-                let wave = |shift: f64| {
-                    let angle = |step: usize| TAU * (frequency * step) as f64 / STEPS as f64;
-                    let terms = sequence.iter().enumerate();
-                    terms
-                        .map(|(t, x)| x * (angle(t) - shift).cos())
-                        .sum::<f64>()
-                };
-                *power += (wave(0.0).powi(2) + wave(TAU / 4.0).powi(2)) / count;
-            }
-            for (sum, x) in variance.iter_mut().zip(&sequence) {
-                *sum += x * x / count;
-            }
-            shared += sequence[3] * other[3] / count;
-        }
-    }
-    for (frequency, found) in power.iter().enumerate().skip(1) {
-        let ratio = found / power[1] * (frequency as f64).powf(EXPONENT);
-        // Five standard errors of a ratio of two exponential means.
-        assert!(
-            (ratio - 1.0).abs() < 5.0 * (2.0 / count).sqrt(),
-            "{frequency}: {ratio}"
-        );
-    }
-    // The constant wave is as strong as each of the two slowest.
-    let ratio = power[0] / power[1];
-    assert!((ratio - 1.0).abs() < 5.0 * (3.0 / count).sqrt(), "{ratio}");
-    for found in variance {
-        assert!((found - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{found}");
-    }
-    assert!(shared.abs() < 5.0 / count.sqrt(), "{shared}");
-}
-
-fn pendulum(effects: &[FittedEffect]) -> Dynamics {
-    let system = Library::built_in().system(Path::new("pendulum")).unwrap();
-    system.dynamics_with(effects, &[SignForm::DEFAULT])
-}
-
-fn swing_up(method: Method) -> Settings {
-    Settings {
-        horizon: 80,
-        method,
-        ..SETTINGS
-    }
-}
-
-/// The published task, from hanging to upright: 500 steps, of each plan the first 50.
-fn swung_up(method: Method, seed: u64) -> f64 {
-    let equations = pendulum(&[]);
-    let objective = Objective::new("cos(q1)", 1).unwrap();
-    let integrator = Integrator::default();
-    let rollouts = Rollouts::new(&equations, &[], objective.program(), integrator, 0.02);
-    let evaluate = || rollouts.block();
-    let search = Planner::new(&swing_up(method), &[[-3.0, 3.0]], evaluate, &rng(seed));
-    let mut rig = Environment::new(&equations, integrator, 0.02);
-    let (mut state, mut sum) = ([PI, 0.0], 0.0);
-    for begin in (0..500).step_by(50) {
-        let plan = search.plan(Start::new(&state, 0.02 * f64::from(begin)));
-        search.shift(50);
-        for (step, tau) in (begin..).zip(&plan.inputs[..50]) {
-            rig.step(&mut state, tau, 0.02 * f64::from(step));
-            sum += state[0].cos();
-        }
-    }
-    sum
-}
-
-fn all_swung_up(method: Method) -> Vec<f64> {
-    let mut returns: Vec<f64> = (0..9).map(|seed| swung_up(method, seed)).collect();
-    returns.sort_by(f64::total_cmp);
-    returns
-}
-
-#[test]
-fn a_pendulum_is_swung_up_and_held() {
-    // Another implementation reached 304 to 315; a pendulum that is not held ends far below.
-    let cem = all_swung_up(Method::Cem(Cem { elite: 20 }));
-    assert!(cem[0] > 290.0 && cem[4] > 315.0, "{cem:?}");
-    let mppi = all_swung_up(Method::Mppi(Mppi::default()));
-    assert!(mppi[0] > 290.0 && mppi[4] > 315.0, "{mppi:?}");
-    // Motion as slow as the pendulum's own finds the way up with one swing less.
-    let icem = all_swung_up(Method::Icem(Icem::new(20)));
-    assert!(icem[0] > 380.0, "{icem:?}");
-}
-
-/// The same task on a rig whose torque acts 60 ms late, for a planner that knows `model` of it.
-fn swung_up_late(rig: &Dynamics, model: &Dynamics) -> f64 {
-    let objective = Objective::new("cos(q1)", 1).unwrap();
-    let rollouts = Rollouts::new(model, &[], objective.program(), Integrator::RK4, 0.02);
-    let settings = swing_up(Method::Icem(Icem::new(20)));
-    let search = Planner::new(&settings, &[[-3.0, 3.0]], || rollouts.block(), &rng(1));
-    let mut simulator = Simulator::new(rig, RK4);
-    simulator.put(&[PI, 0.0]);
-    let mut sum = 0.0;
-    let time: Vec<f64> = (0..=501).map(|row| 0.02 * (f64::from(row) - 1.0)).collect();
-    // Nothing was commanded before.
-    let mut past = vec![vec![0.0]];
-    for begin in (1..=500).step_by(10) {
-        let measured = [simulator.state[0][0], simulator.state[1][0]];
-        let plan = search.plan(Start::after(&measured, time[begin], &past));
-        search.shift(10);
-        past.extend_from_slice(&plan.inputs[..10]);
-        let tau = [past.iter().map(|tau| tau[0]).collect::<Vec<f64>>()];
-        let commands = Commands::new(rig, &time[..past.len()], &tau);
-        for row in begin..begin + 10 {
-            let (from, held) = (Row([time[row]]), [Row([tau[0][row]])]);
-            simulator.advance(&Hold::lasting([&commands], &held, from, 0.02, 5));
-            sum += simulator.state[0][0].cos();
-        }
-    }
-    sum
-}
-
-#[test]
-fn a_pendulum_is_swung_up_through_a_delay() {
-    let library = Library::built_in();
-    let mut effect = FittedEffect::absent(library.effect("actuator_delay").unwrap(), 0);
-    effect.values[0].0 = 0.06;
-    let late = pendulum(&[effect]);
-    let [knows, does_not] = [&late, &pendulum(&[])].map(|model| swung_up_late(&late, model));
-    assert!(
-        knows > 380.0 && does_not < knows - 5.0,
-        "{knows} {does_not}"
-    );
 }

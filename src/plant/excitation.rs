@@ -3,11 +3,11 @@ use std::f64::consts::TAU;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// The torque that drives a rig: a sum of sines of equal amplitude with random phases, different in each log.
+/// The excitation torque: a multisine of equal amplitudes whose phases are drawn anew for each log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Excitation {
-    /// Size of the torque, one a joint, in N m (or N): each of k sines has this amplitude over the root of k.
+    /// Size of the torque per joint in N m (or N): each of k sines has this amplitude divided by the root of k.
     pub amplitude: Vec<f64>,
     /// Lowest and highest frequency in Hz.
     pub band_hz: [f64; 2],
@@ -15,7 +15,7 @@ pub struct Excitation {
     pub tones: usize,
 }
 
-/// One draw of the phases: `[joint][tone]` of amplitude, angular frequency, phase.
+/// One draw: amplitude, angular frequency and phase, `[joint][tone]`.
 pub(super) struct Tones(Vec<Vec<[f64; 3]>>);
 
 impl Excitation {
@@ -26,8 +26,8 @@ impl Excitation {
         let mut tones = |amplitude: f64| {
             (0..self.tones)
                 .map(|k| {
-                    // One tone in each slice of the band, on a scale of octaves, so that draws differ in
-                    // period as well as in phase.
+                    // One tone in each of equal slices of the band on a logarithmic scale, so that draws differ
+                    // in frequency as well as in phase.
                     #[allow(clippy::cast_precision_loss)]
                     let place = (k as f64 + rng.random::<f64>()) / count;
                     let frequency = low * (high / low).powf(place);

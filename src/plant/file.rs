@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::Excitation;
 use crate::expr::suggestion;
+use crate::files::{beside_or_named, text_or_embedded};
 use crate::model::{FileError, FittedEffect, Library, System};
 
 /// Why a plant cannot be simulated.
@@ -26,7 +27,7 @@ pub enum PlantError {
     Diverged { time_s: f64 },
 }
 
-/// A rig to simulate: a model, its true parameters and hidden effects, how it is driven and measured.
+/// A rig to simulate: its model, true parameters, hidden effects, excitation and sensors.
 #[derive(Debug, Clone)]
 pub struct Plant {
     pub system: System,
@@ -38,15 +39,15 @@ pub struct Plant {
     pub recording: Recording,
 }
 
-/// How the rig is measured.
+/// The sensors of the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensor {
-    /// Rows a second.
+    /// Sampling rate in Hz.
     pub rate_hz: f64,
     /// Standard deviation of the noise on the angles, in rad (or m).
     pub position_noise: f64,
-    /// Step of the encoder in rad (or m); 0 for none.
+    /// Resolution of the encoder in rad (or m); 0 for continuous measurements.
     pub position_step: f64,
 }
 
@@ -79,12 +80,12 @@ pub struct HiddenEffect {
     pub name: String,
     /// Counted from 1.
     pub joint: usize,
-    /// Of its parameters; those that are not given are at their typical value.
+    /// Values of its parameters; the others have their typical values.
     #[serde(flatten)]
     pub values: BTreeMap<String, f64>,
 }
 
-/// Rates, torques and times of a desk-sized rig, for a plant that is given as a model file alone.
+/// Sensors, excitation and recording of a desktop rig, for a plant that is given as a model file alone.
 const USUAL_SENSOR: Sensor = Sensor {
     rate_hz: 100.0,
     position_noise: 1e-3,
@@ -95,23 +96,17 @@ const USUAL_SENSOR: Sensor = Sensor {
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/configs/plants");
 
 impl Plant {
-    /// Read a plant file or, where there is no such file, take the embedded plant of that name. For a model file (or
-    /// the name of an embedded system) it is the rig that it declares with a usual sensor and drive.
+    /// Read a plant file, or take the embedded plant of that name. A model file, or the name of an embedded system,
+    /// gives the rig that the model declares, with the sensors and excitation of a desktop rig.
     ///
     /// # Errors
     /// Unreadable file, unknown key, parameter or effect; messages name place and remedy.
     pub fn read(path: &Path, library: &Library) -> Result<Self, PlantError> {
-        match std::fs::read_to_string(path) {
-            Ok(text) if is_plant(&text) => return Self::from_text(path, &text, library),
-            Ok(_) => return Ok(Self::of_system(library.system(path)?)),
-            Err(_) => {}
-        }
-        let embedded = path
-            .to_str()
-            .and_then(|name| BUILT_IN.get_file(format!("{name}.toml")));
-        match embedded.and_then(|file| file.contents_utf8()) {
-            Some(text) => Self::from_text(path, text, library),
-            None => Ok(Self::of_system(library.system(path)?)),
+        let embedded = |name: &str| BUILT_IN.get_file(format!("{name}.toml"))?.contents_utf8();
+        match text_or_embedded(path, embedded) {
+            Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
+            // A model, or nothing that can be read: the library knows what to say of it.
+            _ => Ok(Self::of_system(library.system(path)?)),
         }
     }
 
@@ -141,13 +136,8 @@ impl Plant {
             message,
         };
         let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
-        let beside = path.parent().unwrap_or(Path::new("")).join(&file.model);
-        let model = if beside.is_file() {
-            &beside
-        } else {
-            &file.model
-        };
-        let mut plant = Self::of_system(library.system(model)?);
+        let model = beside_or_named(path, &file.model);
+        let mut plant = Self::of_system(library.system(&model)?);
         plant.set_parameters(&file.parameters).map_err(wrong)?;
         plant.hide(library, &file.effect)?;
         plant.sensor = file.sensor;
@@ -217,7 +207,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Let effects act.
+    /// Add effects.
     ///
     /// # Errors
     /// As [`Plant::add_effect`].
@@ -229,7 +219,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Let an effect act on a joint (counted from 1); parameters that are not given are at their typical value.
+    /// Add an effect on a joint (counted from 1). Parameters that are not given have their typical values.
     ///
     /// # Errors
     /// Unknown effect, joint or parameter, with what is known.

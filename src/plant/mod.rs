@@ -1,4 +1,4 @@
-//! Simulated rigs: a model with effects that nobody is told about, driven and measured as a rig is.
+//! Simulated rigs: a model with hidden effects, excited and measured as a real rig is.
 
 mod excitation;
 mod file;

@@ -6,10 +6,9 @@ use super::PlantError;
 use crate::model::Dynamics;
 use crate::sim::{Environment, Integrator};
 
-/// A plant under control: a torque is held for a step, then its state is measured.
+/// A plant under control: a torque is held for a step, then the state is measured.
 ///
-/// How it moves within a step is its own affair: its integrator may be far finer than that of the model which plans
-/// for it.
+/// Its integrator may be far finer than that of the model which the planner uses.
 pub struct Rig<'d> {
     environment: Environment<'d>,
     noise: Noise,
@@ -19,7 +18,7 @@ pub struct Rig<'d> {
     steps: u32,
 }
 
-/// Standard deviations of what is added to each measured number; white noise.
+/// Standard deviations of the white noise on each measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Noise {
@@ -62,7 +61,7 @@ impl<'d> Rig<'d> {
         f64::from(self.steps) * self.step_s
     }
 
-    /// What the sensors give for the state.
+    /// The measured state: positions, then velocities, with noise.
     pub fn measure(&mut self, rng: &mut impl Rng) -> Vec<f64> {
         let time_s = self.time_s();
         let shown = self.environment.angles(&self.state, time_s);
@@ -77,7 +76,7 @@ impl<'d> Rig<'d> {
             .collect()
     }
 
-    /// Hold `tau` for a step.
+    /// Hold the torque `tau` for one step.
     ///
     /// # Errors
     /// A plant that diverges.

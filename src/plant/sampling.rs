@@ -23,19 +23,19 @@ pub struct Sampling {
     pub starts: Starts,
 }
 
-/// How the starts of trajectories hang together.
+/// How the starts of trajectories are related.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Starts {
-    /// Each is drawn by itself.
+    /// Each is drawn independently.
     #[default]
     Independent,
-    /// Each second one repeats the one before, torques included, with reversed velocities. In transitions
-    /// nothing odd in the velocities, as friction, then correlates by chance with torques and positions.
+    /// Every second one repeats the one before, torques included, with reversed velocities. Odd functions of the
+    /// velocities, such as friction, are then uncorrelated with torques and positions.
     Mirrored,
 }
 
-/// What one trajectory begins with, and its torques, one row a step.
+/// The start of one trajectory and its torques, `[step][joint]`.
 #[derive(Clone)]
 struct Draw {
     position: Vec<f64>,
@@ -143,7 +143,7 @@ impl Sampling {
             trajectory.states.extend(&state);
             trajectory.inputs.extend(tau);
         }
-        // Nothing is driven any more after the last row.
+        // No torque acts after the last row.
         trajectory.inputs.extend(vec![0.0; joints]);
         Ok(trajectory)
     }
@@ -175,7 +175,7 @@ mod tests {
     use super::{Sampling, Starts};
     use crate::model::Library;
     use crate::plant::Plant;
-    use crate::sim::{Environment, Integrator};
+    use crate::sim::Integrator;
 
     fn sampling() -> Sampling {
         Sampling {

@@ -9,17 +9,17 @@ use crate::lanes::Row;
 use crate::model::Dynamics;
 use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
-/// Dry friction reverses over this speed (rad/s): many times sharper than in any fit.
+/// Velocity over which dry friction reverses (rad/s): much sharper than in any fit.
 const SIGN_WIDTH: f64 = 1e-3;
 
 impl Plant {
-    /// The true equations of motion.
+    /// The true equations of motion, with declared values.
     pub fn dynamics(&self) -> Dynamics {
         let sign = vec![SignForm::Smooth { width: SIGN_WIDTH }; self.system.joints];
         self.system.dynamics_with(&self.effects, &sign)
     }
 
-    /// The same with their true values.
+    /// The true equations of motion with their true values.
     pub fn true_dynamics(&self) -> Dynamics {
         self.dynamics().with_values(self.values())
     }
@@ -62,7 +62,7 @@ impl Plant {
         joined(&self.parameters, &self.effects)
     }
 
-    /// A true state as the sensors read it, which is what the equations are about.
+    /// A true state as the sensors read it: the equations are written in measured angles.
     pub fn as_read(&self, state: &[f64]) -> Vec<f64> {
         let mut start = state.to_vec();
         let sensors = self.effects.iter().filter(|e| e.effect.is_of_sensor());

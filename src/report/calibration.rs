@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::wording::{listed, small, with_unit};
-use crate::closeloop::{Calibration, DetectionLimit, HIDDEN, Smallest};
+use crate::closeloop::{Calibration, DetectionLimit, Smallest};
 use crate::model::{EffectParameter, FittedEffect};
 
 #[derive(Debug, Serialize)]
@@ -148,6 +148,7 @@ fn reason(size: &Smallest) -> Option<&'static str> {
         Smallest::Indistinguishable => {
             Some("indistinguishable from the rest of the model at any size")
         }
+        Smallest::Diverged => Some("not computed: the model diverges with it"),
         Smallest::NotComputed => Some("not computed: no parameter value switches the effect off"),
     }
 }
@@ -164,10 +165,11 @@ pub(super) fn section(calibration: &Calibration) -> String {
         "## What these logs could show\n\n{} were searched like the logs themselves, driven by the torques of the training logs \
          and with the residuals of the fit as noise. {}.\n\n\
          The table gives the smallest size at which the search would name each effect in four of five such sets of logs. As a \
-         check, common effects were hidden in a simulation at {HIDDEN} times that size.\n\n\
+         check, common effects were hidden in a simulation at {} times that size.\n\n\
          | effect | joint | smallest size | share of the top torque | hidden in a simulation |\n|---|---|---|---|---|\n",
         simulations(calibration),
         alarms_in_words(calibration),
+        calibration.hidden,
     );
     for limit in &calibration.limits {
         let entry = smallest(limit, &calibration.top_torque);

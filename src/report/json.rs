@@ -6,8 +6,8 @@ use crate::closeloop::{
     SplitMethod, TakenBack, Verdict,
 };
 use crate::data::Finding as AuditFinding;
-use crate::evaluate::{Assessment, Summary, summarise};
 use crate::model::{FittedEffect, OwnValue, Parameter};
+use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// `report.json`: the outcome with fixed names, for other programs.
 #[derive(Debug, Serialize)]
@@ -47,7 +47,11 @@ struct EffectEntry {
     expression: String,
     parameters: Vec<ParameterEntry>,
     p_value: f64,
-    error_reduction: f64,
+    /// `null` where the refit without the effect failed.
+    error_reduction: Option<f64>,
+    /// Why it failed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_reduction_failure: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -296,7 +300,8 @@ fn effect(finding: &Finding) -> EffectEntry {
         expression: finding.expression.clone(),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
-        error_reduction: finding.error_reduction,
+        error_reduction: finding.error_reduction.as_ref().ok().copied(),
+        error_reduction_failure: (finding.error_reduction.as_ref().err()).map(ToString::to_string),
     }
 }
 
@@ -348,7 +353,7 @@ fn alternative(alternative: &Alternative) -> AlternativeEntry {
         effects: alternative.effects.iter().map(effect_name).collect(),
         reason: alternative.reason.clone(),
         experiment: alternative.experiment(),
-        separation: alternative.separation.clone(),
+        separation: alternative.separation.clone().ok(),
     }
 }
 

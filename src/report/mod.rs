@@ -13,7 +13,7 @@ mod text;
 mod wording;
 
 pub use film::film;
-pub use folder::{WriteError, write, write_whole};
+pub use folder::{WriteError, write};
 pub use json::Report;
 pub use model_file::model_file;
 pub use summary::summary;

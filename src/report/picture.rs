@@ -7,9 +7,9 @@ use super::plot::{
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
 use crate::closeloop::{ForceSample, Outcome, ResidualForce};
 use crate::data::Log;
-use crate::evaluate::{Assessment, Trace, summarise, traces};
 use crate::identify::FitError;
 use crate::model::Dynamics;
+use crate::sim::metric::{Assessment, Trace, summarise, traces};
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
 const SHOWN_S: f64 = 8.0;

@@ -4,7 +4,7 @@ use super::calibration::line;
 use super::text::{headline, proposal_line};
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
-use crate::evaluate::{Assessment, Summary, summarise};
+use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// The answer for a terminal: a few lines, and where the rest is.
 pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
@@ -50,7 +50,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: {before} {unit} {FITTED}; {after} {unit} {WITH_EFFECTS}",
+                "  joint {}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}",
                 j + 1
             );
         }

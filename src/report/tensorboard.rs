@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use prost::Message;
 
-use super::WriteError;
+use crate::files::OutputError;
 
 /// What the first event of a file says.
 const FILE_VERSION: &str = "brain.Event:2";
@@ -54,11 +54,11 @@ impl EventFile {
     ///
     /// # Errors
     /// An unwritable folder, or an event file of the same second in it.
-    pub fn create(folder: &Path, wall_time_s: f64) -> Result<Self, WriteError> {
+    pub fn create(folder: &Path, wall_time_s: f64) -> Result<Self, OutputError> {
         let name = format!("events.out.tfevents.{:010}.residyn", wall_time_s.floor());
         let path = folder.join(name);
         let created = std::fs::create_dir_all(folder).and_then(|()| File::create_new(&path));
-        let file = created.map_err(|source| WriteError::File {
+        let file = created.map_err(|source| OutputError {
             path: path.clone(),
             source,
         })?;
@@ -82,7 +82,7 @@ impl EventFile {
         step: i64,
         wall_time_s: f64,
         value: f64,
-    ) -> Result<(), WriteError> {
+    ) -> Result<(), OutputError> {
         let value = Value {
             tag: tag.to_owned(),
             simple_value: Some(value as f32),
@@ -97,10 +97,10 @@ impl EventFile {
         })
     }
 
-    fn append(&mut self, event: &Event) -> Result<(), WriteError> {
+    fn append(&mut self, event: &Event) -> Result<(), OutputError> {
         // In one piece: a reader of a growing file should not find half a record.
         let written = self.file.write_all(&record(&event.encode_to_vec()));
-        written.map_err(|source| WriteError::File {
+        written.map_err(|source| OutputError {
             path: self.path.clone(),
             source,
         })
@@ -129,7 +129,6 @@ mod tests {
     use prost::Message;
 
     use super::{Event, EventFile, masked_checksum};
-    use crate::report::WriteError;
 
     /// The events of a file, with its checksums checked.
     fn events(bytes: &[u8]) -> Vec<Event> {
@@ -194,6 +193,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         EventFile::create(folder.path(), 7.0).unwrap();
         let error = EventFile::create(folder.path(), 7.9).unwrap_err();
-        assert!(matches!(error, WriteError::File { .. }), "{error}");
+        assert!(error.to_string().contains("cannot be written"), "{error}");
     }
 }

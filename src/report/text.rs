@@ -5,13 +5,10 @@ use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, amount, capitalised, listed, probability,
     reduction, small, value, values,
 };
-use crate::closeloop::{
-    Finding, MOST_EFFECTS, NOTEWORTHY, Outcome, Proposal, ResidualForce, SIGNIFICANT, SplitMethod,
-    UNKNOWN, Verdict,
-};
+use crate::closeloop::{Finding, Outcome, Proposal, ResidualForce, SplitMethod, UNKNOWN, Verdict};
 use crate::data::Severity;
-use crate::evaluate::{Summary, summarise};
 use crate::identify::FitError;
+use crate::sim::metric::{Summary, summarise};
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
@@ -78,7 +75,10 @@ fn effects(findings: &[Finding]) -> String {
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
-            reduction(finding.error_reduction, "error")
+            match &finding.error_reduction {
+                Ok(part) => reduction(*part, "error"),
+                Err(error) => format!("not computed (refit without it: {error})"),
+            }
         );
     }
     out + "\nError reduction: by how much the position error on the test logs, at the middle horizon, is below that of a refit without this effect.\n\n"
@@ -277,6 +277,7 @@ fn confirmed(outcome: &Outcome) -> String {
 
 fn left(outcome: &Outcome) -> String {
     let left = &outcome.remainder.unexplained;
+    let settings = &outcome.given.settings.remainder;
     let p = probability(left.p_value);
     let share = 100.0 * left.omnibus.most().1;
     let structure = match left.place.as_str() {
@@ -286,10 +287,10 @@ fn left(outcome: &Outcome) -> String {
              joint compliance, presliding friction, a periodic disturbance."
         ),
         place if left.is_significant() => format!("The remainder depends on {place} (p = {p})."),
-        _ if left.p_value < SIGNIFICANT => format!(
+        _ if left.p_value < settings.significance => format!(
             "The remainder has structure (p = {p}), but too little to matter: {share:.1} % of the residuals' variance \
              exceeds white noise, and no probe lowers the loss by {:.0} %.",
-            100.0 * NOTEWORTHY
+            100.0 * settings.noteworthy
         ),
         _ => format!("The residuals cannot be told from sensor noise (p = {p})."),
     };
@@ -301,12 +302,13 @@ fn left(outcome: &Outcome) -> String {
     };
     format!(
         "## What is left\n\nOf the residual variance above the sensor noise, {:.1} % is left. {structure}\n{network}\
-         Residual generalised force: {} for the {FITTED}, {} {WITH_EFFECTS} (root mean square over stretches of 0.15 s, \
-         in N m or N).\n\n\
+         Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over stretches of {} s in \
+         N m or N.\n\n\
          ![residual](residual.svg)\n\n{}",
         100.0 * left.fraction,
         force(&outcome.remainder.before),
         force(&outcome.remainder.after),
+        settings.stretch_s,
         outcome
             .remainder
             .proposal
@@ -346,6 +348,7 @@ fn tried(outcome: &Outcome) -> String {
     let mut out = String::from(
         "## What was tried\n\nGain: relative fall of the loss on stretches held out of the fit.\n\n",
     );
+    let most_effects = outcome.given.settings.select.most_effects;
     for (number, round) in outcome.effects.rounds.iter().enumerate() {
         let _ = writeln!(
             out,
@@ -366,7 +369,7 @@ fn tried(outcome: &Outcome) -> String {
         }
         out.push('\n');
     }
-    if outcome.effects.rounds.len() == MOST_EFFECTS
+    if outcome.effects.rounds.len() == most_effects
         && outcome
             .effects
             .rounds
@@ -375,7 +378,7 @@ fn tried(outcome: &Outcome) -> String {
     {
         let _ = writeln!(
             out,
-            "The search stopped at its limit of {MOST_EFFECTS} effects; there may be more.\n"
+            "The search stopped at its limit of {most_effects} effects; there may be more.\n"
         );
     }
     out

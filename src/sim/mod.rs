@@ -1,14 +1,17 @@
 //! Simulation: moving a model through time, in one place for fits, errors, simulated rigs and planners.
 
+pub mod batch;
 mod command;
 mod environment;
 mod integrator;
+pub mod metric;
 mod point;
 mod scheme;
 mod sensors;
 mod simulator;
 mod stepper;
 mod substeps;
+mod window;
 
 pub use command::{Commands, StepTorque};
 pub use environment::Environment;
@@ -19,3 +22,4 @@ pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use simulator::{Hold, Simulator};
 pub use stepper::Stepper;
 pub use substeps::{FIT_S, PREDICTION_S, RIG_S, substeps};
+pub use window::{Window, cut, initial_state};

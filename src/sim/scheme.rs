@@ -51,7 +51,17 @@ pub const RK4: &Scheme = &Scheme {
 };
 
 /// Every scheme. A new one is one more entry here.
-pub const SCHEMES: [&Scheme; 2] = [SEMI_IMPLICIT_EULER, RK4];
+pub const SCHEMES: [&Scheme; 3] = [
+    SEMI_IMPLICIT_EULER,
+    &Scheme {
+        name: "heun",
+        title: "method of Heun",
+        order: 2,
+        stages: &stages([0.0, 1.0], [0.5, 0.5]),
+        semi_implicit: false,
+    },
+    RK4,
+];
 
 impl Scheme {
     /// The scheme of this name.

@@ -1,5 +1,4 @@
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
@@ -7,6 +6,7 @@ use burn::tensor::Device;
 use super::manifest::{FORMAT, Manifest};
 use super::optimizer::Moments;
 use super::{Best, CheckpointError, HybridModel, Training, moments};
+use crate::files::{content_id, end_of_links, folder_of, write_whole};
 use crate::model::{Dynamics, ModelWeights, Origin, SavedModelError, weights};
 
 const MANIFEST: &str = "checkpoint.json";
@@ -39,6 +39,7 @@ pub struct Checkpoint {
 /// # Errors
 /// A directory that cannot be written, or that holds something else than a checkpoint.
 pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
+    let dir = &end_of_links(dir);
     refuse_other_contents(dir)?;
     let moments = training.optimizer.moments();
     let steps = [0, 1].map(|k| moments[k].as_ref().map_or(0, |moments| moments.steps));
@@ -54,15 +55,12 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
         (MODEL, origin.model_toml.as_bytes()),
         (MANIFEST, &json),
     ];
-    let parent = match dir.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
+    let parent = folder_of(dir);
     fs::create_dir_all(parent).map_err(io("create the directory", parent))?;
     let fresh = fresh_beside(dir, parent).map_err(io("create a directory in", parent))?;
     for (name, bytes) in files {
         let path = fresh.path().join(name);
-        write(&path, bytes).map_err(io("write", &path))?;
+        write_whole(&path, bytes).map_err(|error| io("write", &path)(error.source))?;
     }
     replace(dir, fresh)
 }
@@ -81,13 +79,6 @@ fn fresh_beside(dir: &Path, parent: &Path) -> std::io::Result<tempfile::TempDir>
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
     builder.prefix(&name).rand_bytes(0).tempdir_in(parent)
-}
-
-/// Write and wait until it is on the disk: a renaming must not overtake the contents.
-fn write(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = fs::File::create_new(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
 }
 
 fn refuse_other_contents(dir: &Path) -> Result<(), CheckpointError> {
@@ -146,6 +137,7 @@ impl Checkpoint {
     /// # Errors
     /// A missing or damaged file, or another format.
     pub fn load(dir: &Path) -> Result<Self, CheckpointError> {
+        let dir = &end_of_links(dir);
         let set_aside = previous(dir);
         let dir = if !dir.exists() && set_aside.exists() {
             set_aside
@@ -176,11 +168,17 @@ impl Checkpoint {
     /// # Errors
     /// As [`Checkpoint::load`], or a directory that holds something else.
     pub fn find(dir: &Path) -> Result<Option<Self>, CheckpointError> {
+        let dir = &end_of_links(dir);
         refuse_other_contents(dir)?;
         if dir.join(MANIFEST).is_file() || (!dir.exists() && previous(dir).exists()) {
             return Self::load(dir).map(Some);
         }
         Ok(None)
+    }
+
+    /// A hash of the trained model's numbers.
+    pub fn fingerprint(&self) -> String {
+        content_id(&weights::to_bytes(&self.manifest.shape, &self.weights))
     }
 
     /// The trained model, on `device`. `dynamics` is what the checkpoint's model file says.

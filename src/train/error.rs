@@ -7,7 +7,9 @@ use crate::model::SavedModelError;
 /// Why a training run cannot start or go on.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    #[error("no device `{name}`; this build has {known} (cuda: build with `--features cuda`)")]
+    #[error(
+        "no device `{name}`; this build has {known} (cuda: only in a build with the Cargo feature `cuda`)"
+    )]
     Device { name: String, known: String },
     #[error(transparent)]
     Model(#[from] HybridError),

@@ -15,6 +15,7 @@ mod manifest;
 mod moments;
 mod optimizer;
 mod penalty;
+pub mod recipe;
 mod residual;
 mod segments;
 mod settings;

@@ -1,4 +1,3 @@
-use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -92,7 +91,7 @@ fn fit_settings(settings: &LearnSettings) -> FitSettings {
             alpha: settings.alpha,
         },
         integrator: Integrator::RK4,
-        record_every: NonZeroUsize::new(10).expect("not zero"),
+        record_every: settings.record_every,
         ..FitSettings::default()
     }
 }

@@ -3,6 +3,7 @@ use std::sync::Arc;
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::{Backend, Blocks, Frame, TrainError};
+use crate::files::content_id;
 use crate::model::{Angles, InputScaling};
 
 /// Why rows of numbers are no segments.
@@ -202,17 +203,14 @@ impl Segments {
         Ok(())
     }
 
-    /// A number that tells apart segments of other contents: FNV-1a over all bits. It finds changed
-    /// data; it is no protection against anyone.
-    pub fn fingerprint(&self) -> u64 {
+    /// A hash of all numbers, which tells segments of other contents apart.
+    pub fn fingerprint(&self) -> String {
         let numbers = [&self.states, &self.inputs, &self.dt, &self.start];
         let numbers = numbers.into_iter().flatten().map(|x| x.to_bits());
         #[allow(clippy::cast_possible_truncation)] // few joints and steps
         let shape = [self.joints as u32, self.steps as u32];
         let bytes = shape.into_iter().chain(numbers).flat_map(u32::to_le_bytes);
-        bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        })
+        content_id(&bytes.collect::<Vec<u8>>())
     }
 
     /// Mean and spread of the features that a network sees, over all steps.

@@ -3,10 +3,9 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::per_log::values_on;
-use crate::closeloop::select::{FALSE_ALARM, SIGNIFICANT_ALONE};
-use crate::closeloop::select::{PLAIN, WORTHWHILE};
 use crate::closeloop::select::{candidates, starts};
 use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::settings::Settings;
 use crate::closeloop::split::set_aside;
 use crate::closeloop::study::Study;
 use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty};
@@ -18,7 +17,7 @@ pub struct DetectionLimit {
     /// The effect, absent.
     pub effect: FittedEffect,
     pub smallest: Smallest,
-    /// What was named with the effect at [`HIDDEN`](super::HIDDEN) times that size; `None` where it was not tried.
+    /// What was named with the effect at a multiple of that size; `None` where it was not tried.
     pub named: Option<Vec<FittedEffect>>,
 }
 
@@ -40,13 +39,9 @@ pub enum Smallest {
     Indistinguishable,
     /// No parameter at zero switches the effect off, so that its size has no scale to start from.
     NotComputed,
+    /// The model diverges with the effect.
+    Diverged,
 }
-
-/// Share of logs like these in which an effect of the smallest size is to be named: the standard normal quantile
-/// of 80 %.
-const POWER: f64 = 0.841_6;
-/// An effect of which less than this share of the information is its own is not told from the rest of the model.
-const OWN: f64 = 1e-6;
 
 /// For each effect that could join an accepted model, the smallest size that the search would name.
 ///
@@ -58,14 +53,14 @@ pub(super) fn detection_limits(
     library: &[Effect],
 ) -> Result<Vec<DetectionLimit>, FitError> {
     // The search chooses on this part alone.
-    let (chosen_by, _) = set_aside(study.logs);
+    let (chosen_by, _) = set_aside(study.logs, study.settings);
     let mut part = study.on(&chosen_by);
     part.identifiability = study.identifiability.clone();
     let look = Look::new(&part, accepted)?;
     let all = candidates(&part, library, &accepted.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
     #[allow(clippy::cast_precision_loss)] // few trials
-    let level = FALSE_ALARM / trials.max(1) as f64;
+    let level = study.settings.select.false_alarm / trials.max(1) as f64;
     Ok(all
         .into_iter()
         .map(|candidate| {
@@ -111,7 +106,7 @@ impl<'a> Look<'a> {
             locals.clone(),
             scale,
         )?;
-        let loss = left_out_losses(&fit, &folds(&study.shooting)).iter().sum();
+        let loss = left_out_losses(&fit, &folds(study)).iter().sum();
         Ok(Self {
             study,
             accepted,
@@ -139,21 +134,28 @@ impl<'a> Look<'a> {
             parameter.per_log = false;
         }
         let starts = starts(&common);
-        let sizes = starts
+        let mut none = Smallest::Indistinguishable;
+        let tried = starts
             .iter()
-            .flat_map(|start| switches.iter().map(move |&switch| (start, switch)))
+            .flat_map(|start| switches.iter().map(move |&switch| (start, switch)));
+        let sizes: Vec<(usize, Vec<f64>)> = tried
             .filter_map(|(start, switch)| {
-                let size = self.smallest(start, switch, tested, level)?;
+                let Ok(size) = self.smallest(start, switch, tested, level) else {
+                    none = Smallest::Diverged;
+                    return None;
+                };
                 let mut values: Vec<f64> = start.values.iter().map(|(value, _)| *value).collect();
-                values[switch] = size;
+                values[switch] = size?;
                 (candidate.effect.is_valid(&values)).then_some((switch, values))
-            });
+            })
+            .collect();
         let multiple =
             |(switch, values): &(usize, Vec<f64>)| values[*switch] / parameters[*switch].typical;
-        sizes
+        (sizes.into_iter())
             .min_by(|a, b| multiple(a).total_cmp(&multiple(b)))
-            .map_or(Smallest::Indistinguishable, |(switch, values)| {
-                Smallest::Detectable { switch, values }
+            .map_or(none, |(switch, values)| Smallest::Detectable {
+                switch,
+                values,
             })
     }
 
@@ -164,23 +166,32 @@ impl<'a> Look<'a> {
         switch: usize,
         switches: usize,
         level: f64,
-    ) -> Option<f64> {
+    ) -> Result<Option<f64>, FitError> {
         let fit = self.with(start, switch)?;
-        let information = own_information(&fit)?;
-        let known = uncertainty(&self.study.shooting, &fit);
+        Ok(self.smallest_by(&fit, switches, level))
+    }
+
+    /// The smallest size of the last free value of a fit; `None` where the motion does not tell it from the others.
+    fn smallest_by(&self, fit: &Fit, switches: usize, level: f64) -> Option<f64> {
+        let Settings {
+            select, calibrate, ..
+        } = self.study.settings;
+        let power = calibrate.power;
+        let information = own_information(fit, calibrate.own_information)?;
+        let known = uncertainty(&self.study.shooting, fit);
         let last = fit.columns.len() - 1;
         let deviation = known.covariance[(last, last)].sqrt();
         let needed = |p: f64, gain: f64| {
             let significant = critical(p, switches, known.blocks)? * deviation;
             let worthwhile = (2.0 * self.loss * gain / (1.0 - gain) / information).sqrt();
-            Some(significant.max(worthwhile) + POWER * deviation)
+            Some(significant.max(worthwhile) + power * deviation)
         };
-        let plain = needed(SIGNIFICANT_ALONE, PLAIN)?;
-        Some(needed(level, WORTHWHILE)?.min(plain))
+        let plain = needed(select.significant_alone, select.plain)?;
+        Some(needed(level, select.worthwhile)?.min(plain))
     }
 
     /// The accepted model with one more free value, a switch of the effect, at zero.
-    fn with(&self, start: &FittedEffect, switch: usize) -> Option<Fit> {
+    fn with(&self, start: &FittedEffect, switch: usize) -> Result<Fit, FitError> {
         let accepted = self.accepted;
         let mut effects = accepted.effects.clone();
         effects.push(start.clone());
@@ -195,12 +206,11 @@ impl<'a> Look<'a> {
             self.locals.clone(),
             accepted.fit.scale,
         )
-        .ok()
     }
 }
 
 /// Information on the last free value, the others free as well; `None` where it is no more than rounding.
-fn own_information(fit: &Fit) -> Option<f64> {
+fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     let last = fit.columns.len() - 1;
     let mut terms = fit.nothing();
     fit.reduced
@@ -216,7 +226,7 @@ fn own_information(fit: &Fit) -> Option<f64> {
     let cross = DVector::from_fn(last, |i, _| scaled(i, last));
     let explained = cross.dot(&(others.pseudo_inverse(1e-12).ok()? * &cross));
     let own = 1.0 - explained;
-    (own > OWN && unit[last] > 0.0).then(|| own * all[(last, last)])
+    (own > least && unit[last] > 0.0).then(|| own * all[(last, last)])
 }
 
 /// Standard deviations from zero at which one of so many switches are significant at level `p`: the threshold of

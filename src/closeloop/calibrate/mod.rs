@@ -28,12 +28,12 @@ pub struct Calibration {
     /// In how many of them something was left that nothing explains.
     pub unexplained: usize,
     pub limits: Vec<DetectionLimit>,
+    /// Effects were hidden at this multiple of their smallest size.
+    pub hidden: f64,
     /// Of each joint in the training logs.
     pub top_torque: Vec<f64>,
 }
 
-/// Effects are hidden at this multiple of their smallest size.
-pub const HIDDEN: f64 = 1.5;
 /// Effects that are hidden: those that most rigs have.
 const COMMON: [&str; 4] = [
     "viscous_friction",
@@ -61,13 +61,13 @@ impl Calibration {
 }
 
 /// The effect to hide, if it is one of those that are.
-fn hidden(limit: &DetectionLimit) -> Option<FittedEffect> {
+fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
     let Smallest::Detectable { switch, values } = &limit.smallest else {
         return None;
     };
     let mut hidden = limit.effect.clone();
     hidden.values = values.iter().map(|value| (*value, None)).collect();
-    hidden.values[*switch].0 *= HIDDEN;
+    hidden.values[*switch].0 *= multiple;
     COMMON
         .contains(&hidden.effect.name.as_str())
         .then_some(hidden)
@@ -96,7 +96,10 @@ pub fn calibrate(
 ) -> Result<Calibration, StudyError> {
     let simulated = SimulatedLogs::new(study, accepted)?;
     let mut limits = detection_limits(study, accepted, library.effects())?;
-    let tried = limits.iter().filter(|limit| hidden(limit).is_some());
+    let multiple = study.settings.calibrate.hidden;
+    let tried = limits
+        .iter()
+        .filter(|limit| hidden(limit, multiple).is_some());
     let mut repeat = Repeat {
         study,
         library,
@@ -119,7 +122,7 @@ pub fn calibrate(
         named.push(repeat.named(&found));
     }
     for limit in &mut limits {
-        if let Some(effect) = hidden(limit)
+        if let Some(effect) = hidden(limit, multiple)
             && let Some(logs) = simulated.draw(&[effect], rng)
         {
             let text = format!("simulation with {}", limit.effect.label());
@@ -131,6 +134,7 @@ pub fn calibrate(
         named,
         unexplained,
         limits,
+        hidden: multiple,
         top_torque: study.top_torque.clone(),
     })
 }

@@ -29,7 +29,7 @@ impl<'a> SimulatedLogs<'a> {
     /// # Errors
     /// A model that diverges on the logs, or logs without a window.
     pub fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let apart = apart(study.logs, &study.shooting.windows);
+        let apart = apart(study);
         let rig = study.on(&apart);
         let values = values_on(&apart, &accepted.declared, &accepted.effects);
         let states = rig.shooting.initial_locals(0);
@@ -88,7 +88,9 @@ impl<'a> SimulatedLogs<'a> {
 
 /// The rows of the windows alone. Before each stands one row at the edge of what the estimate of its start state
 /// reads, and before that a pause that no estimate and no window spans.
-fn apart(logs: &[Log], windows: &[Window]) -> Vec<Log> {
+fn apart(study: &Study<'_>) -> Vec<Log> {
+    let pause = study.settings.calibrate.pause;
+    let windows = &study.shooting.windows;
     let stretch = |index: usize, log: &Log| {
         let reach = half_width_s(log.median_step());
         let mut out = Log {
@@ -105,7 +107,7 @@ fn apart(logs: &[Log], windows: &[Window]) -> Vec<Log> {
             let later = out
                 .time
                 .last()
-                .map_or(0.0, |last| last + PAUSE * reach - log.time[before]);
+                .map_or(0.0, |last| last + pause * reach - log.time[before]);
             for row in std::iter::once(before).chain(window.first..=window.last) {
                 out.time.push(log.time[row] + later);
                 for j in 0..log.joints() {
@@ -117,12 +119,7 @@ fn apart(logs: &[Log], windows: &[Window]) -> Vec<Log> {
         }
         out
     };
-    logs.iter()
-        .enumerate()
+    (study.logs.iter().enumerate())
         .map(|(index, log)| stretch(index, log))
         .collect()
 }
-
-/// Length of a pause in half widths of an estimate, of which each is four median steps or more: windows end at
-/// pauses of five.
-const PAUSE: f64 = 1.5;

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
 use super::*;
+use crate::closeloop::settings::Settings;
 use crate::plant::Plant;
 
 const RIG: &str = r#"
@@ -51,7 +52,8 @@ fn pendulum() -> System {
 #[test]
 fn the_windows_of_the_logs_are_found_again() {
     let (system, logs) = (pendulum(), logs("", 0));
-    let mut study = Study::new(&system, &logs);
+    let settings = Settings::default();
+    let mut study = Study::new(&system, &logs, &settings);
     let accepted = study.fit_declared().unwrap();
     let simulated = SimulatedLogs::new(&study, &accepted).unwrap();
     let drawn = simulated
@@ -90,7 +92,8 @@ fn the_windows_of_the_logs_are_found_again() {
 #[test]
 fn nothing_is_named_where_nothing_is_missing_and_the_hidden_is() {
     let (system, library, logs) = (pendulum(), Library::built_in(), logs("", 0));
-    let mut study = Study::new(&system, &logs);
+    let settings = Settings::default();
+    let mut study = Study::new(&system, &logs, &settings);
     let accepted = study.fit_declared().unwrap();
     let repeat = |runs: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -116,7 +119,8 @@ fn friction_is_named_from_about_its_smallest_size_on() {
     const SEEDS: u64 = 4;
     let (system, library) = (pendulum(), Library::built_in());
     let bare = logs("", 0);
-    let mut study = Study::new(&system, &bare);
+    let settings = Settings::default();
+    let mut study = Study::new(&system, &bare, &settings);
     let accepted = study.fit_declared().unwrap();
     let limits = detection_limits(&study, &accepted, library.effects()).unwrap();
     let friction = |limit: &&DetectionLimit| limit.effect.effect.name == "coulomb_friction";
@@ -128,7 +132,7 @@ fn friction_is_named_from_about_its_smallest_size_on() {
     let named = |level: f64| {
         let named = |seed: &u64| {
             let logs = logs(&coulomb(level), 100 + seed);
-            let mut study = Study::new(&system, &logs);
+            let mut study = Study::new(&system, &logs, &settings);
             let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
             let found = find(&mut study, &library, rng, &mut |_| {}).unwrap();
             let effects = found.after.effects.iter();

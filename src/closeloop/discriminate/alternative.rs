@@ -1,3 +1,5 @@
+use thiserror::Error;
+
 use super::separation::{Separation, separation};
 use crate::closeloop::find::Found;
 use crate::closeloop::select::Rival;
@@ -13,12 +15,18 @@ pub struct Alternative {
     /// The one of them that the set reported does not have.
     pub effect: FittedEffect,
     pub reason: String,
-    /// What would tell it from the one reported; simulated for the few best alternatives.
-    pub separation: Option<Separation>,
+    /// The experiment that would tell it from the one reported, or why none was simulated.
+    pub separation: Result<Separation, NotSimulated>,
 }
 
-/// Experiments are simulated for so many alternatives, the best ones: each costs as much as a few fits.
-const SIMULATED: usize = 3;
+/// Why no experiment was simulated against an alternative.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum NotSimulated {
+    #[error("not simulated: others do as well and come first")]
+    Rank,
+    #[error("not simulated: a model diverges on the present motion")]
+    Diverged,
+}
 
 /// The sets of effects that do as well as the one that stood, the best first; those of which a part was taken back
 /// are none. For the best of them the experiment that tells them from it is simulated.
@@ -37,18 +45,19 @@ pub(in crate::closeloop) fn discriminate(
         .collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let alternative = |(rank, rival): (usize, &Rival)| {
-        let separation = (rank < SIMULATED).then(|| {
-            let text = format!("simulating experiments against {}", rival.effect.label());
-            progress(Progress::within(Stage::Discriminate, &text));
-            separation(study, model, rival)
-        });
-        Alternative::of(rival, separation.flatten())
+        if rank >= study.settings.discriminate.alternatives {
+            return Alternative::of(rival, Err(NotSimulated::Rank));
+        }
+        let text = format!("simulating experiments against {}", rival.effect.label());
+        progress(Progress::within(Stage::Discriminate, &text));
+        let separation = separation(study, model, rival).ok_or(NotSimulated::Diverged);
+        Alternative::of(rival, separation)
     };
     rivals.into_iter().enumerate().map(alternative).collect()
 }
 
 impl Alternative {
-    fn of(rival: &Rival, separation: Option<Separation>) -> Self {
+    fn of(rival: &Rival, separation: Result<Separation, NotSimulated>) -> Self {
         let chosen = rival.instead_of.label();
         let reason = if rival.contains_chosen() {
             format!("contains {chosen} and explains these logs no better")
@@ -70,9 +79,9 @@ impl Alternative {
 
     /// The experiment that tells, in a sentence.
     pub fn experiment(&self) -> String {
-        self.separation.as_ref().map_or_else(
-            || "not simulated: others do as well and come first".to_owned(),
-            Separation::text,
-        )
+        match &self.separation {
+            Ok(separation) => separation.text(),
+            Err(reason) => reason.to_string(),
+        }
     }
 }

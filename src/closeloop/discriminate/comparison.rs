@@ -6,28 +6,19 @@ use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::per_log::values_on;
 use crate::closeloop::select::Rival;
-use crate::closeloop::study::{Study, WINDOW_S};
+use crate::closeloop::settings::DiscriminateSettings;
+use crate::closeloop::study::Study;
 use crate::data::Log;
 use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect};
-
-/// Twice the loss by which the true model must lead for the other to fall behind by two standard errors with a
-/// probability of 95 %: the lead has the mean of half and the standard deviation of the root of this number.
-const NEEDED: f64 = 4.0 * (2.0 + 1.645) * (2.0 + 1.645);
-/// Motion faster than so many times the top speed of the logs is not what the rig was built for.
-const FASTEST: f64 = 5.0;
-/// Windows by which the present logs are represented.
-const PRESENT: usize = 40;
-/// Finer than this (rad or m) no position is measured.
-const FINEST: f64 = 1e-6;
-/// Scale of the residuals in refits: so large that the robust loss is plain least squares.
-const SCALE: f64 = 100.0;
 
 /// One of two explanations.
 pub(super) struct Hypothesis {
     dynamics: Dynamics,
     /// What differs by log, by the logs of the study.
     values: Values,
+    /// Of the residuals in refits.
+    scale: f64,
 }
 
 impl Hypothesis {
@@ -35,6 +26,7 @@ impl Hypothesis {
         Self {
             dynamics: study.system.dynamics_with(effects, &study.sign),
             values: values_on(study.logs, declared, effects),
+            scale: study.settings.discriminate.scale,
         }
     }
 
@@ -53,12 +45,13 @@ impl Hypothesis {
         Self {
             dynamics: payload.map_or_else(|| self.dynamics.clone(), |p| p.on(&self.dynamics)),
             values: self.values.clone(),
+            scale: self.scale,
         }
     }
 
     /// What it says the rig does; `None` where it diverges.
-    fn simulate(&self, motions: &[Motion]) -> Option<Record> {
-        Record::of(motions, &self.dynamics, &self.values, WINDOW_S)
+    fn simulate(&self, motions: &[Motion], window_s: f64) -> Option<Record> {
+        Record::of(motions, &self.dynamics, &self.values, window_s)
     }
 
     /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
@@ -81,7 +74,7 @@ impl Hypothesis {
             common: self.values.common.clone(),
             own: origins.iter().enumerate().flat_map(own).collect(),
         };
-        let scale = Some(SCALE);
+        let scale = Some(self.scale);
         fit(shooting, &self.dynamics, &active, values, locals, scale).ok()
     }
 }
@@ -127,22 +120,23 @@ impl<'a> Comparison<'a> {
         truth: Hypothesis,
         other: Hypothesis,
     ) -> Option<Self> {
+        let settings = &study.settings.discriminate;
         let noise = &study.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
-            .map(|noise| (noise * model.fit.scale).max(FINEST))
+            .map(|noise| (noise * model.fit.scale).max(settings.finest))
             .collect();
-        let motions: Vec<Motion> = spread(study.shooting.windows.len(), PRESENT)
+        let motions: Vec<Motion> = spread(study.shooting.windows.len(), settings.present_windows)
             .into_iter()
             .map(|w| window_of(study, model, w))
             .collect();
-        let present = truth.simulate(&motions)?;
+        let present = truth.simulate(&motions, study.settings.fit.window_s)?;
         let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
         let found = other.refit(&shooting, &present.origins, present.starts(0..))?;
         let loss = loss_of(&found);
         let windows = study.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
         // The logs did not tell, whatever the noise says: they hold no more than was needed.
-        let too_sure = loss / present.duration_s(0..) * all_s / NEEDED;
+        let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
         let differences = differences(&shooting, &other, &found, 0);
         Some(Self {
             inflation: inflation(study, model).max(too_sure),
@@ -170,6 +164,10 @@ impl<'a> Comparison<'a> {
         changes.chain(loaded).collect()
     }
 
+    fn settings(&self) -> &DiscriminateSettings {
+        &self.study.settings.discriminate
+    }
+
     fn payloads(&self) -> Vec<Payload> {
         let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
@@ -179,6 +177,7 @@ impl<'a> Comparison<'a> {
             &truth.dynamics,
             &truth.values.common,
             declared,
+            self.settings().payload,
             2.0 * latest_s + 10.0,
         )
     }
@@ -199,7 +198,7 @@ impl<'a> Comparison<'a> {
     fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
-            .simulate(&experiment.motions)
+            .simulate(&experiment.motions, self.study.settings.fit.window_s)
             .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
         let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
@@ -217,14 +216,15 @@ impl<'a> Comparison<'a> {
             difference: differences[joint],
             present: self.differences[joint],
             noise: self.noise[joint],
-            seconds: NEEDED * self.inflation / rate,
+            seconds: self.settings().lead * self.inflation / rate,
         })
     }
 
     fn is_possible(&self, record: &Record, turns: Option<usize>) -> bool {
+        let fastest = self.settings().fastest;
         let slow = |log: &Log| {
             let mut joints = log.qd.iter().zip(&self.study.top_speed);
-            joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= FASTEST * top))
+            joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= fastest * top))
         };
         let turned = |j: usize| {
             let mut motions = record.motions.iter();
@@ -259,7 +259,7 @@ fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
 
 /// Twice the loss of a fit, in units of the noise.
 fn loss_of(fit: &Fit) -> f64 {
-    2.0 * SCALE * SCALE * fit.cost
+    2.0 * fit.scale * fit.scale * fit.cost
 }
 
 /// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.

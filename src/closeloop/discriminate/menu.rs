@@ -121,15 +121,6 @@ const MENU: [MenuItem; 12] = [
     ),
 ];
 
-/// Encoders that give a new value after less than this (s) are taken to be read as often as they can be.
-const OFTEN_S: f64 = 4e-3;
-/// Length of the motions in s: long enough for another torque to show, short enough that no controller is missed.
-const MOTION_S: f64 = 2.0;
-/// Period of the ramps in s.
-const RAMPS_S: f64 = 8.0;
-/// Motions of one experiment.
-const MOTIONS: usize = 10;
-
 /// An experiment ready to be simulated.
 pub(super) struct Experiment {
     pub text: String,
@@ -169,7 +160,10 @@ impl MenuItem {
             Drive::Logged { .. } => study.top_torque.iter().any(|torque| *torque > 0.0),
             _ => study.top_torque[joint] > 0.0,
         };
-        let coarse = study.logs.iter().all(|log| log.median_step() >= OFTEN_S);
+        let coarse = study
+            .logs
+            .iter()
+            .all(|log| log.median_step() >= study.settings.discriminate.fastest_sampling_s);
         (undriven || driven)
             && (self.finer == 1 || coarse)
             && !(self.turns && (study.system.prismatic[joint] || goes_round(study, joint)))
@@ -196,14 +190,15 @@ impl MenuItem {
     }
 
     fn motions(&self, study: &Study<'_>, model: &Fitted, joint: usize) -> Vec<Motion> {
+        let motions = study.settings.discriminate.motions;
         let windows = &study.shooting.windows;
         let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
         let starts: Vec<usize> = match self.start {
             Start::Rest => (0..windows.len())
                 .filter(first_of_log)
-                .take(MOTIONS)
+                .take(motions)
                 .collect(),
-            _ => spread(windows.len(), MOTIONS),
+            _ => spread(windows.len(), motions),
         };
         starts
             .into_iter()
@@ -213,12 +208,13 @@ impl MenuItem {
 
     /// One motion that begins like window `w` of the logs.
     fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: usize) -> Motion {
+        let settings = &study.settings.discriminate;
         let window = study.shooting.windows[w];
         let log = &study.logs[window.log];
         let step_s = log.median_step() / f64::from(self.finer);
         let length_s = match self.drive {
-            Drive::Ramps(_) => RAMPS_S,
-            _ => MOTION_S,
+            Drive::Ramps(_) => settings.ramps_s,
+            _ => settings.motion_s,
         };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (length_s / step_s).round() as usize;
@@ -247,7 +243,8 @@ impl MenuItem {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
                 Drive::Added(share) => with(logged, joint, share * study.top_torque[joint]),
                 Drive::Ramps(share) => {
-                    let torque = share * study.top_torque[joint] * triangle(since / RAMPS_S);
+                    let torque =
+                        share * study.top_torque[joint] * triangle(since / settings.ramps_s);
                     with(logged.map(|_| 0.0), joint, torque)
                 }
                 Drive::Nothing => logged.map(|_| 0.0).collect(),

@@ -7,6 +7,6 @@ mod motion;
 mod payload;
 mod separation;
 
-pub use self::alternative::Alternative;
 pub(super) use self::alternative::discriminate;
+pub use self::alternative::{Alternative, NotSimulated};
 pub use self::separation::Separation;

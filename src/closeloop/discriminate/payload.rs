@@ -6,7 +6,9 @@ use crate::model::{Dynamics, Parameter};
 pub(super) struct Payload {
     /// Index of the parameter.
     pub parameter: usize,
-    /// In the parameter's unit.
+    /// Of the parameter.
+    pub share: f64,
+    /// The same in the parameter's unit.
     pub extra: f64,
     /// Logs with the payload are this much (s) later than they would be.
     pub delay_s: f64,
@@ -14,16 +16,20 @@ pub(super) struct Payload {
 
 /// Units of what a payload adds to.
 const OF_MASS: [&str; 2] = ["kg", "kg m^2"];
-/// Share of the parameter that the payload adds.
-const SHARE: f64 = 0.5;
-
 impl Payload {
     /// A payload for each of the first `declared` parameters that one can add to.
-    pub fn all(dynamics: &Dynamics, values: &[f64], declared: usize, delay_s: f64) -> Vec<Self> {
+    pub fn all(
+        dynamics: &Dynamics,
+        values: &[f64],
+        declared: usize,
+        share: f64,
+        delay_s: f64,
+    ) -> Vec<Self> {
         let carries = |k: &usize| OF_MASS.contains(&dynamics.parameters[*k].unit.as_str());
         let of = |parameter: usize| Self {
             parameter,
-            extra: SHARE * values[parameter],
+            share,
+            extra: share * values[parameter],
             delay_s,
         };
         (0..declared).filter(carries).map(of).collect()
@@ -31,7 +37,7 @@ impl Payload {
 
     pub fn text(&self, dynamics: &Dynamics) -> String {
         let Parameter { name, unit, .. } = &dynamics.parameters[self.parameter];
-        let percent = 100.0 * SHARE;
+        let percent = 100.0 * self.share;
         format!(
             "a payload that raises `{name}` by a known {:.3} {unit} ({percent:.0} %)",
             self.extra

@@ -3,6 +3,7 @@ use serde::Serialize;
 use super::comparison::{Comparison, Hypothesis, Trial};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::Rival;
+use crate::closeloop::settings::DiscriminateSettings;
 use crate::closeloop::study::Study;
 
 /// How far two explanations differ in the experiment that tells them apart best.
@@ -25,19 +26,13 @@ pub struct Separation {
     slides: bool,
 }
 
-/// Below this length in s an experiment is not worth shortening.
-const SHORT_S: f64 = 10.0;
-/// Nobody records for longer than this (s) to tell two explanations.
-const LONG_S: f64 = 600.0;
-/// A difference below this share of the noise is less than what no model has right.
-const VISIBLE: f64 = 0.1;
-
 /// The experiment that would tell a rival from the model chosen, by T-optimality (Atkinson and Fedorov 1975): each
 /// experiment of the menu is simulated with one of the two, the other is refitted to it and to the present logs
 /// together, all its parameters and start states free, and what then still differs is weighed against the noise.
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
 pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
+    let settings = &study.settings.discriminate;
     let chosen = Hypothesis::new(study, &model.effects, &model.declared);
     let other = Hypothesis::of_rival(study, model, rival);
     let comparison = if rival.contains_chosen() {
@@ -48,8 +43,8 @@ pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Op
     let mut joints = vec![rival.effect.joint, rival.instead_of.joint];
     joints.dedup();
     let trials: Vec<Trial> = comparison.trials(model, &joints);
-    let telling = trials.iter().filter(|trial| trial.tells());
-    let best = telling.min_by(|a, b| a.worth().total_cmp(&b.worth()));
+    let telling = trials.iter().filter(|trial| trial.tells(settings));
+    let best = telling.min_by(|a, b| a.worth(settings).total_cmp(&b.worth(settings)));
     let widest = (trials.iter()).max_by(|a, b| a.deviation().total_cmp(&b.deviation()))?;
     let shown = best.unwrap_or(widest);
     Some(Separation {
@@ -58,7 +53,7 @@ pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Op
         difference_rad: shown.difference,
         present_difference_rad: shown.present,
         noise_rad: shown.noise,
-        seconds: best.map(|trial| trial.worth().ceil()),
+        seconds: best.map(|trial| trial.worth(settings).ceil()),
         slides: study.system.prismatic[shown.joint],
     })
 }
@@ -91,12 +86,12 @@ impl Separation {
 
 impl Trial {
     /// What the best experiment has least of: seconds, as far as they matter.
-    fn worth(&self) -> f64 {
-        self.seconds.max(SHORT_S)
+    fn worth(&self, settings: &DiscriminateSettings) -> f64 {
+        self.seconds.max(settings.short_s)
     }
 
-    fn tells(&self) -> bool {
-        self.seconds < LONG_S && self.deviation() > VISIBLE
+    fn tells(&self, settings: &DiscriminateSettings) -> bool {
+        self.seconds < settings.long_s && self.deviation() > settings.visible
     }
 
     fn deviation(&self) -> f64 {

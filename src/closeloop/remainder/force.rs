@@ -20,10 +20,6 @@ pub struct ForceSample {
     pub force: Vec<f64>,
 }
 
-/// Length of the stretches in s: short against a swing, long enough that encoder noise of 1 mrad makes an
-/// error of 0.3 rad/s^2.
-const STRETCH_S: f64 = 0.15;
-
 /// The residual generalised force along the logs, found on trajectories: no measurement is differentiated. Angles are
 /// within the turn where a joint makes more than one.
 ///
@@ -34,7 +30,7 @@ pub(super) fn residual_force(
     model: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {
     let joints = study.system.joints;
-    let windows = cut(study.logs, STRETCH_S);
+    let windows = cut(study.logs, study.settings.remainder.stretch_s);
     let shooting = Shooting::new(study.logs, windows, &study.shooting.noise);
     let locals = shooting.initial_locals(joints);
     let found = fit(

@@ -12,4 +12,4 @@ pub use self::force::ForceSample;
 pub use self::omnibus::Omnibus;
 pub use self::proposal::{Proposal, proposal};
 pub use self::residual::ResidualForce;
-pub use self::unexplained::{NOTEWORTHY, Probed, SIGNIFICANT, UNKNOWN, Unexplained, unexplained};
+pub use self::unexplained::{Probed, UNKNOWN, Unexplained, unexplained};

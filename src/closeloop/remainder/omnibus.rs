@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
 use crate::data::Audit;
 use crate::data::statistics::{deviation, mean};
@@ -32,22 +33,15 @@ impl Omnibus {
     }
 }
 
-/// Waves over a window with up to so many half periods are smooth: a force that a model lacks reaches the
-/// positions through two integrations, so that little of it is left in faster ones.
-const SMOOTH: usize = 6;
-/// Logs of pure noise that the residuals are compared with.
-const SIMULATED: usize = 999;
-/// A start state is varied by this share of a radian (or m) and of a radian (or m) per second: small against
-/// what a model's curvature shows, large against rounding.
-const VARIED: f64 = 1e-5;
-
 /// Compare, window by window, the share of the residuals' energy that is smooth in time with that of noise of the
 /// sensor, rounded as the sensor rounds, passed through the same fit of start states. The share of a window
 /// does not depend on how large the noise is, and one bad reading raises it no more than any noise does.
 pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
     let of_residuals = |windows: &[Window]| Energies::of(windows, |window| window.residual.clone());
     let windows = windows(study, after);
-    let seeds: Vec<u64> = (0..SIMULATED).map(|_| rng.random()).collect();
+    let seeds: Vec<u64> = (0..study.settings.remainder.noise_draws)
+        .map(|_| rng.random())
+        .collect();
     let declared = of_residuals(&self::windows(study, before));
     let found = of_residuals(&windows);
     let simulated: Vec<Energies> = seeds
@@ -67,7 +61,7 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
     #[allow(clippy::cast_precision_loss)] // a thousand
     let as_smooth = simulated.iter().filter(|s| excess(s) >= bar).count() as f64;
     #[allow(clippy::cast_precision_loss)]
-    let trials = SIMULATED as f64;
+    let trials = simulated.len() as f64;
     let noise: Vec<f64> = (0..joints).map(|j| nulls[j].noise(&found, j)).collect();
     // In units of the sensors' noise, so that joints can be added.
     let above = |energies: &Energies| -> f64 {
@@ -101,6 +95,11 @@ struct Window {
 }
 
 fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
+    let RemainderSettings {
+        slow_waves,
+        start_step,
+        ..
+    } = study.settings.remainder;
     let joints = study.system.joints;
     let shooting = &study.shooting;
     let found = model.fit.found();
@@ -110,7 +109,7 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
         .map(|k| {
             let mut locals = model.fit.locals.clone();
-            locals.iter_mut().for_each(|local| local[k] += VARIED);
+            locals.iter_mut().for_each(|local| local[k] += start_step);
             residuals(&locals)
         })
         .collect();
@@ -133,7 +132,7 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
                 positions: DVector::from_fn(size, |i, _| read(i) + residual[i]),
                 residual,
                 absorbed: slopes.qr().q(),
-                waves: waves(rows),
+                waves: waves(rows, slow_waves),
                 sensor: sensors[window.log].clone(),
             }
         })
@@ -163,10 +162,10 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
 }
 
 /// The slowest waves of the discrete cosine transform of so many rows, at most half of all.
-fn waves(rows: usize) -> DMatrix<f64> {
+fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
     #[allow(clippy::cast_precision_loss)] // few rows
     let count = rows as f64;
-    DMatrix::from_fn(rows, (SMOOTH + 1).min(rows / 2), |row, wave| {
+    DMatrix::from_fn(rows, (slow + 1).min(rows / 2), |row, wave| {
         #[allow(clippy::cast_precision_loss)]
         let phase = PI * wave as f64 * (row as f64 + 0.5) / count;
         phase.cos() * ((if wave == 0 { 1.0 } else { 2.0 }) / count).sqrt()

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::unexplained::{NOTEWORTHY, Unexplained};
+use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::best_start;
 use crate::closeloop::select::gain;
@@ -62,11 +62,6 @@ const TERMS: [Term; 31] = [
     ("t*qd", [0, 1, 0, 1]),
     ("t*tau", [0, 0, 1, 1]),
 ];
-/// Longer formulas explain everything.
-const MOST_TERMS: usize = 3;
-/// Terms that are fitted after all have been screened.
-const FITTED: usize = 4;
-
 /// A short sum of terms for the force that `model` lacks on the joint where most is left: terms are added while
 /// they lower the loss on stretches left out of the fit. `None` where nothing that matters is left, or no
 /// term follows it.
@@ -74,22 +69,23 @@ pub fn proposal(study: &Study<'_>, model: &Fitted, left: &Unexplained) -> Option
     if !left.is_significant() {
         return None;
     }
-    let folds = folds(&study.shooting);
+    let folds = folds(study);
+    let noteworthy = study.settings.remainder.noteworthy;
     let without = left_out_losses(&model.fit, &folds);
     let mut found: Option<Sum> = None;
-    for _ in 0..MOST_TERMS {
+    for _ in 0..study.settings.proposal.most_terms {
         let (terms, losses) = match &found {
             Some(sum) => (sum.terms.as_slice(), &sum.losses),
             None => (&[][..], &without),
         };
         let longer = longer(study, model, left.joint, terms, &folds)?;
-        if gain(losses, &longer.losses) < NOTEWORTHY {
+        if gain(losses, &longer.losses) < noteworthy {
             break;
         }
         found = Some(longer);
     }
     let sum = found?;
-    let structured = left.omnibus.shares[left.joint].max(NOTEWORTHY);
+    let structured = left.omnibus.shares[left.joint].max(noteworthy);
     Some(Proposal {
         joint: left.joint,
         formula: sum.formula(),
@@ -124,7 +120,7 @@ fn longer(
         })
         .collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
-    screened.truncate(FITTED);
+    screened.truncate(study.settings.proposal.fitted);
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {

@@ -19,7 +19,7 @@ impl ResidualForce {
     pub(in crate::closeloop) fn of(study: &Study<'_>, model: &Fitted) -> Result<Self, FitError> {
         let samples = residual_force(study, model)?;
         Ok(Self {
-            curves: curves(&samples, &study.system.prismatic),
+            curves: curves(&samples, &study.system.prismatic, &study.settings.curves),
             samples,
         })
     }

@@ -7,6 +7,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::acting;
 use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::select::{gain, p_value};
+use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
 use crate::model::{Effect, FittedEffect};
 
@@ -42,16 +43,6 @@ pub struct Probed {
     pub gain: f64,
 }
 
-/// Below this probability what is left is no accident.
-pub const SIGNIFICANT: f64 = 0.01;
-/// Share of the residuals' variance (or of the loss, for a probe) below which what is left is of no practical
-/// interest.
-pub const NOTEWORTHY: f64 = 0.05;
-/// A probe tells where it lives if it saves this part of what is more than noise.
-const FAIR_PART: f64 = 0.25;
-/// Less than this share of the declared model's residual variance above noise, a tenth of its error, matters only
-/// where a probe says what it follows: so much the smoothing of dry friction leaves.
-const SLIVER: f64 = 0.01;
 /// What is left follows no variable that was probed.
 pub const UNKNOWN: &str = "unknown";
 const NONE: &str = "none";
@@ -72,16 +63,18 @@ pub fn unexplained(
     rng: &mut impl Rng,
 ) -> Unexplained {
     let omnibus = omnibus(study, before, after, rng);
-    let losses = left_out_losses(&after.fit, &folds(&study.shooting));
+    let losses = left_out_losses(&after.fit, &folds(study));
     let probed: Vec<Probed> = acting(study, probes)
         .into_par_iter()
         .filter_map(|probe| ask(study, after, probe, &losses))
         .collect();
     #[allow(clippy::cast_precision_loss)] // few probes
-    let asked = probed.len() as f64;
-    let seen = probed.iter().filter(|p| p.gain > NOTEWORTHY);
+    let asked = probed.len().max(1) as f64;
+    let seen = probed
+        .iter()
+        .filter(|p| p.gain > study.settings.remainder.noteworthy);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
-    let (place, joint) = place(&omnibus, &probed);
+    let (place, joint) = place(&omnibus, &probed, &study.settings.remainder);
     Unexplained {
         fraction: omnibus.fraction,
         p_value: (2.0 * omnibus.p_value.min(least * asked)).min(1.0),
@@ -100,7 +93,7 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
     let fitted = study
         .refit(&effects, &model.declared, model.fit.locals.clone(), scale)
         .ok()?;
-    let without = left_out_losses(&fitted.fit, &folds(&study.shooting));
+    let without = left_out_losses(&fitted.fit, &folds(study));
     Some(Probed {
         place,
         joint,
@@ -110,15 +103,22 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
 }
 
 /// The variable and the joint of the probe that saves most; one test among all probes and the omnibus test.
-fn place(omnibus: &Omnibus, probed: &[Probed]) -> (String, usize) {
+fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, usize) {
+    let RemainderSettings {
+        significance,
+        noteworthy,
+        located,
+        unlocated,
+        ..
+    } = *settings;
     #[allow(clippy::cast_precision_loss)] // few probes
-    let level = 0.5 * SIGNIFICANT / probed.len().max(1) as f64;
+    let level = 0.5 * significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
-    let matters = NOTEWORTHY.max(FAIR_PART * share);
-    let noteworthy = |p: &&Probed| p.p_value < level && p.gain > matters;
-    let most = probed.iter().filter(noteworthy);
+    let matters = noteworthy.max(located * share);
+    let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters;
+    let most = probed.iter().filter(stands_out);
     let structured =
-        omnibus.p_value < 0.5 * SIGNIFICANT && share > NOTEWORTHY && omnibus.fraction > SLIVER;
+        omnibus.p_value < 0.5 * significance && share > noteworthy && omnibus.fraction > unlocated;
     match most.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
         Some(most) => (most.place.clone(), most.joint),
         None if structured => (UNKNOWN.to_owned(), joint),

@@ -1,11 +1,9 @@
 use rand::Rng;
 
+use crate::closeloop::settings::ScoreSettings;
 use crate::data::statistics::bootstrap;
-use crate::evaluate::OpenLoop;
 use crate::identify::{BLOCK_S, stretches};
-
-/// With this many logs whole trajectories are resampled.
-const ENOUGH_LOGS: usize = 5;
+use crate::sim::metric::OpenLoop;
 
 /// 95 % interval of the relative reduction of the position error (all joints together) from `before` to
 /// `after`, by resampling whole trajectories or, where there are fewer than five, stretches of two seconds.
@@ -13,10 +11,11 @@ const ENOUGH_LOGS: usize = 5;
 pub fn reduction_interval(
     before: &OpenLoop,
     after: &OpenLoop,
+    settings: &ScoreSettings,
     rng: &mut impl Rng,
 ) -> Option<[f64; 2]> {
-    let blocks = blocks(before, after);
-    if blocks.len() < 3 {
+    let blocks = blocks(before, after, settings.whole_logs);
+    if blocks.len() < settings.fewest {
         return None;
     }
     let reduction = |drawn: &[usize]| {
@@ -28,16 +27,16 @@ pub fn reduction_interval(
 }
 
 /// Squared errors before and after, summed over each block.
-fn blocks(before: &OpenLoop, after: &OpenLoop) -> Vec<(f64, f64)> {
+fn blocks(before: &OpenLoop, after: &OpenLoop, whole_logs: usize) -> Vec<(f64, f64)> {
     let logs = before
         .windows
         .iter()
         .map(|w| w.log)
         .max()
         .map_or(0, |last| last + 1);
-    let starts = before.windows.iter().map(|w| match logs {
-        ENOUGH_LOGS.. => (w.log, 0.0),
-        _ => (w.log, w.start_s),
+    let starts = before.windows.iter().map(|w| {
+        let start_s = if logs >= whole_logs { 0.0 } else { w.start_s };
+        (w.log, start_s)
     });
     let members = stretches(starts, BLOCK_S);
     let mut blocks = vec![(0.0, 0.0); members.last().map_or(0, |last| last + 1)];

@@ -6,9 +6,9 @@ use crate::closeloop::per_log::take_over_intervals;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
-use crate::evaluate::Assessment;
-use crate::identify::{Uncertainty, uncertainty};
+use crate::identify::{FitError, Uncertainty, uncertainty};
 use crate::model::{FittedEffect, OwnValue, Parameter, System};
+use crate::sim::metric::Assessment;
 
 /// One effect that was added.
 #[derive(Debug, Clone)]
@@ -17,9 +17,12 @@ pub struct Finding {
     pub expression: String,
     /// With intervals.
     pub parameters: Vec<Parameter>,
+    /// Of the parameters that switch the effect on; of an effect without such a parameter, of the fall of the loss on
+    /// left-out stretches. 1 where the refit without the effect that this takes fails.
     pub p_value: f64,
-    /// Share of the position error that this effect alone takes away, by a refit without it.
-    pub error_reduction: f64,
+    /// Share of the position error on the test logs that this effect alone takes away, or why the refit without it
+    /// failed.
+    pub error_reduction: Result<f64, FitError>,
 }
 
 impl Finding {
@@ -45,32 +48,61 @@ impl Finding {
     }
 }
 
-/// The effects that were added to the declared model, each with what it contributes. `with` is the error of the model
-/// with all of them.
+/// The effects that were added to the declared model, each with what it contributes. `chosen` is the model before it was
+/// refined, `with` the error of the refined one on the test logs.
 pub(in crate::closeloop) fn findings(
     study: &Study<'_>,
+    chosen: &Fitted,
     refined: &Refined<'_>,
     scorer: &Scorer<'_>,
     with: &Assessment,
 ) -> Vec<Finding> {
     let declared = study.system.effects.len();
-    let uncertainty = uncertainty(&study.shooting, &refined.model.fit);
+    let uncertainty = uncertainty(&refined.study.shooting, &refined.model.fit);
+    let finding = |k: usize| {
+        // The refit without an effect takes the same two steps as the model with it: coarse, then refined.
+        let coarse = without(study, chosen, k);
+        let fine = coarse
+            .clone()
+            .and_then(|less| refined.study.estimate(&less));
+        let reduction = |less: Fitted| {
+            1.0 - with.position_rms() / scorer.fitted(&less).position_rms().max(f64::MIN_POSITIVE)
+        };
+        let (effect, expression, parameters) = reported(refined, &uncertainty, k);
+        Finding {
+            effect,
+            expression,
+            parameters,
+            p_value: p_value(&refined.study, &refined.model, k)
+                .or_else(|| Some(p_of_refit(study, chosen, coarse.as_ref().ok()?)))
+                .unwrap_or(1.0),
+            error_reduction: fine.map(reduction),
+        }
+    };
     (declared..refined.model.effects.len())
         .into_par_iter()
-        .filter_map(|k| finding(study, refined, &uncertainty, scorer, with, k))
+        .map(finding)
         .collect()
 }
 
-fn finding(
-    study: &Study<'_>,
+/// The signed-rank p-value of a model beside the refit without one of its effects.
+fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted) -> f64 {
+    let folds = folds(study);
+    let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
+    p_of_gains(&losses(without), &losses(chosen))
+}
+
+/// The k-th effect of the refined model with intervals, what it adds, and the parameters that it is reported with.
+fn reported(
     refined: &Refined<'_>,
     uncertainty: &Uncertainty,
-    scorer: &Scorer<'_>,
-    with: &Assessment,
     k: usize,
-) -> Option<Finding> {
+) -> (FittedEffect, String, Vec<Parameter>) {
     let Refined {
-        model, parameters, ..
+        study,
+        model,
+        parameters,
+        ..
     } = refined;
     let own = parameters[model.range_of(k)].to_vec();
     let mut effect = model.effects[k].clone();
@@ -85,22 +117,7 @@ fn finding(
         uncertainty,
         study.logs,
     );
-    let without = without(study, model, k)?;
-    let folds = folds(&study.shooting);
-    let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
-    Some(Finding {
-        expression,
-        effect,
-        parameters: reported,
-        p_value: p_value(study, model, k)
-            .unwrap_or_else(|| p_of_gains(&losses(&without), &losses(model))),
-        error_reduction: 1.0
-            - with.position_rms()
-                / scorer
-                    .fitted(&without)
-                    .position_rms()
-                    .max(f64::MIN_POSITIVE),
-    })
+    (effect, expression, reported)
 }
 
 /// What an effect with its `own` parameters adds, and the parameters that it is reported with: of a shift, what is
@@ -124,15 +141,9 @@ fn described(
 }
 
 /// The model refitted without its k-th effect, its residuals on the same scale.
-fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Option<Fitted> {
+fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Result<Fitted, FitError> {
     let mut effects = model.effects.clone();
     effects.remove(k);
-    study
-        .refit(
-            &effects,
-            &model.declared,
-            model.fit.locals.clone(),
-            Some(model.fit.scale),
-        )
-        .ok()
+    let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
+    study.refit(&effects, &model.declared, locals, scale)
 }

@@ -3,9 +3,10 @@ use rand::Rng;
 use super::bootstrap::reduction_interval;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
+use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
-use crate::evaluate::{Assessment, assess};
 use crate::model::{Dynamics, System};
+use crate::sim::metric::{Assessment, assess};
 
 /// Open-loop errors on the test logs.
 pub struct Errors {
@@ -26,7 +27,7 @@ pub struct Errors {
 /// Scores models on the test logs.
 pub(in crate::closeloop) struct Scorer<'a> {
     pub test: &'a [Log],
-    pub horizons_s: &'a [f64],
+    pub settings: &'a ScoreSettings,
 }
 
 impl Scorer<'_> {
@@ -45,7 +46,7 @@ impl Scorer<'_> {
             declared: self.as_it_is(declared),
             hybrid: hybrid.map(|model| self.dynamics(model)),
             against: against.iter().map(scored).collect(),
-            reduction_ci95: reduction_interval(before.middle(), after.middle(), rng),
+            reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
             before,
             after,
         }
@@ -67,6 +68,11 @@ impl Scorer<'_> {
 
     fn assess(&self, dynamics: &Dynamics, values_in: impl Fn(&Log) -> Vec<f64>) -> Assessment {
         let values: Vec<Vec<f64>> = self.test.iter().map(values_in).collect();
-        assess(dynamics, |log| &values[log], self.test, self.horizons_s)
+        assess(
+            dynamics,
+            |log| &values[log],
+            self.test,
+            &self.settings.horizons_s,
+        )
     }
 }

@@ -2,6 +2,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::folds::left_out_losses;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::uncertainty;
@@ -21,20 +22,6 @@ pub struct Evidence {
     /// The loss on each left-out stretch.
     pub(super) losses: Vec<f64>,
 }
-
-/// An effect must lower the loss on left-out stretches by this share, the error itself thus by a twentieth: less
-/// is of no use to anyone, and on real rigs it is what a wrong effect saves by standing in for others.
-pub const WORTHWHILE: f64 = 0.1;
-/// An effect plainly helps that takes away half of the loss on stretches that it was not fitted to: chance does
-/// not do that.
-pub const PLAIN: f64 = 0.5;
-/// Candidates within this many standard errors of the best explain the logs as well as it does.
-const AS_GOOD: f64 = 2.0;
-/// And they save this share of what it saves,
-const AS_MUCH: f64 = 0.8;
-/// and leave not more than so many times the loss that it leaves, a seventh more in error: few stretches may fail to
-/// tell models apart of which one leaves plainly more.
-const AS_LITTLE: f64 = 1.3;
 
 impl Evidence {
     /// Number of values, one a log where they differ by log, then of the simpler effects that it contains.
@@ -73,11 +60,11 @@ impl Evidence {
     }
 
     /// Whether the losses on left-out stretches do not tell this candidate from a better one.
-    pub fn is_as_good_as(&self, best: &Self) -> bool {
+    pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
         let differences = differences(&self.losses, &best.losses);
-        mean(&differences) <= AS_GOOD * standard_error(&differences)
-            && self.gain > AS_MUCH * best.gain
-            && 1.0 - self.gain <= AS_LITTLE * (1.0 - best.gain)
+        mean(&differences) <= settings.as_good * standard_error(&differences)
+            && self.gain > settings.as_much * best.gain
+            && 1.0 - self.gain <= settings.as_little * (1.0 - best.gain)
     }
 }
 

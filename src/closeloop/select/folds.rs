@@ -1,13 +1,12 @@
 use nalgebra::{DMatrix, DVector};
 
-use crate::identify::{Fit, Shooting, blocks};
-
-/// With this many logs a whole log is left out at a time; with fewer, stretches of two seconds.
-const ENOUGH_LOGS: usize = 8;
+use crate::closeloop::study::Study;
+use crate::identify::{Fit, blocks};
 
 /// For each window the fold that it is left out with: its trajectory or, where there are few, a stretch of it.
-pub fn folds(shooting: &Shooting<'_>) -> Vec<usize> {
-    if shooting.logs.len() >= ENOUGH_LOGS {
+pub fn folds(study: &Study<'_>) -> Vec<usize> {
+    let shooting = &study.shooting;
+    if shooting.logs.len() >= study.settings.select.whole_logs {
         shooting.windows.iter().map(|window| window.log).collect()
     } else {
         blocks(shooting)

@@ -3,12 +3,14 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::candidate::{beside, best_start, candidates, starts};
-use super::evidence::{Evidence, PLAIN, WORTHWHILE};
+use super::evidence::Evidence;
 use super::folds::{folds, left_out_losses};
 use super::simpler::simpler;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::stage::{Progress, Stage};
 use crate::closeloop::study::Study;
+use crate::identify::FitError;
 use crate::model::{Effect, EffectParameter, FittedEffect};
 
 /// One look at a model: what was tried beside the effects that it has, best first.
@@ -40,16 +42,6 @@ impl Rival {
         own.joint == chosen.joint && own.effect.contains.contains(&chosen.effect.name)
     }
 }
-
-/// Probability of a false alarm that a look admits, over all candidates and all their starting points.
-pub const FALSE_ALARM: f64 = 0.05;
-/// Few stretches cannot prove so much. There an effect is admitted that plainly helps if it alone is this
-/// significant.
-pub const SIGNIFICANT_ALONE: f64 = 0.01;
-/// Candidates that are fitted after all have been screened.
-const FITTED: usize = 8;
-/// Effects that one search adds at most.
-pub const MOST_EFFECTS: usize = 6;
 
 /// Effects of a model whatever their order.
 type Key = Vec<String>;
@@ -84,7 +76,7 @@ impl<'a, 'p> Search<'a, 'p> {
         Self {
             study,
             library,
-            folds: folds(&study.shooting),
+            folds: folds(study),
             looks: HashMap::new(),
             passed: Vec::new(),
             rounds: Vec::new(),
@@ -94,9 +86,12 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
     /// then exchange, simplify and remove until each effect is the best choice beside all others.
-    pub fn select(&mut self, declared: Fitted) -> Fitted {
+    ///
+    /// # Errors
+    /// A selected model that cannot be fitted again.
+    pub fn select(&mut self, declared: Fitted) -> Result<Fitted, FitError> {
         let mut model = declared;
-        while model.effects.len() < self.declared() + MOST_EFFECTS {
+        while model.effects.len() < self.declared() + self.study.settings.select.most_effects {
             let round = self.look(&model, None);
             self.rounds.push(round.clone());
             let next = match round.chosen {
@@ -104,13 +99,13 @@ impl<'a, 'p> Search<'a, 'p> {
                 None => self.exchanged(&model),
             };
             let Some(next) = next else { break };
-            let next = self.simplified(self.rescaled(&next));
+            let next = self.simplified(self.rescaled(&next)?);
             if self.has_passed(&next) {
                 break;
             }
             model = next;
         }
-        model
+        Ok(model)
     }
 
     /// Tell what is being done.
@@ -140,7 +135,8 @@ impl<'a, 'p> Search<'a, 'p> {
         }
         let all = candidates(self.study, self.library, &model.effects);
         let mut screened = self.screened(model, &all);
-        let rest = screened.split_off(FITTED.min(screened.len()));
+        let fitted = self.study.settings.select.fitted;
+        let rest = screened.split_off(fitted.min(screened.len()));
         screened.extend(rest.into_iter().filter(is_wanted));
         let losses = left_out_losses(&model.fit, &self.folds);
         self.say(&format!("fitting {} effects", screened.len()));
@@ -153,7 +149,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
         let round = Round {
             candidates: all.len(),
-            chosen: choose(&evidence, trials),
+            chosen: choose(&evidence, trials, &study.settings.select),
             evidence,
         };
         self.looks.insert(at, round.clone());
@@ -181,12 +177,11 @@ impl<'a, 'p> Search<'a, 'p> {
         screened.into_iter().map(|(start, _)| start).collect()
     }
 
-    /// The scale of the residuals has fallen: from now on the search looks with sharper eyes.
-    fn rescaled(&self, model: &Fitted) -> Fitted {
+    /// The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
+    fn rescaled(&self, model: &Fitted) -> Result<Fitted, FitError> {
         let locals = model.fit.locals.clone();
         self.study
             .refit(&model.effects, &model.declared, locals, None)
-            .unwrap_or_else(|_| model.clone())
     }
 
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
@@ -197,7 +192,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let first = simpler.par_iter().find_map_first(|effects| {
             let less = refit(study, &model, effects)?;
             let without: f64 = left_out_losses(&less.fit, folds).iter().sum();
-            (without < with * (1.0 + 0.5 * WORTHWHILE)).then_some(less)
+            (without < with * (1.0 + study.settings.select.simpler)).then_some(less)
         });
         match first {
             Some(less) => self.simplified(less),
@@ -221,6 +216,7 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// What explains the logs as well as one of the effects of a model does, beside all others.
     pub fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
+        let settings = &self.study.settings.select;
         let mut rivals = Vec::new();
         for k in self.declared()..model.effects.len() {
             let Some((present, without)) = self.without(model, k) else {
@@ -232,13 +228,17 @@ impl<'a, 'p> Search<'a, 'p> {
                 continue;
             };
             let others = round.evidence.iter().filter(|e| !is_present(e));
-            rivals.extend(others.filter(|e| e.is_as_good_as(chosen)).map(|e| Rival {
-                model: e.model.clone(),
-                effect: e.effect.clone(),
-                instead_of: present.clone(),
-                gain: e.gain,
-                gain_of_chosen: chosen.gain,
-            }));
+            rivals.extend(
+                others
+                    .filter(|e| e.is_as_good_as(chosen, settings))
+                    .map(|e| Rival {
+                        model: e.model.clone(),
+                        effect: e.effect.clone(),
+                        instead_of: present.clone(),
+                        gain: e.gain,
+                        gain_of_chosen: chosen.gain,
+                    }),
+            );
         }
         rivals
     }
@@ -289,14 +289,15 @@ fn has_switch(candidate: &FittedEffect) -> bool {
 
 /// Index of the evidence to act upon: of all candidates that are significant over so many trials, worthwhile
 /// and as good as the best, the one with the fewest parameters.
-fn choose(evidence: &[Evidence], trials: usize) -> Option<usize> {
+fn choose(evidence: &[Evidence], trials: usize, settings: &SelectSettings) -> Option<usize> {
     #[allow(clippy::cast_precision_loss)] // few trials
-    let level = FALSE_ALARM / trials.max(1) as f64;
+    let level = settings.false_alarm / trials.max(1) as f64;
     let sound = |e: &Evidence| {
-        e.p_value < level && e.gain > WORTHWHILE || e.p_value < SIGNIFICANT_ALONE && e.gain > PLAIN
+        e.p_value < level && e.gain > settings.worthwhile
+            || e.p_value < settings.significant_alone && e.gain > settings.plain
     };
     let best = evidence.iter().find(|e| sound(e))?;
     (0..evidence.len())
-        .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best))
+        .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best, settings))
         .min_by_key(|&i| evidence[i].complexity())
 }

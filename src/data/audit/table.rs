@@ -84,7 +84,7 @@ impl Audit {
 
     fn write_findings(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.findings.is_empty() {
-            return writeln!(f, "\nnothing to object to");
+            return writeln!(f, "\nno findings");
         }
         writeln!(f)?;
         for finding in &self.findings {

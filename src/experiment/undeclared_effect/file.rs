@@ -8,37 +8,37 @@ use crate::model::MlpSettings;
 use crate::plant::HiddenEffect;
 use crate::train::FitSettings;
 
-/// What is compared, and on which plants.
+/// The configuration of an experiment: models to compare, and plants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// The declared model: a model file, as seen from here, or the name of a built-in system.
+    /// The declared model: a model file, relative to this file, or the name of a built-in system.
     pub model: PathBuf,
-    /// What the plants are to do: a task file, as seen from here, or the name of a built-in task.
+    /// The task: a task file, relative to this file, or the name of a built-in task.
     pub task: PathBuf,
-    /// So many starts, draws of noise and draws of candidates in each case.
+    /// Number of consecutive seeds (of initial states, sensor noise and plans) in each case.
     pub seeds: u64,
-    /// Models are closed and trained on the first of so many episodes.
+    /// Numbers of episodes on whose logs models are closed and trained, rising.
     pub episodes: Vec<usize>,
-    /// How much is lost with the declared model, and won back with others.
+    /// The plants: what each has that the declared model lacks.
     #[serde(rename = "case")]
     pub cases: Vec<Case>,
     /// The residual network of the hybrid.
     pub network: MlpSettings,
     /// Training of the hybrid.
     pub fit: FitSettings,
-    /// Where it was read from.
+    /// The file that it was read from.
     #[serde(skip)]
     pub path: PathBuf,
 }
 
-/// What a plant has that the declared model has not.
+/// A plant: its differences from the declared model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
     /// Part of a file's name.
     pub name: String,
-    /// True values of declared parameters, where they differ.
+    /// True values of declared parameters that differ from the declared ones.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -49,7 +49,7 @@ impl Experiment {
     /// Read an experiment.
     ///
     /// # Errors
-    /// Unreadable file, unknown key, or numbers that make no sense: with line and remedy.
+    /// An unreadable file, an unknown key, a value out of range: with line and remedy.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
         let mut experiment: Self = config::read_toml(path)?;
         path.clone_into(&mut experiment.path);
@@ -78,7 +78,7 @@ impl Experiment {
             let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
             if name.is_empty() || !name.chars().all(plain) {
                 return Err(format!(
-                    "the case `{name}` names files; use letters, digits, - and _"
+                    "the name `{name}` of a case becomes part of file names; use letters, digits, - and _"
                 ));
             }
             if self.cases[..k].iter().any(|other| other.name == *name) {
@@ -86,10 +86,5 @@ impl Experiment {
             }
         }
         Ok(())
-    }
-
-    /// A file that is named here or, where there is none, the name as it is: that of something built in.
-    pub(super) fn beside_or_named(&self, file: &Path) -> PathBuf {
-        config::beside_or_named(&self.path, file)
     }
 }

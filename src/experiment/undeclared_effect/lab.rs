@@ -1,16 +1,15 @@
-use std::path::Path;
-
 use rayon::prelude::*;
 
-use super::runs::Runs;
 use super::{Case, Experiment, Outcome, Trial};
 use crate::control::Task;
 use crate::experiment::ExperimentError;
+use crate::files::beside_or_named;
 use crate::model::{Library, System};
 use crate::plant::Plant;
+use crate::runs::RunFolder;
 use crate::train::Backend;
 
-/// All that an experiment takes, checked.
+/// An experiment with everything it refers to read and checked.
 pub struct Lab {
     pub experiment: Experiment,
     pub library: Library,
@@ -18,23 +17,26 @@ pub struct Lab {
     pub task: Task,
     /// One for each case.
     pub plants: Vec<Plant>,
-    /// Where hybrids are trained.
+    /// The backend that hybrids are trained on.
     pub backend: Backend,
+    /// The first of the consecutive seeds.
+    pub first_seed: u64,
 }
 
 impl Lab {
-    /// Look for everything that the experiment names.
+    /// Reads everything that the experiment refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
-    /// What is missing, or does not belong to the declared system.
+    /// Files that are missing or not of the declared system.
     pub fn new(
         experiment: Experiment,
         library: Library,
         backend: Backend,
+        first_seed: u64,
     ) -> Result<Self, ExperimentError> {
-        let model = experiment.beside_or_named(&experiment.model);
+        let model = beside_or_named(&experiment.path, &experiment.model);
         let declared = library.system(&model)?;
-        let task = Task::read(&experiment.beside_or_named(&experiment.task))?;
+        let task = Task::read(&beside_or_named(&experiment.path, &experiment.task))?;
         if task.system != declared.name {
             return Err(experiment.wrong(format!(
                 "the task is for {}, the model is of {}; give those that belong together",
@@ -63,25 +65,27 @@ impl Lab {
             task,
             plants,
             backend,
+            first_seed,
         })
     }
 
-    /// Carry out what is not in `dir` yet, where each trial is a file. `observer` is told of each that is done.
+    /// Carries out the trials that are not in the folder yet. `observer` is called after each trial.
     ///
     /// # Errors
-    /// A trial that cannot be carried out, or a folder that cannot be written or holds another experiment.
+    /// A trial that cannot be carried out, or a folder that cannot be written or holds another run.
     pub fn run(
         &self,
-        dir: &Path,
+        folder: &RunFolder,
         observer: &(impl Fn(&Trial) + Sync),
     ) -> Result<Outcome, ExperimentError> {
-        let runs = Runs::open(dir)?;
+        folder.claim(&self.identity())?;
+        let runs = folder.within("runs");
         let cases = 0..self.experiment.cases.len();
         let trials: Vec<(usize, u64)> = cases
-            .flat_map(|case| (0..self.experiment.seeds).map(move |seed| (case, seed)))
+            .flat_map(|case| (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k)))
             .collect();
         let trial = |&(case, seed): &(usize, u64)| {
-            let trial = runs.get_or(self, case, seed, || self.trial(case, seed))?;
+            let trial = self.trial_in(&runs, case, seed)?;
             observer(&trial);
             Ok(trial)
         };

@@ -1,8 +1,8 @@
-//! The loop closed on control: a plant has an effect that the declared model does not know. How much of the return that
-//! this costs comes back when the model is closed on the logs of one or a few episodes?
+//! Closing the loop for control: a plant has an effect that the declared model lacks. How much of the return that this
+//! costs is recovered when the loop is closed on the logs of one or a few episodes?
 //!
-//! The same planner drives the plant by the declared model, by that model with what closing the loop found, by the hybrid of
-//! that model and a network, and by the plant's own equations.
+//! The same planner drives the plant with the declared model, with the model that closing the loop gives, with a hybrid of
+//! the declared model and a network, and with the plant's own equations.
 
 mod file;
 mod lab;

@@ -3,35 +3,36 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
-use crate::control::{Purpose, stream};
 use crate::data::statistics::{bootstrap, mean, sample_deviation};
+use crate::runs::{Purpose, stream};
 
-/// Of the return that the declared model loses, this share is to come back after the first number of episodes.
+/// The share of the lost return that is to be recovered after the first number of episodes.
 pub const TARGET: f64 = 0.9;
 
-/// What came of an experiment.
+/// The results of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     pub schema: u32,
-    /// The program that wrote it.
+    /// Version of the program that wrote it.
     pub residyn: String,
     pub config: Experiment,
     pub target: f64,
-    /// Whether it is reached in every case in which something is lost.
+    /// Whether the target is reached in every case with a loss.
     pub reached: bool,
     pub cases: Vec<OutcomeOfCase>,
 }
 
-/// What came of one plant.
+/// The results for one plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutcomeOfCase {
     pub case: Case,
-    /// What the true model returns more than the declared one, mean over the seeds.
+    /// Return with the true model minus return with the declared one, mean over the seeds.
     pub loss: f64,
     pub loss_ci95: [f64; 2],
-    /// Whether the loss stands out of its scatter. Where it does not, there is nothing to win back.
+    /// Whether the loss is significant. If it is not, there is nothing to win back.
     pub is_lost: bool,
     pub models: Vec<Compared>,
+    pub seeds: Vec<u64>,
     /// What closing the loop found: `[seed][number of episodes]`.
     pub closed: Vec<Vec<Closed>>,
 }
@@ -40,22 +41,22 @@ pub struct OutcomeOfCase {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Compared {
     pub model: Contestant,
-    /// Of data that it has seen.
+    /// Number of episodes that it was fitted to.
     pub episodes: usize,
-    /// One for each seed.
+    /// One per seed.
     pub returns: Vec<f64>,
     pub mean: f64,
     pub deviation: f64,
-    /// Episodes in which the goal held until the end.
+    /// Number of episodes in which the goal was held until the end.
     pub successes: usize,
-    /// None of the declared and the true model, nor where nothing is lost.
+    /// None for the declared and the true model, and where nothing is lost.
     pub won_back: Option<WonBack>,
 }
 
-/// The share of a lost return that comes back with a model.
+/// The share of the lost return that a model wins back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct WonBack {
-    /// Of the mean returns; 1 where all of it does.
+    /// Ratio of means over the seeds; 1 if the whole loss is won back.
     pub share: f64,
     pub ci95: [f64; 2],
 }
@@ -81,7 +82,7 @@ impl Outcome {
         }
     }
 
-    /// The outcome for people.
+    /// The results as a table for the terminal.
     pub fn text(&self) -> String {
         let mut out = String::new();
         for case in &self.cases {
@@ -111,7 +112,7 @@ impl OutcomeOfCase {
                 .map(|&seed| returns[seed] - declared[seed])
                 .sum()
         };
-        let mut rng = stream(0, Purpose::Other, 0);
+        let mut rng = stream(0, Purpose::Other(0));
         let (seeds, all) = (trials.len(), (0..trials.len()).collect::<Vec<_>>());
         let per_seed = 1.0 / seeds as f64;
         let loss_ci95 = bootstrap(seeds, &mut rng, |drawn| per_seed * of(&truth, drawn));
@@ -132,11 +133,12 @@ impl OutcomeOfCase {
             loss_ci95,
             is_lost,
             models,
+            seeds: trials.iter().map(|trial| trial.seed).collect(),
             closed: trials.iter().map(|trial| trial.closed.clone()).collect(),
         }
     }
 
-    /// What the closed model wins back after so many episodes; none where nothing is lost.
+    /// The share that the closed model wins back after this number of episodes; none where nothing is lost.
     fn share(&self, episodes: usize) -> Option<f64> {
         let is_it = |m: &&Compared| m.model == Contestant::Closed && m.episodes == episodes;
         let model = self.models.iter().find(is_it)?;
@@ -148,7 +150,7 @@ impl OutcomeOfCase {
         let lost = if self.is_lost {
             ""
         } else {
-            ", which is none: nothing to win back"
+            ", which is not significant: nothing to win back"
         };
         let _ = writeln!(
             out,
@@ -158,9 +160,9 @@ impl OutcomeOfCase {
         for model in &self.models {
             model.write(out);
         }
-        for (seed, closed) in self.closed.iter().enumerate() {
+        for (seed, closed) in self.seeds.iter().zip(&self.closed) {
             for found in closed {
-                found.write(out, seed);
+                found.write(out, *seed);
             }
         }
         out.push('\n');
@@ -168,7 +170,7 @@ impl OutcomeOfCase {
 }
 
 impl Compared {
-    /// The k-th model of every trial.
+    /// Collects the k-th model of every trial.
     fn new(trials: &[&Trial], k: usize) -> Self {
         let scores = || trials.iter().map(|trial| &trial.scores[k]);
         let returns: Vec<f64> = scores().map(|score| score.judged.total).collect();
@@ -207,7 +209,7 @@ impl Compared {
 }
 
 impl Closed {
-    fn write(&self, out: &mut String, seed: usize) {
+    fn write(&self, out: &mut String, seed: u64) {
         let values = |values: &[(String, f64)]| {
             let each = values
                 .iter()

@@ -2,49 +2,51 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 use super::Lab;
-use crate::closeloop::{Finding, Outcome, Request, Split, StudyError, Verdict, close_loop};
-use crate::control::{Predictor, Purpose, stream};
+use crate::closeloop::{
+    Finding, Outcome, Request, Settings, Split, StudyError, Verdict, close_loop,
+};
+use crate::control::Predictor;
 use crate::data::Log;
 use crate::experiment::ExperimentError;
 use crate::mbrl::{Experience, Judge, Judged, Learner, Prior, RunError};
 use crate::model::Dynamics;
+use crate::runs::{Purpose, stream};
 
-/// One plant under control by every model, all from the same start, under the same noise and with the same draws of
-/// candidates.
+/// One plant under control with every model, with the same initial state, sensor noise and random numbers of the planner.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
     pub case: String,
     pub seed: u64,
     pub scores: Vec<Score>,
-    /// What closing the loop found, one for each number of episodes.
+    /// The results of closing the loop, one per number of episodes.
     pub closed: Vec<Closed>,
 }
 
-/// How an episode went.
+/// The result of an episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Score {
     pub model: Contestant,
-    /// Of data that the model has seen.
+    /// Number of episodes that the model was fitted to.
     pub episodes: usize,
     #[serde(flatten)]
     pub judged: Judged,
 }
 
-/// A model to plan with.
+/// A kind of model to plan with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Contestant {
-    /// As it is in its file.
+    /// The model file as it is.
     Declared,
-    /// With the parameters and effects that closing the loop found.
+    /// With the parameters and effects from closing the loop.
     Closed,
-    /// With learnt parameters and a residual network.
+    /// With trained parameters and a residual network.
     Hybrid,
     /// The plant's own equations.
     True,
 }
 
-/// What closing the loop found.
+/// A result of closing the loop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Closed {
     pub episodes: usize,
@@ -54,7 +56,7 @@ pub struct Closed {
     pub parameters: Vec<(String, f64)>,
 }
 
-/// An effect that was named.
+/// An effect in the result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Named {
     pub name: String,
@@ -97,11 +99,11 @@ impl Closed {
 }
 
 impl Lab {
-    /// Drive the plant of a case with every model. The first episode of data is gathered with the declared model, the
-    /// next ones with what was closed on the first.
+    /// Drives the plant of a case with every model. The first episode of data is gathered with the declared model, the
+    /// next ones with the model closed on the first.
     ///
     /// # Errors
-    /// A plant that diverges, a loss that is no longer finite, or logs that cannot be studied.
+    /// A plant that diverges, a loss that is not finite, or logs on which the loop cannot be closed.
     pub fn trial(&self, case: usize, seed: u64) -> Result<Trial, ExperimentError> {
         let name = || self.experiment.cases[case].name.clone();
         let failed = |source: RunError| ExperimentError::Run {
@@ -178,9 +180,9 @@ impl Lab {
         }
     }
 
-    /// The log of an episode with a start, noise and candidates of its own.
+    /// The log of an episode with an initial state and random numbers of its own.
     fn gather(&self, judge: Judge<'_>, model: &Predictor, number: usize) -> Result<Log, RunError> {
-        let seed = stream(judge.seed, Purpose::Gather, number).next_u64();
+        let seed = stream(judge.seed, Purpose::Gather(number)).next_u64();
         let (episode, _) = Judge { seed, ..judge }.episode(model, self.task.replan)?;
         let mut log = episode.stretch.log;
         log.path = format!("episode{}.csv", number + 1).into();
@@ -188,9 +190,9 @@ impl Lab {
     }
 
     fn close(&self, logs: &[Log], seed: u64) -> Result<Outcome, StudyError> {
-        let split = Split::of(logs.to_vec());
+        let split = Split::of(logs.to_vec(), &Settings::default().split);
         let request = Request::new(&self.declared, &self.library, split);
-        let mut rng = stream(seed, Purpose::Other, logs.len());
+        let mut rng = stream(seed, Purpose::Other(logs.len()));
         close_loop(request, &mut rng, &mut |_| {})
     }
 
@@ -205,7 +207,7 @@ impl Lab {
     }
 }
 
-/// What closing the loop ended with.
+/// The model that closing the loop gives.
 fn fitted(outcome: &Outcome) -> Dynamics {
     let values = outcome.models.after.fit.values.iter().copied();
     outcome.models.after.dynamics.clone().with_values(values)

@@ -10,7 +10,6 @@ use crate::formats::robot::mechanism::{
 use crate::formats::verify::{Client, PythonClient};
 use crate::formats::{ExportError, ExportModel, File, Format, RobotReader};
 use crate::model::chain::Joint;
-use crate::sim::RK4;
 
 pub(in crate::formats) const FORMAT: Format = Format {
     name: "mjcf",
@@ -48,13 +47,6 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
                 .into(),
         );
     }
-    let scheme = model.integrator.scheme();
-    if !scheme.semi_implicit && scheme != RK4 {
-        lost.push(format!(
-            "the {}: MuJoCo integrates by the {} in its place",
-            scheme.title, RK4.title
-        ));
-    }
     lost
 }
 
@@ -91,15 +83,11 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
 
 /// Gravity, step and integrator of the model.
 pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
-    // MuJoCo's own Runge-Kutta method is the classical one.
-    let integrator = match model.integrator.scheme().semi_implicit {
-        true => "Euler",
-        false => "RK4",
-    };
     format!(
-        "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{integrator}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
+        "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
         numbers([0.0, 0.0, -mechanism.gravity]),
-        model.step_s / model.integrator.substeps() as f64
+        model.step_s / model.integrator.substeps() as f64,
+        mechanism.integrator
     )
 }
 

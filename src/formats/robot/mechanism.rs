@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::expr::SignForm;
 use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
 use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
+use crate::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
 
 /// A mechanism with its drives.
 pub(in crate::formats) struct Mechanism {
@@ -16,6 +17,8 @@ pub(in crate::formats) struct Mechanism {
     pub drives: Vec<Drive>,
     /// m/s^2, against z
     pub gravity: f64,
+    /// The model's scheme as MuJoCo names it.
+    pub integrator: &'static str,
     /// What of the model it does not carry.
     pub not_carried: Vec<String>,
 }
@@ -43,11 +46,23 @@ pub(in crate::formats) struct Link {
     pub tensor: Matrix3<f64>,
 }
 
+/// The schemes that MuJoCo has, and its names for them.
+const INTEGRATORS: [(&Scheme, &str); 2] = [(SEMI_IMPLICIT_EULER, "Euler"), (RK4, "RK4")];
+
+fn integrator(scheme: &Scheme) -> Result<&'static str, String> {
+    let mut known = INTEGRATORS.into_iter();
+    let found = known.find(|(known, _)| *known == scheme);
+    found.map(|(_, name)| name).ok_or_else(|| {
+        let known = INTEGRATORS.map(|(scheme, _)| scheme.name).join(" or ");
+        format!("MuJoCo has no {}; export it with {known}", scheme.title)
+    })
+}
+
 impl Mechanism {
     /// The mechanism of a model.
     ///
     /// # Errors
-    /// Equations of no known mechanism, equations with time, or a network in their place.
+    /// Equations of no known mechanism, equations with time, a network in their place, or a scheme that MuJoCo lacks.
     pub fn of(model: &ExportModel) -> Result<Self, String> {
         if model.prior.is_some() {
             return Err("a network replaces its equations".into());
@@ -67,6 +82,7 @@ impl Mechanism {
             drives: vec![still; found.joints.len()],
             joints: found.joints,
             gravity: found.gravity,
+            integrator: integrator(model.integrator.scheme())?,
             not_carried: Vec::new(),
         };
         for effect in &model.effects {

@@ -128,7 +128,7 @@ pub(super) fn clock_value(duration_s: f64) -> String {
     format!("{duration_s:.3}s")
 }
 
-/// Things of one kind, such as joints, counted from 0.
+/// The line of the k-th of several things of one kind, such as joints, from 0.
 pub(super) fn numbered(k: usize) -> Stroke {
     let colours = [BLUE, VERMILION, GREEN, OTHERS[0]];
     Stroke {

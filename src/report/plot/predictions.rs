@@ -1,4 +1,4 @@
-//! What a model predicts, against what was measured.
+//! Predictions of a model and the measured motion.
 
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, marker};
@@ -8,12 +8,12 @@ use super::scale::Range;
 use super::style::{INK, MARGIN, Role, START_MARK_PX, WIDTH};
 use super::{JointKind, PlotError};
 
-/// Two for each column of pixels and some: more cannot be seen.
+/// About two points for each column of pixels: more cannot be seen.
 const MAX_TRACK_POINTS: usize = 4000;
-/// Above this the marks at the starts of the pieces would hide the curves.
+/// With more pieces, the marks at their starts would hide the curves.
 const MAX_START_MARKS: usize = 60;
-/// A prediction may leave the measured range by this much (rad or m) however small that range is: a guess, so that
-/// a rig at rest does not have its noise blown up to fill the panel.
+/// The axis extends at least this far (rad or m) beyond the measured range, so that the noise of a rig at rest does not
+/// fill the panel.
 const LEAST_REACH: f64 = 0.1;
 
 /// A curve of one joint, in one or more pieces.
@@ -97,7 +97,7 @@ fn entries(panels: &[Panel]) -> Vec<Entry> {
     let line = |track: &&Track| Entry::new(Sample::Line(track.role.stroke()), &track.label);
     let mut entries: Vec<Entry> = tracks.iter().map(line).collect();
     if tracks.iter().any(|track| has_start_marks(track)) {
-        entries.push(Entry::new(Sample::Start, "restart from the log"));
+        entries.push(Entry::new(Sample::Start, "restart"));
     }
     entries
 }

@@ -1,5 +1,5 @@
-use crate::batch::{Rows, W};
 use crate::lanes::Row;
+use crate::sim::batch::{Rows, W};
 
 /// Segments with [`W`] of them side by side. The last ones are repeated until the last block is full, and do not
 /// count there.

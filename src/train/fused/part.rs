@@ -6,8 +6,8 @@ use super::plan::{CHUNK, Numbers, Plan};
 use super::record::Layout;
 use super::tapes::Tapes;
 use super::worker::{Desk, Worker, total};
-use crate::batch::Rows;
 use crate::lanes::{Element, Vector};
+use crate::sim::batch::Rows;
 use crate::train::Frame;
 
 /// One thread's share of a loss, with memory that serves again for the next.

@@ -1,4 +1,4 @@
-use crate::batch::{Network, Rows};
+use crate::sim::batch::{Network, Rows};
 
 /// What the way back through a rollout needs of the way there, for the blocks of a chunk: the stages one after the
 /// other, then the state at the end of each step.

@@ -1,5 +1,5 @@
-use crate::batch::W;
 use crate::expr::{Program, Tape};
+use crate::sim::batch::W;
 use crate::train::Frame;
 
 /// The programs of a frame, ready to run.

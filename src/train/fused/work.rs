@@ -4,14 +4,14 @@ use pulp::Arch;
 
 use super::part::{Backward, Forward, Part};
 use super::plan::{Numbers, Plan};
-use crate::rounds::Rounds;
+use crate::lanes::WorkerPool;
 use crate::train::Frame;
 use crate::train::loss::NORM_FLOOR;
 
 /// The threads that losses are taken on, and memory that serves again for the next.
 #[derive(Debug, Default)]
 pub struct Crew {
-    rounds: Rounds,
+    pool: WorkerPool,
     /// What the present round is about; held by the one who leads it.
     leading: Mutex<()>,
     task: Mutex<Option<Task>>,
@@ -54,14 +54,14 @@ pub(super) struct Work {
 impl Crew {
     /// Call `lead` while other threads stand by for the losses in it. Without them it takes them alone.
     pub(in crate::train) fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
-        self.rounds.helped(&|part| self.carry_out(part), lead)
+        self.pool.with_workers(&|part| self.carry_out(part), lead)
     }
 
     fn run(&self, task: Task) {
         let _leading = lock(&self.leading);
         let parts = task.desks.parts.len();
         *lock(&self.task) = Some(task);
-        self.rounds.run(parts, &|part| self.carry_out(part));
+        self.pool.run(parts, &|part| self.carry_out(part));
         *lock(&self.task) = None;
     }
 

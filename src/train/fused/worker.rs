@@ -5,10 +5,10 @@ use pulp::Simd;
 use super::plan::{CHUNK, Numbers, Plan};
 use super::record::{Layout, Stage as Recorded};
 use super::tapes::Tapes;
-use crate::batch::{Network, Rows, W};
 use crate::expr::Tape;
 use crate::lanes::{Element, Vector};
 use crate::sim::Stage;
+use crate::sim::batch::{Network, Rows, W};
 use crate::train::Frame;
 
 /// One thread at work on a chunk of blocks.
@@ -88,10 +88,12 @@ pub(super) fn update<S: Simd, const N: usize>(
     value: impl Fn(Vector<S, f32>, [Vector<S, f32>; N]) -> Vector<S, f32>,
 ) {
     let to = f32::registers_mut::<S>(&mut to.0);
-    let of = of.map(|rows| f32::registers::<S>(&rows.0));
     for (k, to) in to.iter_mut().enumerate() {
-        let of = of.map(|registers| Vector::new(simd, registers[k]));
-        *to = value(Vector::new(simd, *to), of).register;
+        let mut operands = [Vector::splat(simd, 0.0); N];
+        for n in 0..N {
+            operands[n] = of[n].get(simd, k);
+        }
+        *to = value(Vector::new(simd, *to), operands).register;
     }
 }
 

@@ -15,18 +15,18 @@ const LITTLE_MOTION_S: f64 = 4.0;
 /// Below this \[s\] not even one window of 0.5 s fits.
 const TOO_LITTLE_MOTION_S: f64 = 0.5;
 
-/// Beyond this, one step in ten or so overruns by a good part of a step, and lags of the order of one
-/// step blur.
+/// Beyond this about one step in ten overruns by a large part of a step, and lags of about one step
+/// cannot be resolved.
 const LARGE_JITTER: f64 = 0.05;
 
 /// A motion of fewer quantisation steps (or noise deviations) than this says little: at rest an
 /// encoder flickers over two or three steps, and a creeping joint over five or six.
 const VISIBLE_STEPS: f64 = 10.0;
 
-/// Beyond this share of bad rows a column is not worth masking row by row.
+/// With a larger share of bad rows, masking single rows does not save a column.
 const MANY_SPIKES: f64 = 0.01;
 
-/// Fewer bad rows than this share do not move a robust fit.
+/// A smaller share of bad rows does not affect a robust fit.
 const SOME_SPIKES: f64 = 0.001;
 
 /// Beyond this share at rest most rows show static friction at best.
@@ -119,7 +119,7 @@ impl Found {
             self.add(
                 Warning,
                 format!(
-                    "{} gap(s), the longest of {} s at t = {} s: leave out what lies in them ({}@{}-{})",
+                    "{} gap(s), the longest of {} s at t = {} s: leave them out ({}@{}-{})",
                     gaps.len(),
                     short(longest.length_s()),
                     short(longest.start_s),
@@ -190,7 +190,7 @@ impl Found {
                 Warning,
                 format!(
                     "{name} never reverses: dry friction cannot be told from a constant torque; move \
-                     both ways"
+                     in both directions"
                 ),
             );
         }
@@ -223,7 +223,7 @@ impl Found {
                 Serious,
                 format!(
                     "{name} repeats the row before in {} of the rows in motion: the log is written \
-                     faster than the encoder is read; keep only the rows that changed",
+                     faster than the encoder is read; keep only rows that differ",
                     percent(joint.repeated_fraction)
                 ),
             );

@@ -33,7 +33,7 @@ impl Found {
                 Warning,
                 format!(
                     "{name} never changes sign ({} to {} N m): its gain and a constant torque are hard \
-                     to tell apart; drive both ways",
+                     to tell apart; drive in both directions",
                     short(tau.min),
                     short(tau.max)
                 ),
@@ -64,7 +64,7 @@ impl Found {
                 // Never serious: a command may chatter for good reason.
                 spike_severity(tau.spikes, rows).max(Warning),
                 format!(
-                    "{name} has {} single-row spike(s) ({}): an actuator hardly follows them; check whether \
+                    "{name} has {} single-row spike(s) ({}): too fast for a real actuator; check whether \
                      the column holds a command or a measurement",
                     tau.spikes,
                     percent(tau.spikes as f64 / rows as f64)
@@ -146,7 +146,7 @@ impl Found {
             self.add(
                 Warning,
                 format!(
-                    "{name} is {} N m throughout: its gain cannot be told from a constant torque; vary it",
+                    "{name} is {} N m throughout: its gain cannot be told from a constant torque; vary the torque",
                     short(tau.max)
                 ),
             );

@@ -57,7 +57,7 @@ impl Found {
         let (name, number) = (&joint.qd.name, joint.joint);
         let severity = spike_severity(joint.qd.spikes, rows);
         let remedy = match severity {
-            Serious => format!("{name} is not fit for fitting; take velocities from q{number}"),
+            Serious => format!("do not fit {name}; take velocities from q{number}"),
             _ => format!("mask them, or take velocities from q{number}"),
         };
         self.add(

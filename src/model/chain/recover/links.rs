@@ -12,6 +12,12 @@ const GYRATION: f64 = 0.1;
 /// Joints in the world frame, and gravity (m/s^2) as a vector of the plane.
 pub(super) type Links = (Vec<Joint>, Planar);
 
+/// Builds the links from the coefficients of [`Shape`](super::Shape) and gravity (m/s^2).
+///
+/// # Errors
+/// Coefficients that no bodies can have.
+pub(super) type Build = fn(&[f64], f64) -> Result<Links, String>;
+
 /// A link that turns. `found` are the coefficients of [`Shape`](super::Shape), `gravity` in m/s^2; so below.
 pub(super) fn turning(found: &[f64], gravity: f64) -> Result<Links, String> {
     let [inertia, cos, sin, ..] = found[..] else {

@@ -10,7 +10,7 @@ use nalgebra::{Complex, Vector3};
 use super::spatial::turn;
 use super::{Joint, Pose};
 use crate::model::Dynamics;
-use links::Links;
+use links::Build;
 use shape::Shape;
 
 /// A point or vector of the plane in which links turn, as z + i x with z up. A rotation by q about y multiplies it by
@@ -40,7 +40,7 @@ const GRAVITY: f64 = 9.81;
 /// # Errors
 /// Equations of another kind of mechanism, or of one that no bodies can have.
 pub(crate) fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recovered, String> {
-    let (shape, links): (Shape, fn(&[f64], f64) -> Result<Links, String>) = match prismatic {
+    let (shape, build): (Shape, Build) = match prismatic {
         [false] => (Shape::turning(), links::turning),
         [true] => (Shape::sliding(), links::sliding),
         [false, false] => (Shape::arm(), links::arm),
@@ -48,7 +48,7 @@ pub(crate) fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recover
         _ => return Err(KNOWN.to_owned()),
     };
     let found = shape.fit(declared)?;
-    let (mut joints, downward) = links(&found, gravity(declared))?;
+    let (mut joints, downward) = build(&found, gravity(declared))?;
     let largest = found.iter().map(|x| x.abs()).fold(0.0, f64::max);
     for (joint, damping) in joints.iter_mut().zip(shape.damping(&found)) {
         if *damping < -ROUNDING * largest {

@@ -1,0 +1,56 @@
+use std::error::Error;
+use std::io::ErrorKind;
+
+use crate::bench::GridError;
+use crate::experiment::ExperimentError;
+use crate::files::OutputError;
+use crate::runs::RunFolderError;
+use crate::train::recipe::RecipeError;
+
+/// What to do about an error, in terms of the command line, of which the library knows nothing.
+pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    None.or_else(|| error.downcast_ref().and_then(of_output))
+        .or_else(|| error.downcast_ref().and_then(of_folder))
+        .or_else(|| error.downcast_ref().and_then(of_recipe))
+        .or_else(|| error.downcast_ref().and_then(of_experiment))
+        .or_else(|| error.downcast_ref().and_then(of_grid))
+}
+
+fn of_output(error: &OutputError) -> Option<&'static str> {
+    Some(match error.source.kind() {
+        ErrorKind::InvalidInput => "give the name of a file with --out",
+        _ => "free some space or give another folder with --out",
+    })
+}
+
+fn of_folder(error: &RunFolderError) -> Option<&'static str> {
+    match error {
+        RunFolderError::Busy { .. } => {
+            Some("wait until that has ended, or give another folder with --out")
+        }
+        RunFolderError::OtherRun { .. } | RunFolderError::Damaged { .. } => {
+            Some("give another folder with --out, or remove this one to start anew")
+        }
+        RunFolderError::NotAFolder { .. } | RunFolderError::Io { .. } => {
+            Some("give a folder that can be written with --out")
+        }
+        RunFolderError::Output(_) => None,
+    }
+}
+
+fn of_recipe(error: &RecipeError) -> Option<&'static str> {
+    match error {
+        RecipeError::Open { .. } => Some("give a recipe with --config"),
+        RecipeError::NoAlpha { .. } => Some("or leave out --alpha"),
+        _ => None,
+    }
+}
+
+fn of_experiment(error: &ExperimentError) -> Option<&'static str> {
+    let cannot_open = matches!(error, ExperimentError::Open { .. });
+    cannot_open.then_some("give a file with --config")
+}
+
+fn of_grid(error: &GridError) -> Option<&'static str> {
+    matches!(error, GridError::Open { .. }).then_some("give a grid with --grid")
+}

@@ -1,0 +1,203 @@
+mod additive;
+mod basis;
+
+use nalgebra::DVector;
+use serde::Serialize;
+
+use self::additive::Additive;
+use self::basis::Basis;
+use super::force::ForceSample;
+use crate::closeloop::settings::CurveSettings;
+use crate::identify::{BLOCK_S, stretches};
+
+/// The residual force of a joint as a smooth curve over one variable, the others' shares taken off.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Curve {
+    /// Counted from 1.
+    pub joint: usize,
+    /// `q1`, `qd1`, `tau1` or `t`.
+    pub variable: String,
+    /// Of the variable.
+    pub unit: &'static str,
+    pub x: Vec<f64>,
+    /// In N m (or N).
+    pub force: Vec<f64>,
+    /// Ends of the pointwise 95 % band.
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+}
+
+/// A variable that a force may follow.
+struct Variable {
+    name: &'static str,
+    /// On a turning joint and on a sliding one.
+    units: [&'static str; 2],
+    value: fn(&ForceSample, usize) -> f64,
+}
+
+const VARIABLES: [Variable; 4] = [
+    Variable {
+        name: "q",
+        units: ["rad", "m"],
+        value: |sample, joint| sample.q[joint],
+    },
+    Variable {
+        name: "qd",
+        units: ["rad/s", "m/s"],
+        value: |sample, joint| sample.qd[joint],
+    },
+    Variable {
+        name: "tau",
+        units: ["N m", "N"],
+        value: |sample, joint| sample.tau[joint],
+    },
+    Variable {
+        name: "t",
+        units: ["s", "s"],
+        value: |sample, _| sample.time_s,
+    },
+];
+
+/// One curve for each joint and each variable that takes more than one value; none for logs too short to give
+/// a band. The curves of a joint are fitted together, so that none borrows the shape of another.
+pub(super) fn curves(
+    samples: &[ForceSample],
+    prismatic: &[bool],
+    settings: &CurveSettings,
+) -> Vec<Curve> {
+    let blocks = stretches(samples.iter().map(|s| (s.log, s.time_s)), BLOCK_S);
+    if blocks
+        .last()
+        .is_none_or(|last| last + 1 < settings.fewest_stretches)
+    {
+        return Vec::new();
+    }
+    let joints = 0..prismatic.len();
+    joints
+        .flat_map(|joint| of_joint(samples, &blocks, joint, prismatic[joint], settings))
+        .collect()
+}
+
+fn of_joint(
+    samples: &[ForceSample],
+    blocks: &[usize],
+    joint: usize,
+    prismatic: bool,
+    settings: &CurveSettings,
+) -> Vec<Curve> {
+    let bases: Vec<(&Variable, Basis)> = VARIABLES
+        .iter()
+        .filter_map(|variable| {
+            let values = samples.iter().map(|sample| (variable.value)(sample, joint));
+            Some((variable, Basis::over(values.collect(), settings.quantiles)?))
+        })
+        .collect();
+    let forces = DVector::from_iterator(samples.len(), samples.iter().map(|s| s.force[joint]));
+    let shapes: Vec<&Basis> = bases.iter().map(|(_, basis)| basis).collect();
+    let Some(fit) = Additive::fit(&shapes, &forces, blocks, settings) else {
+        return Vec::new();
+    };
+    let curve = |(k, (variable, basis)): (usize, &(&Variable, Basis))| {
+        let numbered = match variable.name {
+            "t" => "t".to_owned(),
+            name => format!("{name}{}", joint + 1),
+        };
+        let mut curve = Curve {
+            joint: joint + 1,
+            variable: numbered,
+            unit: variable.units[usize::from(prismatic)],
+            x: Vec::new(),
+            force: Vec::new(),
+            low: Vec::new(),
+            high: Vec::new(),
+        };
+        for x in basis.points(settings.points) {
+            let (force, half) = fit.at(k, basis, x);
+            curve.x.push(x);
+            curve.force.push(force);
+            curve.low.push(force - half);
+            curve.high.push(force + half);
+        }
+        curve
+    };
+    bases.iter().enumerate().map(curve).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Noise of neighbouring stretches has something in common.
+    fn samples(force: fn(f64, f64) -> f64, noise: f64, rng: &mut impl Rng) -> Vec<ForceSample> {
+        let mut carried = 0.0;
+        (0..400)
+            .map(|i| {
+                let t = 0.15 * f64::from(i);
+                let fresh: f64 = StandardNormal.sample(rng);
+                carried = 0.5 * carried + fresh;
+                let (q, qd) = (
+                    rng.random_range(-1.5..1.5),
+                    (2.0 * t).sin() * rng.random_range(0.0..6.0),
+                );
+                ForceSample {
+                    log: i as usize / 100,
+                    time_s: t,
+                    q: vec![q],
+                    qd: vec![qd],
+                    tau: vec![0.0],
+                    force: vec![force(q, qd) + noise * carried],
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_variable_that_does_not_vary_has_no_curve() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let found = curves(
+            &samples(|q, _| q, 0.1, &mut rng),
+            &[false],
+            &CurveSettings::default(),
+        );
+        let names: Vec<&str> = found.iter().map(|c| c.variable.as_str()).collect();
+        assert_eq!(names, ["q1", "qd1", "t"]);
+        assert!(
+            found
+                .iter()
+                .all(|c| c.x.len() == CurveSettings::default().points)
+        );
+    }
+
+    #[test]
+    fn the_band_holds_the_force_and_no_variable_borrows_it() {
+        let force = |_: f64, qd: f64| -0.002 * qd.powi(3) + 0.05 * (1.3 * qd).sin();
+        let (mut held, mut all, mut off) = (0, 0, 0.0_f64);
+        for seed in 0..30 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let samples = samples(force, 0.05, &mut rng);
+            let mean = samples.iter().map(|s| force(0.0, s.qd[0])).sum::<f64>() / 400.0;
+            for curve in curves(&samples, &[false], &CurveSettings::default()) {
+                for (i, &x) in curve.x.iter().enumerate() {
+                    let truth = if curve.variable == "qd1" {
+                        force(0.0, x)
+                    } else {
+                        mean
+                    };
+                    let holds = curve.low[i] <= truth && truth <= curve.high[i];
+                    (held, all) = (held + usize::from(holds), all + 1);
+                    if curve.variable == "q1" {
+                        off = off.max((curve.force[i] - mean).abs());
+                    }
+                }
+            }
+        }
+        let share = held as f64 / all as f64;
+        println!("{share} {off}");
+        assert!((0.85..0.995).contains(&share), "{share}");
+        // The force itself is up to 0.45 N m.
+        assert!(off < 0.1, "{off}");
+    }
+}

@@ -1,0 +1,184 @@
+//! Failures are carried to the report, and settings are heard, on a simulated pendulum with dry friction.
+
+use std::path::Path;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::confirm::confirm;
+use super::find::{Found, find};
+use super::fitted::Fitted;
+use super::refine::refine;
+use super::remainder::ResidualForce;
+use super::score::{Scorer, findings};
+use super::settings::Settings;
+use super::split::Split;
+use super::study::Study;
+use super::verdict::{Verdict, verdict};
+use crate::data::Log;
+use crate::identify::FitError;
+use crate::model::{FittedEffect, Library, System};
+use crate::plant::Plant;
+
+const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
+effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
+"#;
+
+fn logs() -> Vec<Log> {
+    let plant = Plant::from_text(Path::new("rig.toml"), RIG, &Library::built_in()).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    (0..plant.recording.logs)
+        .map(|_| plant.record(&mut rng).unwrap())
+        .collect()
+}
+
+fn pendulum() -> System {
+    Library::built_in().system(Path::new("pendulum")).unwrap()
+}
+
+/// A model that moves no window: its values are no numbers.
+fn diverging(mut model: Fitted) -> Fitted {
+    model.declared.fill(f64::NAN);
+    model.fit.values.fill(f64::NAN);
+    model
+}
+
+fn search(study: &mut Study<'_>) -> Found {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    find(study, &Library::built_in(), &mut rng, &mut |_| {}).unwrap()
+}
+
+#[test]
+fn a_model_that_diverges_has_no_residual_force() {
+    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let mut study = Study::new(&system, &logs, &settings);
+    let model = study.fit_declared().unwrap();
+    assert!(ResidualForce::of(&study, &model).unwrap().norm() > 0.0);
+    let failed = ResidualForce::of(&study, &diverging(model));
+    assert!(matches!(failed, Err(FitError::Diverged { .. })));
+}
+
+#[test]
+fn data_on_which_a_model_diverges_confirm_nothing() {
+    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let mut study = Study::new(&system, &logs, &settings);
+    let model = study.fit_declared().unwrap();
+    assert!(confirm(&study, &study, model.clone()).is_ok());
+    let failed = confirm(&study, &study, diverging(model));
+    assert!(matches!(failed, Err(FitError::Diverged { .. })));
+}
+
+#[test]
+fn a_fit_that_fails_allows_no_verdict() {
+    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let split = Split::of(logs, &settings.split);
+    let mut study = Study::new(&system, &split.train, &settings);
+    let mut found = search(&mut study);
+    let scorer = Scorer {
+        test: &split.test,
+        settings: &settings.score,
+    };
+    let refined = refine(&study, &found.after);
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let models = [&found.before, &refined.model];
+    let errors = scorer.errors(&system, models, None, &[], &mut rng);
+    let of = |found: &Found, refined: &_| verdict(&study, found, refined, &errors);
+    assert_eq!(of(&found, &refined).0, Verdict::Explained);
+
+    let mut failed = refine(&study, &diverging(found.after.clone()));
+    assert!(matches!(failed.failure, Some(FitError::Diverged { .. })));
+    failed.model = refined.model.clone();
+    let (answer, reason) = of(&found, &failed);
+    assert_eq!(answer, Verdict::Inconclusive);
+    assert!(reason.contains("the final fit in fine steps failed"));
+
+    found.failure = failed.failure.clone();
+    assert_eq!(of(&found, &refined).0, Verdict::Inconclusive);
+}
+
+/// Where a rig's torque carries a bias, the model without the effect that takes it away leaves the range in which its
+/// equations hold.
+#[test]
+fn an_effect_stays_where_the_refit_without_it_fails() {
+    let bounded = "sin(q1) * (1 + 1e-9*sqrt(2 - abs(q1)))";
+    let text = pendulum().declaration.replace("sin(q1)", bounded);
+    let library = Library::built_in();
+    let system = System::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
+    let (mut logs, settings) = (logs(), Settings::default());
+    for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
+        *tau += 8.0;
+    }
+    let split = Split::of(logs, &settings.split);
+    let study = Study::new(&system, &split.train, &settings);
+    let bias = |size: f64| FittedEffect {
+        values: vec![(size, None)],
+        ..FittedEffect::absent(library.effect("constant_torque").unwrap(), 0)
+    };
+    let declared = [-17.4, 4.6];
+    let locals = study.shooting.initial_locals(0);
+    let chosen = study.refit(&[bias(-8.0)], &declared, locals, None).unwrap();
+    let refined = refine(&study, &chosen);
+    let scorer = Scorer {
+        test: &split.test,
+        settings: &settings.score,
+    };
+    let with = scorer.fitted(&refined.model);
+    let found = findings(&study, &chosen, &refined, &scorer, &with);
+    assert_eq!(found.len(), 1);
+    assert!(matches!(
+        found[0].error_reduction,
+        Err(FitError::Diverged { .. })
+    ));
+    assert!(found[0].p_value < 1e-6);
+}
+
+#[test]
+fn the_error_reduction_compares_two_fine_fits() {
+    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let split = Split::of(logs, &settings.split);
+    let mut study = Study::new(&system, &split.train, &settings);
+    let found = search(&mut study);
+    let refined = refine(&study, &found.after);
+    let scorer = Scorer {
+        test: &split.test,
+        settings: &settings.score,
+    };
+    let with = scorer.fitted(&refined.model);
+    let reported = findings(&study, &found.after, &refined, &scorer, &with);
+    let reduction = *reported[0].error_reduction.as_ref().unwrap();
+    let beside = |model: &Fitted| 1.0 - with.position_rms() / scorer.fitted(model).position_rms();
+    let fine = beside(&refined.study.estimate(&found.before).unwrap());
+    let coarse = beside(&found.before);
+    println!("{reduction} {fine} {coarse}");
+    assert!((reduction - fine).abs() < 0.1 * (fine - coarse).abs());
+}
+
+#[test]
+fn a_setting_is_heard() {
+    let (system, logs) = (pendulum(), logs());
+    let named = |settings: &Settings| {
+        search(&mut Study::new(&system, &logs, settings))
+            .after
+            .effects
+            .len()
+    };
+    let mut settings = Settings::default();
+    assert_eq!(named(&settings), 1);
+    settings.select.most_effects = 0;
+    assert_eq!(named(&settings), 0);
+}
+
+#[test]
+fn a_result_predicts_a_log() {
+    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let model = Study::new(&system, &logs, &settings)
+        .fit_declared()
+        .unwrap();
+    let predicted = model.predict(&logs[0], 0.5);
+    assert!(predicted.len() > 10);
+}

@@ -1,0 +1,181 @@
+use std::fs;
+use std::io::{self, BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// As many as Linux follows.
+const MOST_LINKS: usize = 40;
+
+/// An output file that cannot be written. What was there before is unchanged, and no part of the new file is left.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: cannot be written: {source}", path = .path.display())]
+pub struct OutputError {
+    pub path: PathBuf,
+    pub source: io::Error,
+}
+
+/// Write a file whole or not at all: under a temporary name in the same folder, which is then renamed. Symbolic links
+/// are followed, so that the file that a link points to is written and the link stays.
+///
+/// # Errors
+/// A folder that does not exist or cannot be written, a full disk, or a `path` that is no regular file (a folder, a
+/// device, a pipe).
+pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), OutputError> {
+    write_with(path, |file| file.write_all(contents))
+}
+
+/// [`write_whole`] for contents that `write` produces piece by piece.
+///
+/// # Errors
+/// As [`write_whole`], and what `write` returns.
+pub fn write_with(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let written = || {
+        let target = target_of(path)?;
+        let folder = folder_of(&target);
+        if !folder.is_dir() {
+            let missing = "its folder does not exist";
+            return Err(io::Error::new(ErrorKind::NotFound, missing));
+        }
+        let file = with_usual_permissions().tempfile_in(folder)?;
+        let mut buffer = BufWriter::new(file);
+        write(&mut buffer)?;
+        let file = buffer.into_inner()?;
+        file.as_file().sync_all()?;
+        file.persist(&target).map_err(|error| error.error)?;
+        Ok(())
+    };
+    written().map_err(|source| OutputError {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Move the complete file `from` to `to`, as [`write_whole`] would write it there.
+///
+/// # Errors
+/// As [`write_whole`].
+pub fn move_to(from: &Path, to: &Path) -> Result<(), OutputError> {
+    let moved = target_of(to).and_then(|target| fs::rename(from, target));
+    match moved {
+        // A link may lead to another file system, where a file can only be written anew.
+        Err(error) if error.kind() == ErrorKind::CrossesDevices => write_with(to, |file| {
+            io::copy(&mut fs::File::open(from)?, file).map(drop)
+        }),
+        moved => moved.map_err(|source| OutputError {
+            path: to.to_owned(),
+            source,
+        }),
+    }
+}
+
+/// The folder that `path` is in; `.` for a name alone.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
+}
+
+/// The regular file, be it one that does not exist yet, that `path` leads to when links are followed.
+fn target_of(path: &Path) -> io::Result<PathBuf> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_file() => fs::canonicalize(path),
+        Ok(found) => {
+            let kind = if found.is_dir() {
+                "a folder"
+            } else {
+                "a device or a pipe"
+            };
+            let message = format!("it is {kind}, not a regular file");
+            Err(io::Error::new(ErrorKind::InvalidInput, message))
+        }
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(end_of_links(path)),
+        Err(error) => Err(error),
+    }
+}
+
+/// Where `path` leads when links are followed, also where they end at nothing. Links that form a loop are followed for a
+/// while; whoever uses the result gets the system's error.
+pub fn end_of_links(path: &Path) -> PathBuf {
+    let mut at = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        match fs::read_link(&at) {
+            Ok(next) => at = folder_of(&at).join(next),
+            Err(_) => break,
+        }
+    }
+    at
+}
+
+/// Temporary files are private by default; results have the permissions of any new file.
+fn with_usual_permissions() -> tempfile::Builder<'static, 'static> {
+    #[cfg_attr(not(unix), allow(unused_mut))]
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::{ErrorKind, io, move_to, write_whole, write_with};
+
+    #[test]
+    fn a_failure_leaves_the_file_that_was_there_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_whole(&path, b"first").unwrap();
+        let broken = write_with(&path, |file| {
+            file.write_all(b"half")?;
+            Err(io::Error::other("the disk is full"))
+        });
+        let told = broken.unwrap_err().to_string();
+        assert!(told.ends_with("a.txt: cannot be written: the disk is full"));
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let missing = write_whole(&folder.path().join("none/a.txt"), b"").unwrap_err();
+        assert!(missing.to_string().contains("its folder does not exist"));
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_are_followed_and_stay() {
+        let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let (link, file) = (
+            folder.path().join("link"),
+            elsewhere.path().join("file.txt"),
+        );
+        // The first link is relative, and at first its end does not exist.
+        std::os::unix::fs::symlink(&file, folder.path().join("second")).unwrap();
+        std::os::unix::fs::symlink("second", &link).unwrap();
+        for contents in [b"first!", b"second"] {
+            write_whole(&link, contents).unwrap();
+            assert_eq!(fs::read(&file).unwrap(), contents);
+        }
+        let staged = folder.path().join("staged");
+        fs::write(&staged, "third").unwrap();
+        move_to(&staged, &link).unwrap();
+        assert_eq!(fs::read(&file).unwrap(), b"third");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_dir(elsewhere.path()).unwrap().count(), 1);
+        let looped = folder.path().join("loop");
+        std::os::unix::fs::symlink("loop", &looped).unwrap();
+        assert!(write_whole(&looped, b"").is_err());
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn what_is_no_regular_file_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let device = folder.path().join("device");
+        std::os::unix::fs::symlink("/dev/null", &device).unwrap();
+        for (path, kind) in [(device.as_path(), "a device"), (folder.path(), "a folder")] {
+            let error = write_whole(path, b"text").unwrap_err();
+            assert_eq!(error.source.kind(), ErrorKind::InvalidInput);
+            assert!(error.to_string().contains(kind), "{error}");
+        }
+    }
+}

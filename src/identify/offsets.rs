@@ -1,0 +1,139 @@
+use thiserror::Error;
+
+use super::{FitError, Shooting, fit};
+use crate::data::{Interval, Log};
+use crate::expr::Graph;
+use crate::model::{Dynamics, Parameter};
+use crate::sim::cut;
+
+/// A model with an unknown sensor offset per joint and log.
+#[derive(Debug, Clone)]
+pub struct Offsets {
+    pub dynamics: Dynamics,
+    /// All parameters of that model, `[log][parameter]`.
+    pub values: Vec<Vec<f64>>,
+    /// The sensor offsets in rad (or m), `[log][joint]`.
+    pub offsets: Vec<Vec<f64>>,
+}
+
+/// Why offsets could not be estimated.
+#[derive(Debug, Error)]
+pub enum CalibrateError {
+    #[error(
+        "a calibration on the fraction {0} of each log is not possible; give a number above 0 and below 1"
+    )]
+    Fraction(f64),
+    #[error("{log}: its first {seconds:.2} s do not give its sensor offsets: {source}")]
+    Fit {
+        log: String,
+        seconds: f64,
+        source: FitError,
+    },
+}
+
+/// Length in s of the windows over which offsets are estimated.
+const WINDOW_S: f64 = 0.5;
+
+/// Estimate the sensor offsets of each log on its first `fraction`, which is then left out of the log.
+///
+/// # Errors
+/// A fraction outside of 0 to 1, or a beginning that is too short.
+pub fn calibrate(
+    dynamics: &Dynamics,
+    values: &[f64],
+    logs: &mut [Log],
+    fraction: f64,
+) -> Result<Offsets, CalibrateError> {
+    if !(fraction > 0.0 && fraction < 1.0) {
+        return Err(CalibrateError::Fraction(fraction));
+    }
+    let with_offsets = with_offsets(dynamics);
+    let mut found = Offsets {
+        dynamics: with_offsets,
+        values: Vec::new(),
+        offsets: Vec::new(),
+    };
+    for log in logs {
+        let seconds = fraction * log.duration();
+        let start_s = log.time[0];
+        let rest = Interval {
+            start_s: start_s + seconds,
+            end_s: f64::INFINITY,
+        };
+        let mut beginning = log.clone();
+        beginning.leave_out.push(rest);
+        let all =
+            estimate(&found.dynamics, values, beginning).map_err(|source| CalibrateError::Fit {
+                log: log.name(),
+                seconds,
+                source,
+            })?;
+        found.offsets.push(all[values.len()..].to_vec());
+        found.values.push(all);
+        log.leave_out.push(Interval {
+            start_s,
+            end_s: start_s + seconds,
+        });
+    }
+    Ok(found)
+}
+
+fn estimate(dynamics: &Dynamics, values: &[f64], log: Log) -> Result<Vec<f64>, FitError> {
+    let logs = [log];
+    let noise = vec![1e-3; dynamics.joints];
+    let shooting = Shooting::new(&logs, cut(&logs, WINDOW_S), &noise);
+    let start = [values, &vec![0.0; dynamics.joints]].concat();
+    let active: Vec<usize> = (values.len()..start.len()).collect();
+    let locals = shooting.initial_locals(0);
+    Ok(fit(&shooting, dynamics, &active, &start, locals, None)?.values)
+}
+
+/// The same equations in logged angles: the true angle is the logged one less the offset.
+fn with_offsets(dynamics: &Dynamics) -> Dynamics {
+    let n = dynamics.joints;
+    let mut graph = Graph::new();
+    let mut inputs: Vec<_> = dynamics
+        .program
+        .inputs()
+        .iter()
+        .map(|name| graph.input(name))
+        .collect();
+    let mut parameters = dynamics.parameters.clone();
+    let logged = inputs[..n].to_vec();
+    for (joint, input) in inputs[..n].iter_mut().enumerate() {
+        // Names with spaces cannot occur in formulas, so this name is free.
+        let name = format!("offset of q{}", joint + 1);
+        let offset = graph.input(&name);
+        *input = graph.sub(*input, offset);
+        parameters.push(Parameter {
+            name,
+            value: 0.0,
+            unit: "rad".into(),
+            bounds: [-1.0, 1.0],
+            fixed: false,
+            per_log: false,
+            ci95: None,
+            scale: 0.01,
+        });
+    }
+    let outputs = graph.append(&dynamics.program, &inputs);
+    let reading = dynamics.reading.as_ref().map(|reading| {
+        let mut graph = graph.clone();
+        let shown = graph.append(reading, &inputs);
+        let with_offset: Vec<_> = (shown.into_iter().zip(&logged).zip(&inputs))
+            .map(|((shown, logged), own)| {
+                let offset = graph.sub(*logged, *own);
+                graph.add(shown, offset)
+            })
+            .collect();
+        graph.finish(&with_offset)
+    });
+    Dynamics {
+        name: dynamics.name.clone(),
+        joints: n,
+        parameters,
+        program: graph.finish(&outputs),
+        filters: dynamics.filters.clone(),
+        reading,
+    }
+}

@@ -1,0 +1,279 @@
+use std::fs::{self, TryLockError};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Identity;
+use super::lock::Lock;
+use crate::files::{OutputError, end_of_links, folder_of, write_whole};
+
+/// What a folder belongs to: the identity of its run and the version that began it.
+const RECORD: &str = "run.json";
+
+/// The folder of a run: one run at a time works in it, and a run that was interrupted goes on in it.
+///
+/// It is locked until all copies are dropped or the process ends, however that comes. The lock is a file beside the
+/// folder, `.NAME.lock`, since a checkpoint replaces the whole folder.
+#[derive(Debug, Clone)]
+pub struct RunFolder {
+    path: PathBuf,
+    _lock: Arc<Lock>,
+}
+
+/// Why a run cannot have its folder.
+#[derive(Debug, Error)]
+pub enum RunFolderError {
+    #[error("{path}: another run is working there", path = .path.display())]
+    Busy { path: PathBuf },
+    #[error("{path} holds another run: {difference}", path = .path.display())]
+    OtherRun { path: PathBuf, difference: String },
+    #[error("{path} is a file", path = .path.display())]
+    NotAFolder { path: PathBuf },
+    #[error("{path} cannot be {action}: {source}", path = .path.display())]
+    Io {
+        action: &'static str,
+        path: PathBuf,
+        source: io::Error,
+    },
+    #[error("{path} is damaged: {reason}", path = .path.display())]
+    Damaged { path: PathBuf, reason: String },
+    #[error("{0}")]
+    Output(#[from] OutputError),
+}
+
+/// `run.json`
+#[derive(Serialize, Deserialize)]
+struct Record {
+    /// The program that began the run.
+    residyn: String,
+    #[serde(flatten)]
+    run: Identity,
+}
+
+impl RunFolder {
+    /// Lock the folder `path`. It need not exist yet; the folder that it is in is made.
+    ///
+    /// # Errors
+    /// Another run works there, `path` is a file, or the folder that it is in cannot be written.
+    pub fn open(path: &Path) -> Result<Self, RunFolderError> {
+        let owned = || path.to_owned();
+        if path.exists() && !path.is_dir() {
+            return Err(RunFolderError::NotAFolder { path: owned() });
+        }
+        let parent = folder_of(path);
+        fs::create_dir_all(parent).map_err(failed("made", parent))?;
+        let lock = lock_of(path).map_err(failed("found", path))?;
+        match Lock::take(&lock) {
+            Ok(lock) => Ok(Self {
+                path: owned(),
+                _lock: Arc::new(lock),
+            }),
+            Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy { path: owned() }),
+            Err(TryLockError::Error(source)) => Err(failed("locked", path)(source)),
+        }
+    }
+
+    /// The folder of this name within this one, under the same lock.
+    #[must_use]
+    pub fn within(&self, name: impl AsRef<Path>) -> Self {
+        Self {
+            path: self.path.join(name),
+            _lock: Arc::clone(&self._lock),
+        }
+    }
+
+    /// The folder's path, as it was given; it may not exist yet.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Record that the folder belongs to `run`, or find that it does.
+    ///
+    /// # Errors
+    /// The folder belongs to another run, cannot be made or written, or its record is damaged.
+    pub fn claim(&self, run: &Identity) -> Result<(), RunFolderError> {
+        match self.read::<Record>(RECORD)? {
+            Some(saved) => self.expect(&saved.run, run),
+            None => self.write(
+                RECORD,
+                &Record {
+                    residyn: env!("CARGO_PKG_VERSION").to_owned(),
+                    run: run.clone(),
+                },
+            ),
+        }
+    }
+
+    /// Refuse to mix `run` with the one that was `saved` here.
+    ///
+    /// # Errors
+    /// They differ.
+    pub fn expect(&self, saved: &Identity, run: &Identity) -> Result<(), RunFolderError> {
+        run.difference(saved).map_or(Ok(()), |difference| {
+            Err(RunFolderError::OtherRun {
+                path: self.path.clone(),
+                difference,
+            })
+        })
+    }
+
+    /// The text of a file here; none where there is no such file.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn text(&self, name: &str) -> Result<Option<String>, RunFolderError> {
+        let path = self.path.join(name);
+        match fs::read_to_string(&path) {
+            Ok(text) => Ok(Some(text)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(failed("read", &path)(error)),
+        }
+    }
+
+    /// What a JSON file here says; none where there is no such file.
+    ///
+    /// # Errors
+    /// A file that cannot be read or does not say a `T`.
+    pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, RunFolderError> {
+        let read = |text: String| serde_json::from_str(&text);
+        let value = self.text(name)?.map(read).transpose();
+        value.map_err(|error| self.damaged(name, error.to_string()))
+    }
+
+    /// Write a JSON file here, whole or not at all; the folder is made where it is missing.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write(&self, name: &str, value: &impl Serialize) -> Result<(), RunFolderError> {
+        let json = serde_json::to_string_pretty(value).expect("numbers, texts and names");
+        self.write_text(name, &(json + "\n"))
+    }
+
+    /// Write a text file here, whole or not at all; the folder is made where it is missing.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn write_text(&self, name: &str, text: &str) -> Result<(), RunFolderError> {
+        fs::create_dir_all(&self.path).map_err(failed("made", &self.path))?;
+        Ok(write_whole(&self.path.join(name), text.as_bytes())?)
+    }
+
+    /// The error of a file here that cannot be what this program wrote.
+    pub fn damaged(&self, name: &str, reason: String) -> RunFolderError {
+        RunFolderError::Damaged {
+            path: self.path.join(name),
+            reason,
+        }
+    }
+}
+
+/// The file that locks a folder: the same for every name that leads to the folder.
+fn lock_of(path: &Path) -> io::Result<PathBuf> {
+    let path = end_of_links(path);
+    let real = match fs::canonicalize(&path) {
+        Ok(real) => real,
+        Err(_) => fs::canonicalize(folder_of(&path))?.join(path.file_name().unwrap_or_default()),
+    };
+    let mut name = std::ffi::OsString::from(".");
+    name.push(real.file_name().unwrap_or_default());
+    name.push(".lock");
+    Ok(real.with_file_name(name))
+}
+
+fn failed<'a>(action: &'static str, path: &'a Path) -> impl Fn(io::Error) -> RunFolderError {
+    move |source| RunFolderError::Io {
+        action,
+        path: path.to_owned(),
+        source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use serde_json::json;
+
+    use super::{Identity, RunFolder, RunFolderError};
+
+    #[test]
+    fn one_run_at_a_time_works_in_a_folder() {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("run");
+        let first = RunFolder::open(&path).unwrap();
+        assert!(!path.exists(), "a folder is made when it is needed");
+        let part = first.within("runs/a");
+        part.write_text("a.txt", "").unwrap();
+        drop(first);
+        let refused = RunFolder::open(&path).unwrap_err();
+        assert!(matches!(refused, RunFolderError::Busy { .. }), "{refused}");
+        // Under another name it is the same folder.
+        let refused = RunFolder::open(&path.join("../run")).unwrap_err();
+        assert!(matches!(refused, RunFolderError::Busy { .. }), "{refused}");
+        drop(part);
+        drop(RunFolder::open(&path).unwrap());
+        let left: Vec<_> = fs::read_dir(parent.path()).unwrap().collect();
+        assert_eq!(left.len(), 1, "the lock goes with its owner: {left:?}");
+        // A killed process leaves the file, but not the lock.
+        fs::write(parent.path().join(".run.lock"), "").unwrap();
+        drop(RunFolder::open(&path).unwrap());
+    }
+
+    #[test]
+    fn threads_that_open_and_drop_a_folder_never_share_it() {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("run");
+        let owners = std::sync::atomic::AtomicUsize::new(0);
+        let work = || {
+            for _ in 0..500 {
+                if let Ok(folder) = RunFolder::open(&path) {
+                    use std::sync::atomic::Ordering::SeqCst;
+                    assert_eq!(owners.fetch_add(1, SeqCst), 0);
+                    owners.fetch_sub(1, SeqCst);
+                    drop(folder);
+                }
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(work);
+            }
+        });
+    }
+
+    #[test]
+    fn a_folder_keeps_to_its_run() {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("run");
+        let of_seed = |seed| Identity {
+            command: "train".to_owned(),
+            seed,
+            config: json!({"epochs": 40}),
+            inputs: [].into(),
+        };
+        let claim = |seed| RunFolder::open(&path).unwrap().claim(&of_seed(seed));
+        claim(3).unwrap();
+        claim(3).unwrap();
+        let told = claim(4).unwrap_err().to_string();
+        assert!(
+            told.ends_with("run holds another run: its `seed` is 3, here it is 4"),
+            "{told}"
+        );
+        fs::write(path.join("run.json"), "{").unwrap();
+        let told = claim(3).unwrap_err().to_string();
+        assert!(told.contains("run.json is damaged: EOF"), "{told}");
+    }
+
+    #[test]
+    fn a_file_is_no_folder() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let told = RunFolder::open(file.path()).unwrap_err().to_string();
+        assert!(told.ends_with("is a file"), "{told}");
+        let inside = RunFolder::open(&file.path().join("a/run")).unwrap_err();
+        assert!(inside.to_string().contains("cannot be made"), "{inside}");
+    }
+}

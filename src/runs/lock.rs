@@ -1,0 +1,58 @@
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// An advisory lock, held until it is dropped or the process ends. Its file is removed when it is dropped.
+#[derive(Debug)]
+pub(super) struct Lock {
+    path: PathBuf,
+    /// Locked for as long as it is open.
+    _file: File,
+}
+
+impl Lock {
+    /// Take the lock whose file is `path`.
+    ///
+    /// # Errors
+    /// `WouldBlock` where another owner has it; a file that cannot be made or locked.
+    pub fn take(path: &Path) -> Result<Self, TryLockError> {
+        loop {
+            let mut options = OpenOptions::new();
+            let opened = options.write(true).create(true).truncate(false).open(path);
+            let file = opened.map_err(TryLockError::Error)?;
+            file.try_lock()?;
+            if is_at(&file, path).map_err(TryLockError::Error)? {
+                return Ok(Self {
+                    path: path.to_owned(),
+                    _file: file,
+                });
+            }
+            // Its last owner removed the file between the opening and the locking; the next one of that name counts.
+        }
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // A file that stays is not locked any more, and the next owner takes it.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+/// Whether `path` is still the name of `file`.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |found: fs::Metadata| (found.dev(), found.ino());
+    match fs::metadata(path) {
+        Ok(found) => Ok(identity(found) == identity(file.metadata()?)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Elsewhere a file that is open keeps its name.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> io::Result<bool> {
+    Ok(true)
+}

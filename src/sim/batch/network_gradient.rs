@@ -1,0 +1,194 @@
+use pulp::Simd;
+
+use super::network::{Layer, Network};
+use super::product::{Finish, Product};
+use super::{Rows, W};
+use crate::lanes::{Element, Vector};
+
+/// A range of the values of several blocks of rows.
+#[derive(Clone, Copy)]
+struct Columns<'a> {
+    rows: &'a [Rows],
+    /// Values of one block.
+    stride: usize,
+    first: usize,
+}
+
+impl<'a> Columns<'a> {
+    #[inline(always)]
+    fn registers<S: Simd, const N: usize>(
+        self,
+        block: usize,
+        from: usize,
+    ) -> [&'a [<f32 as Element>::Register<S>]; N] {
+        let rows = &self.rows[block * self.stride + self.first + from..][..N];
+        std::array::from_fn(|k| f32::registers::<S>(&rows[k].0))
+    }
+}
+
+impl Network {
+    /// Backpropagation for several blocks of rows. `activations` are those of [`Network::forward`], with the loss
+    /// gradient with respect to the outputs in place of the outputs; every layer's values are replaced by the
+    /// gradient with respect to the inputs of its ReLU.
+    ///
+    /// `sums` holds one register for each weight and bias, to which its gradient is added lane by lane. `by_features`,
+    /// unless it is empty, receives the gradient with respect to the features.
+    #[inline(always)]
+    pub fn backward<S: Simd>(
+        &self,
+        simd: S,
+        features: &[Rows],
+        activations: &mut [Rows],
+        by_features: &mut [Rows],
+        sums: &mut [f32],
+    ) {
+        let stride = self.activations();
+        let blocks = activations.len() / stride;
+        for (k, layer) in self.layers.iter().enumerate().rev() {
+            let inputs = match k {
+                0 => Columns {
+                    rows: features,
+                    stride: layer.inputs,
+                    first: 0,
+                },
+                _ => Columns {
+                    rows: activations,
+                    stride,
+                    first: self.layers[k - 1].values.start,
+                },
+            };
+            let slopes = Columns {
+                rows: activations,
+                stride,
+                first: layer.values.start,
+            };
+            layer.add_gradient(simd, blocks, slopes, inputs, sums);
+            for block in 0..blocks {
+                let values = &mut activations[block * stride..][..stride];
+                let (before, slopes) = values.split_at_mut(layer.values.start);
+                let (finish, to) = match k {
+                    0 if by_features.is_empty() => continue,
+                    0 => {
+                        let to = &mut by_features[block * layer.inputs..];
+                        (Finish::Plain, &mut to[..layer.inputs])
+                    }
+                    _ => {
+                        let first = before.len() - layer.inputs;
+                        (Finish::Masked, &mut before[first..])
+                    }
+                };
+                let product = Product {
+                    weight: &self.numbers[layer.weight.clone()],
+                    bias: &[],
+                    finish,
+                };
+                product.run(simd, &slopes[..layer.outputs], to);
+            }
+        }
+    }
+}
+
+impl Layer {
+    /// Accumulate the gradient of the layer's weights and biases.
+    #[inline(always)]
+    fn add_gradient<S: Simd>(
+        &self,
+        simd: S,
+        blocks: usize,
+        slopes: Columns,
+        inputs: Columns,
+        sums: &mut [f32],
+    ) {
+        let lanes = f32::lanes::<S>();
+        let sums =
+            f32::registers_mut::<S>(&mut sums[lanes * self.weight.start..lanes * self.bias.end]);
+        let (weight, bias) = sums.split_at_mut(self.weight.len());
+        let mut output = 0;
+        while self.outputs - output >= 4 {
+            self.row_of_tiles::<S, 4>(simd, output, blocks, slopes, inputs, weight);
+            output += 4;
+        }
+        while self.outputs > output {
+            self.row_of_tiles::<S, 1>(simd, output, blocks, slopes, inputs, weight);
+            output += 1;
+        }
+        for (output, bias) in bias.iter_mut().enumerate() {
+            let mut sum = Vector::<S, f32>::new(simd, *bias);
+            for block in 0..blocks {
+                let [slopes] = slopes.registers::<S, 1>(block, output);
+                for slope in slopes {
+                    sum = sum + Vector::new(simd, *slope);
+                }
+            }
+            *bias = sum.register;
+        }
+    }
+
+    /// The weight gradient of `O` outputs.
+    #[inline(always)]
+    fn row_of_tiles<S: Simd, const O: usize>(
+        &self,
+        simd: S,
+        output: usize,
+        blocks: usize,
+        slopes: Columns,
+        inputs: Columns,
+        weight: &mut [<f32 as Element>::Register<S>],
+    ) {
+        let mut input = 0;
+        if S::REGISTER_COUNT >= 32 {
+            while self.inputs - input >= 4 {
+                self.tile::<S, O, 4>(simd, (output, input), blocks, slopes, inputs, weight);
+                input += 4;
+            }
+        }
+        while self.inputs - input >= 2 {
+            self.tile::<S, O, 2>(simd, (output, input), blocks, slopes, inputs, weight);
+            input += 2;
+        }
+        while self.inputs > input {
+            self.tile::<S, O, 1>(simd, (output, input), blocks, slopes, inputs, weight);
+            input += 1;
+        }
+    }
+
+    /// `O` outputs by `I` inputs, accumulated in registers over all rows.
+    #[inline(always)]
+    fn tile<S: Simd, const O: usize, const I: usize>(
+        &self,
+        simd: S,
+        (output, input): (usize, usize),
+        blocks: usize,
+        slopes: Columns,
+        inputs: Columns,
+        weight: &mut [<f32 as Element>::Register<S>],
+    ) {
+        let at = |o: usize| (output + o) * self.inputs + input;
+        let mut sums = [[Vector::<S, f32>::splat(simd, 0.0); I]; O];
+        for o in 0..O {
+            let weight = &weight[at(o)..][..I];
+            for i in 0..I {
+                sums[o][i].register = weight[i];
+            }
+        }
+        for block in 0..blocks {
+            let slopes = slopes.registers::<S, O>(block, output);
+            let inputs = inputs.registers::<S, I>(block, input);
+            for k in 0..W / f32::lanes::<S>() {
+                for o in 0..O {
+                    let slope = Vector::new(simd, slopes[o][k]);
+                    for i in 0..I {
+                        let input = Vector::new(simd, inputs[i][k]);
+                        sums[o][i] = slope.mul_add(input, sums[o][i]);
+                    }
+                }
+            }
+        }
+        for o in 0..O {
+            let weight = &mut weight[at(o)..][..I];
+            for i in 0..I {
+                weight[i] = sums[o][i].register;
+            }
+        }
+    }
+}

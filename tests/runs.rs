@@ -1,0 +1,148 @@
+//! Runs and their files, through the binary: one run a folder, recorded commands that repeat the result, output files
+//! that are written through links and never onto devices.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::support::{refuses, succeeds, text};
+use crate::train::{config, json, refused, residyn, run};
+
+#[test]
+fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let config = config("train-pendulum.toml");
+    let save_often = ["--save-every", "20", "--out", "c"];
+    let command = [&["train", "--config", &config][..], &save_often].concat();
+    let first = residyn(dir, &[&command[..], &["--json"]].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    while !dir.join("c/checkpoint.json").exists() {
+        sleep(Duration::from_millis(2));
+    }
+    for again in [&command[..], &["closeloop", "--out", "./c"]] {
+        let message = refused(dir, again);
+        assert!(message.contains("c: another run is working there; wait until"));
+        assert!(message.contains("--out"), "{message}");
+    }
+    let ended = first.wait_with_output().unwrap();
+    assert!(ended.status.success());
+    let found: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(json(dir, &command), found);
+    let left = fs::read_dir(dir).unwrap().count();
+    assert_eq!(left, 1, "only the checkpoint is left");
+}
+
+/// Carry out a command, remove what it wrote, carry out the command that `command` finds in the file `record`, and
+/// compare the records without what is no result.
+fn comes_again(arguments: &[&str], record: &str, command: fn(&Value) -> &Value, clock: &[&str]) {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let read = || -> Value {
+        let text = fs::read_to_string(dir.join(record)).unwrap();
+        let mut value: Value = serde_json::from_str(&text).unwrap();
+        for key in clock {
+            assert_ne!(value[*key].take(), Value::Null, "{key}");
+        }
+        value
+    };
+    assert!(run(dir, arguments).status.success(), "{arguments:?}");
+    let first = read();
+    fs::remove_dir_all(dir.join("the run")).unwrap();
+    let bin = Path::new(env!("CARGO_BIN_EXE_residyn")).parent().unwrap();
+    let again = Command::new("/bin/sh")
+        .current_dir(dir)
+        .args(["-c", command(&first).as_str().unwrap()])
+        .env("PATH", bin)
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&again.stderr);
+    assert!(again.status.success(), "{}: {errors}", command(&first));
+    assert_eq!(read(), first);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_recorded_command_gives_the_same_file_again() {
+    let experiment = config("smoke/physics-prior-pendulum.toml");
+    let arguments = ["experiment", "physics-prior", "--config", &experiment];
+    let own = ["--out", "the run", "--seed", "1000"];
+    let recorded: fn(&Value) -> &Value = |results| {
+        assert_eq!(results["seeds"], serde_json::json!([1000, 1001]));
+        &results["command"]
+    };
+    comes_again(
+        &[&arguments[..], &own].concat(),
+        "the run/results.json",
+        recorded,
+        &["wall_s"],
+    );
+    let recipe = config("smoke/train-pendulum.toml");
+    comes_again(
+        &[&["train", "--config", &recipe][..], &own].concat(),
+        "the run/checkpoint.json",
+        |checkpoint| &checkpoint["config"]["command_line"],
+        &[],
+    );
+    comes_again(
+        &[&["sweep", "--seeds", "2", "--config", &recipe][..], &own].concat(),
+        "the run/sweep.json",
+        |sweep| &sweep["config"]["command_line"],
+        &["totals"],
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn a_log_is_written_through_a_link_and_never_onto_a_device() {
+    use std::os::unix::fs::symlink;
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("logs")).unwrap();
+    symlink("logs/run.csv", at("link.csv")).unwrap();
+    symlink("/dev/null", at("device.csv")).unwrap();
+    let (link, device) = (at("link.csv"), at("device.csv"));
+    let simulate = [
+        "simulate",
+        "--plant",
+        "pendulum",
+        "--duration",
+        "1",
+        "--out",
+    ];
+    succeeds(&[&simulate[..], &[text(&link)]].concat());
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert!(
+        fs::read_to_string(at("logs/run.csv"))
+            .unwrap()
+            .starts_with("time,q1")
+    );
+    let message = refuses(&[&simulate[..], &[text(&device)]].concat());
+    for part in ["device.csv", "a device", "not a regular file", "--out"] {
+        assert!(message.contains(part), "{part:?} in {message}");
+    }
+    assert!(fs::symlink_metadata(&device).unwrap().is_symlink());
+    assert_eq!(fs::read_dir(at("logs")).unwrap().count(), 1);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_checkpoint_is_written_through_a_link() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    std::os::unix::fs::symlink("real", dir.join("link")).unwrap();
+    let config = config("smoke/train-pendulum.toml");
+    for _ in 0..2 {
+        json(dir, &["train", "--config", &config, "--out", "link"]);
+        assert!(fs::symlink_metadata(dir.join("link")).unwrap().is_symlink());
+        assert!(dir.join("real/checkpoint.json").is_file());
+        assert_eq!(fs::read_dir(dir).unwrap().count(), 2);
+    }
+}
