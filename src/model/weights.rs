@@ -9,7 +9,7 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
 use super::saved::{SavedModelError, SavedNetwork};
-use super::{LayerWeights, MlpWeights, ModelShape, ModelWeights};
+use super::{LayerWeights, MlpWeights, ModelShape, ModelWeights, to_f32};
 
 /// A tensor on its way into a file.
 pub(crate) struct Entry {
@@ -20,12 +20,12 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// A vector of f32.
-    pub(crate) fn of_f32(name: String, values: &[f32]) -> Self {
+    /// Of f32.
+    pub(crate) fn of_f32(name: String, shape: Vec<usize>, values: &[f32]) -> Self {
         Self {
             name,
             dtype: Dtype::F32,
-            shape: vec![values.len()],
+            shape,
             bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
         }
     }
@@ -60,28 +60,13 @@ pub(crate) fn serialize(shape: &ModelShape, entries: &[Entry]) -> Vec<u8> {
     safetensors::serialize(views, Some(about)).expect("names and shapes are plain")
 }
 
+/// In the precision of training.
 fn layer_entries(prefix: &str, k: usize, layer: &LayerWeights) -> [Entry; 2] {
-    #[allow(clippy::cast_possible_truncation)]
-    // they are f32 in training, widened for other readers
-    let bytes = |values: &[f64]| {
-        values
-            .iter()
-            .flat_map(|v| (*v as f32).to_le_bytes())
-            .collect()
-    };
+    let name = |part| format!("{prefix}layers.{k}.{part}");
+    let weights = vec![layer.outputs, layer.inputs];
     [
-        Entry {
-            name: format!("{prefix}layers.{k}.weight"),
-            dtype: Dtype::F32,
-            shape: vec![layer.outputs, layer.inputs],
-            bytes: bytes(&layer.weight),
-        },
-        Entry {
-            name: format!("{prefix}layers.{k}.bias"),
-            dtype: Dtype::F32,
-            shape: vec![layer.outputs],
-            bytes: bytes(&layer.bias),
-        },
+        Entry::of_f32(name("weight"), weights, &to_f32(&layer.weight)),
+        Entry::of_f32(name("bias"), vec![layer.outputs], &to_f32(&layer.bias)),
     ]
 }
 

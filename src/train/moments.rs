@@ -17,10 +17,10 @@ pub(super) fn to_bytes(manifest: &Manifest, moments: &[Option<Moments>; 2]) -> V
     let known = PARTS.iter().zip(moments);
     let entries = known.filter_map(|(part, moments)| {
         let moments = moments.as_ref()?;
-        Some([
-            Entry::of_f32(format!("{part}.first"), &moments.first),
-            Entry::of_f32(format!("{part}.second"), &moments.second),
-        ])
+        let each = [("first", &moments.first), ("second", &moments.second)];
+        Some(each.map(|(which, values)| {
+            Entry::of_f32(format!("{part}.{which}"), vec![values.len()], values)
+        }))
     });
     serialize(&manifest.shape, &entries.flatten().collect::<Vec<_>>())
 }

@@ -17,7 +17,8 @@ pub struct Imported {
     pub(crate) description: Description,
     /// What its model file says.
     pub system: System,
-    pub(crate) numbers: ModelWeights,
+    /// Values of the parameters, and the networks.
+    pub numbers: ModelWeights,
 }
 
 /// Why a description cannot be read.
