@@ -10,7 +10,6 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::closeloop::{self, Request, Split, close_loop};
-use residyn::expr::SignForm;
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
@@ -50,9 +49,9 @@ const TASKS: [Task; 2] = [
 impl Task {
     fn equations(&self) -> Dynamics {
         let system = Library::built_in()
-            .system(Path::new(self.name))
+            .model(Path::new(self.name))
             .expect("a built-in system");
-        let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; system.joints]);
+        let mut dynamics = system.dynamics();
         for (name, value) in self.parameters {
             let found = dynamics.parameters.iter_mut().find(|p| p.name == *name);
             found.expect("a parameter of the system").value = *value;
@@ -236,7 +235,7 @@ fn identify(c: &mut Criterion) {
     let logs = (0..rig.recording.logs).map(|_| rig.record(&mut rng).expect("a log"));
     let split = Split::of(logs.collect(), &closeloop::Settings::default().split);
     let system = library
-        .system(Path::new("pendulum"))
+        .model(Path::new("pendulum"))
         .expect("a built-in system");
     let mut group = c.benchmark_group("identify");
     group.sample_size(10).bench_function("demo", |b| {

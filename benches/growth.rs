@@ -9,9 +9,8 @@ use std::time::Instant;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit};
-use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, System};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
@@ -158,8 +157,8 @@ fn chain(joints: usize) -> Dynamics {
         "[system]\nname = \"chain\"\njoints = {joints}\n[parameters]\nm = {{ value = 1.0, unit = \"kg\" }}\n\
          g = {{ value = 9.8, unit = \"m/s^2\" }}\n[dynamics]\nmass = [{mass}]\nbias = [{bias}]\n"
     );
-    let system = System::from_text(Path::new("chain.toml"), &text, &[]).expect("a model file");
-    system.dynamics(&vec![SignForm::DEFAULT; joints])
+    let system = Model::from_text(Path::new("chain.toml"), &text, &[]).expect("a model file");
+    system.dynamics()
 }
 
 /// Seconds of fitting the pendulum to logs of this length.
@@ -171,16 +170,16 @@ fn identification(duration_s: f64) -> f64 {
         .record(&mut ChaCha8Rng::seed_from_u64(5))
         .expect("a log");
     let dynamics = library
-        .system(Path::new("pendulum"))
+        .model(Path::new("pendulum"))
         .expect("a built-in system");
-    let dynamics = dynamics.dynamics(&[SignForm::DEFAULT]);
+    let dynamics = dynamics.dynamics();
     let logs = [log];
     let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
     let active = [0, 1];
     best(|| {
         seconds(|| {
-            let (begin, states) = (dynamics.values(), shooting.initial_locals(0));
-            let fitted = fit(&shooting, &dynamics, &active, &begin, states, None);
+            let states = shooting.initial_locals(0);
+            let fitted = fit(&shooting, &dynamics, &active, states, None);
             drop(fitted.expect("a model that stays finite"));
         })
     })

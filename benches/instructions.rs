@@ -10,9 +10,8 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::data::Log;
-use residyn::expr::SignForm;
-use residyn::identify::{Shooting, cut, promise};
-use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, System};
+use residyn::identify::{Shooting, cut, predicted_cost};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model};
 use residyn::plan::Objective;
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
@@ -46,14 +45,14 @@ fn main() {
     }
 }
 
-fn system(name: &str) -> System {
-    let system = Library::built_in().system(Path::new(name));
+fn system(name: &str) -> Model {
+    let system = Library::built_in().model(Path::new(name));
     system.expect("a built-in system")
 }
 
 fn dynamics(name: &str) -> Dynamics {
     let system = system(name);
-    system.dynamics(&vec![SignForm::DEFAULT; system.joints])
+    system.dynamics()
 }
 
 /// The published network for so many joints.
@@ -132,14 +131,7 @@ fn gauss_newton_steps(times: usize) {
     let locals = shooting.initial_locals(0);
     let free: Vec<usize> = (0..dynamics.parameters.len()).collect();
     for _ in 0..times {
-        let cost = promise(
-            &shooting,
-            &dynamics,
-            &free,
-            &dynamics.values(),
-            &locals,
-            1.0,
-        );
+        let cost = predicted_cost(&shooting, &dynamics, &free, &locals, 1.0);
         black_box(cost.expect("a model that does not diverge"));
     }
 }

@@ -19,19 +19,18 @@
 //!
 //! use rand::SeedableRng;
 //! use residyn::sim::metric::{assess, summarise};
-//! use residyn::expr::SignForm;
+//! use residyn::data::Joint;
 //! use residyn::model::Library;
 //! use residyn::plant::Plant;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let library = Library::built_in();
 //! let mut rig = Plant::read(Path::new("pendulum"), &library)?;
-//! rig.add_effect(&library, "coulomb_friction", 1, &[("F_c".to_owned(), 0.2)])?;
+//! rig.add_effect(&library, "coulomb_friction", Joint::at(0), &[("F_c".to_owned(), 0.2)])?;
 //! let log = rig.record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
 //!
-//! let declared = library.system(Path::new("pendulum"))?.dynamics(&[SignForm::DEFAULT]);
-//! let values = declared.values();
-//! let errors = assess(&declared, |_| &values, &[log], &[0.5]);
+//! let declared = library.model(Path::new("pendulum"))?.dynamics();
+//! let errors = assess(&declared, &[log], &[0.5]);
 //! let summary = summarise(&errors.horizons, declared.joints);
 //! assert!(summary.position_rmse[0][0] > 0.01, "friction shows within half a second");
 //! # Ok(())

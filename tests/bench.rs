@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
-use residyn::expr::SignForm;
 use residyn::model::{FittedEffect, Library};
 use residyn::sim::metric::assess;
 
@@ -40,7 +39,7 @@ fn true_value(mechanics: &Mechanics, name: &str) -> Option<f64> {
 /// The library's effect with the true numbers, where it is one of force, torque, angle or inertia.
 fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     let effect = library.effect(&hidden.name).ok()?;
-    let mut known = FittedEffect::absent(effect, hidden.joint - 1);
+    let mut known = FittedEffect::absent(effect, hidden.joint);
     for (slot, parameter) in known.values.iter_mut().zip(&effect.parameters) {
         slot.0 = *hidden.values.get(&parameter.name)?;
     }
@@ -77,16 +76,15 @@ fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code(
         condition.rate_hz = 500.0;
         condition.logs = 2;
         condition.seconds = 6.0;
-        let system = library.system(&cell.model).unwrap();
+        let system = library.model(&cell.model).unwrap();
         let (logs, _) = cell.record(&system).unwrap();
         let error = |effects: &[FittedEffect]| {
-            let sign = vec![SignForm::Smooth { width: 1e-4 }; system.joints];
-            let dynamics = system.dynamics_with(effects, &sign);
-            let mut values = dynamics.values();
-            for (value, parameter) in values.iter_mut().zip(&system.parameters) {
-                *value = true_value(&mechanics, &parameter.name).expect("the rig has it");
+            let rig = system.with_effects(effects.to_vec());
+            let mut rig = rig.with_sign_widths(vec![1e-4; system.joints]);
+            for parameter in &mut rig.parameters {
+                parameter.value = true_value(&mechanics, &parameter.name).expect("the rig has it");
             }
-            assess(&dynamics, |_| &values, &logs, &[0.5]).position_rms()
+            assess(&rig.dynamics(), &logs, &[0.5]).position_rms()
         };
         let effects: Option<Vec<FittedEffect>> = cell
             .effects
@@ -167,7 +165,7 @@ fn logs_of_another_program_are_cells_too() {
     let rig = folder.path().join("rig-01");
     std::fs::create_dir(&rig).unwrap();
     let cell = &read(&path("smoke.toml")).unwrap()[0];
-    let system = Library::built_in().system(&cell.model).unwrap();
+    let system = Library::built_in().model(&cell.model).unwrap();
     let (logs, truth) = cell.record(&system).unwrap();
     for log in &logs {
         log.write(rig.join(&log.path)).unwrap();

@@ -7,21 +7,21 @@ use burn::tensor::{Device, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
-use residyn::data::Log;
+use residyn::data::{Joint, Log};
 use residyn::expr::{Graph, Program, SignForm};
 use residyn::lanes::Row;
-use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, System};
+use residyn::model::{Dynamics, Effect, Entry, FittedEffect, Library, Model};
 use residyn::sim::{Commands, Hold, RK4, Simulator};
 
 pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-pub fn system(name: &str) -> System {
-    Library::built_in().system(Path::new(name)).unwrap()
+pub fn system(name: &str) -> Model {
+    Library::built_in().model(Path::new(name)).unwrap()
 }
 
-pub fn all_systems() -> Vec<System> {
+pub fn all_systems() -> Vec<Model> {
     Library::system_names().iter().map(|n| system(n)).collect()
 }
 
@@ -30,7 +30,7 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
     assert_eq!(effect.parameters.len(), values.len());
     FittedEffect {
         effect: effect.clone(),
-        joint,
+        joint: Joint::at(joint),
         values: values.iter().map(|value| (*value, None)).collect(),
         own: Vec::new(),
         fixed: false,
@@ -38,12 +38,19 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
 }
 
 /// The same form of the sign on every joint.
-pub fn dynamics(system: &System, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
-    system.dynamics_with(effects, &vec![sign; system.joints])
+pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dynamics {
+    let width = match sign {
+        SignForm::Exact => 0.0,
+        SignForm::Smooth { width } => width,
+    };
+    let model = system.with_effects(effects.to_vec());
+    model
+        .with_sign_widths(vec![width; system.joints])
+        .dynamics()
 }
 
 /// Whether the effect can act on that joint.
-pub fn can_act(system: &System, effect: &Effect, joint: usize) -> bool {
+pub fn can_act(system: &Model, effect: &Effect, joint: usize) -> bool {
     let inertia = matches!(effect.entry, Entry::Inertia(_));
     !(inertia && !system.has_mass_matrix() || effect.first_joint_only && joint > 0)
 }
@@ -92,7 +99,7 @@ pub fn catalog(sign: SignForm) -> Vec<Case> {
                         "{} with {} on joint {}",
                         system.name,
                         effect.name,
-                        joint + 1
+                        Joint::at(joint)
                     ),
                     dynamics: dynamics(&system, &effects, sign),
                 }

@@ -167,9 +167,9 @@ fn error_of(checkpoint: &Checkpoint, recipe: &str) -> f64 {
 fn job_dynamics(job: &Job) -> residyn::model::Dynamics {
     let name = job.model.system().to_owned();
     Library::built_in()
-        .system(Path::new(&name))
+        .model(Path::new(&name))
         .unwrap()
-        .dynamics(&vec![residyn::expr::SignForm::DEFAULT; job.model.joints()])
+        .dynamics()
 }
 
 /// Rounding differs between processors and grows over thousands of epochs, so what must come again everywhere is how

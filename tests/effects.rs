@@ -1,5 +1,6 @@
 //! Every effect against its meaning, written by hand; exact sign.
 
+use residyn::data::Joint;
 use residyn::expr::SignForm;
 use residyn::model::{Effect, Library};
 
@@ -102,7 +103,7 @@ fn effects_of_force_and_torque_do_what_their_row_says() {
                     let mut bare = point[..end].to_vec();
                     bare[2 * n + joint] = meaning(&own, q, v, tau);
                     for (j, wanted) in oracle(&bare).into_iter().enumerate() {
-                        let what = format!("{name} on joint {} of {system_name}", joint + 1);
+                        let what = format!("{name} on joint {} of {system_name}", Joint::at(joint));
                         assert_near(found[n + j], wanted, ROUNDING, &what);
                     }
                 }

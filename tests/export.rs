@@ -7,7 +7,7 @@ use residyn::control::{Meter, Task};
 use residyn::formats::{
     Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
 };
-use residyn::model::System;
+use residyn::model::Model;
 use residyn::sim::Integrator;
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -356,7 +356,7 @@ fn names_and_units_of_files_do_not_break_a_module() {
     let text = "[system]\nname = 'a \"\"\" \\ b'\nabout = \"two\\nlines \\\"\\\"\\\"\"\njoints = 1\n[parameters]\n\
                 lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
                 [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
-    let system = System::from_text(Path::new("odd.toml"), text, &[]).unwrap();
+    let system = Model::from_text(Path::new("odd.toml"), text, &[]).unwrap();
     let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("\"\"\"\n\\"));
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("odd.module");

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use residyn::formats::{ExportModel, Predictions, Samples, find};
 use residyn::lanes::Row;
-use residyn::model::{Library, System};
+use residyn::model::{Library, Model};
 use residyn::sim::{Commands, Hold, Integrator, StepTorque};
 use serde_json::json;
 use tempfile::TempDir;
@@ -38,7 +38,7 @@ qdd1 = "int * double - 3 * state * tanh(qd1) + NAN * time + int_ + tau1 - qd1 + 
 
 fn odd() -> ExportModel {
     let library = Library::built_in();
-    let system = System::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
+    let system = Model::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
     ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("*/ \\"))
 }
 

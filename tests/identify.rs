@@ -4,7 +4,7 @@ use rand::RngExt;
 use residyn::data::{Interval, Log};
 use residyn::expr::SignForm;
 use residyn::identify::{
-    Fit, Identifiability, Shooting, Window, cut, fit, identifiability, uncertainty,
+    Fit, Identifiability, Shooting, Values, Window, cut, fit, identifiability, uncertainty,
 };
 use residyn::model::{Dynamics, Library};
 
@@ -20,16 +20,17 @@ fn shooting<'l>(logs: &'l [Log], joints: usize) -> Shooting<'l> {
     Shooting::new(logs, cut(logs, WINDOW_S), &vec![NOISE; joints])
 }
 
-fn fit_to(shooting: &Shooting<'_>, model: &Dynamics, active: &[usize], values: &[f64]) -> Fit {
-    fit(
-        shooting,
-        model,
-        active,
-        values,
-        shooting.initial_locals(0),
-        None,
-    )
-    .unwrap()
+fn fit_to(
+    shooting: &Shooting<'_>,
+    model: &Dynamics,
+    active: &[usize],
+    values: &[f64],
+) -> (Values, Fit) {
+    let start = model.clone().with_values(values.iter().copied());
+    let locals = shooting.initial_locals(0);
+    let (found, fit) = fit(shooting, &start, active, locals, None).unwrap();
+    assert!(fit.termination.has_converged(), "{:?}", fit.termination);
+    (found, fit)
 }
 
 fn free(model: &Dynamics) -> Vec<usize> {
@@ -65,9 +66,9 @@ const RECOVERED: f64 = 1e-6;
 
 fn assert_recovered(model: &Dynamics, logs: &[Log], active: &[usize]) {
     let shooting = shooting(logs, model.joints);
-    let fit = fit_to(&shooting, model, active, &astray(model, active));
+    let (found, _) = fit_to(&shooting, model, active, &astray(model, active));
     for (k, parameter) in model.parameters.iter().enumerate() {
-        let share = fit.values[k] / parameter.value;
+        let share = found.common[k] / parameter.value;
         assert_near(
             share,
             1.0,
@@ -106,10 +107,8 @@ fn parameters_of_effects_come_back_with_them() {
 /// The verdict on all free parameters at their true values.
 fn verdict(model: &Dynamics, logs: &[Log]) -> Identifiability {
     let shooting = shooting(logs, model.joints);
-    identifiability(
-        model,
-        &fit_to(&shooting, model, &free(model), &model.values()),
-    )
+    let (found, fit) = fit_to(&shooting, model, &free(model), &model.values());
+    identifiability(model, &found, &fit)
 }
 
 fn names(model: &Dynamics, indices: &[usize]) -> Vec<String> {
@@ -168,9 +167,9 @@ fn without_torque_its_gain_is_undetermined_and_held() {
     // A flat direction stays where it is, and spoils nothing.
     let shooting = shooting(&logs, 1);
     let start = [astray(&model, &[0])[0], 2.4];
-    let fit = fit_to(&shooting, &model, &[0, 1], &start);
-    assert_near(fit.values[0], 15.0, RECOVERED, "C_g");
-    assert_eq!(fit.values[1], 2.4);
+    let (found, _) = fit_to(&shooting, &model, &[0, 1], &start);
+    assert_near(found.common[0], 15.0, RECOVERED, "C_g");
+    assert_eq!(found.common[1], 2.4);
 }
 
 /// Whether the interval of each parameter holds the truth, and the fit's scale of the residuals.
@@ -179,10 +178,10 @@ fn covered(model: &Dynamics, clean: &Log, seed: u64) -> (Vec<bool>, f64) {
     add_noise(&mut log, NOISE, seed);
     let logs = [log];
     let shooting = shooting(&logs, 1);
-    let fit = fit_to(&shooting, model, &free(model), &astray(model, &free(model)));
+    let (found, fit) = fit_to(&shooting, model, &free(model), &astray(model, &free(model)));
     let uncertainty = uncertainty(&shooting, &fit);
     let holds = fit.active.iter().enumerate().map(|(i, k)| {
-        (fit.values[*k] - model.parameters[*k].value).abs() <= uncertainty.half_width(i)
+        (found.common[*k] - model.parameters[*k].value).abs() <= uncertainty.half_width(i)
     });
     (holds.collect(), fit.scale)
 }
@@ -238,17 +237,17 @@ fn offsets_come_back_log_by_log_with_honest_intervals() {
     for seed in 0..SEEDS {
         let logs = offset_logs(&rig, seed);
         let shooting = shooting(&logs, 1);
-        let fit = fit_to(&shooting, &model, &[0, 1, 2], &[12.0, 3.6, 0.0]);
+        let (found, fit) = fit_to(&shooting, &model, &[0, 1, 2], &[12.0, 3.6, 0.0]);
         assert_eq!(fit.columns.len(), 5);
         let uncertainty = uncertainty(&shooting, &fit);
         let truth = [&[15.0, 3.0], OFFSETS.as_slice()].concat();
         for (i, column) in fit.columns.iter().enumerate() {
             assert_eq!(column.log, i.checked_sub(2));
             assert_eq!(
-                fit.value(i),
-                fit.values_of_log(column.log.unwrap_or(0))[column.parameter]
+                found.get(*column),
+                found.of_log(column.log.unwrap_or(0))[column.parameter]
             );
-            hits.push((fit.value(i) - truth[i]).abs() <= uncertainty.half_width(i));
+            hits.push((found.get(*column) - truth[i]).abs() <= uncertainty.half_width(i));
         }
         // The intervals of the offsets are worth having.
         assert!((2..5).all(|i| uncertainty.half_width(i) < 3e-3));
@@ -270,11 +269,11 @@ fn a_log_without_windows_has_no_value_of_its_own() {
     });
     let model = dynamics(&pendulum, &[offset], SignForm::Exact);
     let shooting = shooting(&logs, 1);
-    let fit = fit_to(&shooting, &model, &[0, 1, 2], &[12.0, 3.6, 0.0]);
+    let (found, fit) = fit_to(&shooting, &model, &[0, 1, 2], &[12.0, 3.6, 0.0]);
     let seen: Vec<Option<usize>> = fit.columns.iter().map(|column| column.log).collect();
     assert_eq!(seen, [None, None, Some(0), Some(2)]);
-    assert_eq!(fit.values_of_log(1)[2], 0.0);
-    assert!((fit.values_of_log(2)[2] - OFFSETS[2]).abs() < 3e-3);
+    assert_eq!(found.of_log(1)[2], 0.0);
+    assert!((found.of_log(2)[2] - OFFSETS[2]).abs() < 3e-3);
 }
 
 /// 20 s at irregular steps of 5 to 15 ms with three pauses and three intervals left out.

@@ -7,7 +7,7 @@ use rand::RngExt;
 use residyn::expr::SignForm;
 use residyn::formats::{FORMATS, Format};
 use residyn::model::chain::{Chain, model_text};
-use residyn::model::{Dynamics, FittedEffect, Library, System};
+use residyn::model::{Dynamics, FittedEffect, Library, Model};
 use serde_json::json;
 
 use crate::clients::client;
@@ -43,9 +43,9 @@ fn chain(name: &str) -> Chain {
     read(&fixture(name))
 }
 
-fn system(chain: &Chain) -> System {
+fn system(chain: &Chain) -> Model {
     let library = Library::built_in();
-    System::from_text(
+    Model::from_text(
         Path::new(&chain.name),
         &model_text(chain),
         library.effects(),
@@ -54,7 +54,7 @@ fn system(chain: &Chain) -> System {
 }
 
 /// The model with effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
-fn comparable(system: &System) -> Dynamics {
+fn comparable(system: &Model) -> Dynamics {
     let others = ["coulomb_friction", "actuator_saturation"];
     let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
     let effects: Vec<FittedEffect> = system.effects.iter().filter(is_force).cloned().collect();

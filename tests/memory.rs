@@ -169,19 +169,12 @@ fn a_delay_and_a_lag_come_back_within_their_intervals() {
         let logs = logs(&rig);
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
         let model = pendulum(&[effect(name, 0.0)]);
-        let start = [14.0, 3.3, 0.0];
-        let found = fit(
-            &shooting,
-            &model,
-            &[0, 1, 2],
-            start.as_slice(),
-            shooting.initial_locals(0),
-            None,
-        )
-        .unwrap();
-        let uncertainty = uncertainty(&shooting, &found);
+        let start = model.with_values([14.0, 3.3, 0.0]);
+        let locals = shooting.initial_locals(0);
+        let (found, fit) = fit(&shooting, &start, &[0, 1, 2], locals, None).unwrap();
+        let uncertainty = uncertainty(&shooting, &fit);
         for (i, wanted) in [15.0, 3.0, truth].into_iter().enumerate() {
-            let (value, half) = (found.values[i], uncertainty.half_width(i));
+            let (value, half) = (found.common[i], uncertainty.half_width(i));
             assert!(
                 (value - wanted).abs() < half,
                 "{name}: {value} +- {half}, wanted {wanted}"
@@ -367,19 +360,11 @@ fn play_comes_back_within_its_interval() {
         let logs = logs(&rig);
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
         let model = pendulum(&[backlash(0.0, driven)]);
-        let start = [14.0, 3.3, 0.0, driven];
+        let start = model.with_values([14.0, 3.3, 0.0, driven]);
         let locals = shooting.initial_locals(0);
-        let found = fit(
-            &shooting,
-            &model,
-            &[0, 1, 2],
-            start.as_slice(),
-            locals,
-            None,
-        )
-        .unwrap();
-        let half = uncertainty(&shooting, &found).half_width(2);
-        let value = found.values[2];
+        let (found, fit) = fit(&shooting, &start, &[0, 1, 2], locals, None).unwrap();
+        let half = uncertainty(&shooting, &fit).half_width(2);
+        let value = found.common[2];
         assert!(
             (value - 0.01).abs() < half && half < 1e-3,
             "{driven}: {value} +- {half}"

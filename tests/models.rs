@@ -5,8 +5,8 @@ use std::path::Path;
 use rand_chacha::ChaCha8Rng;
 use residyn::formats::ExportModel;
 use residyn::model::{
-    Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ModelWeights, ResidualOn,
-    System,
+    Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model, ModelWeights,
+    ResidualOn,
 };
 use residyn::sim::{Integrator, SCHEMES};
 use serde_json::json;
@@ -106,10 +106,10 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
 }
 
 /// A built-in system with effects appended to its file.
-pub fn system(name: &str, effects: &str) -> System {
+pub fn system(name: &str, effects: &str) -> Model {
     let library = Library::built_in();
-    let declared = library.system(Path::new(name)).unwrap();
-    System::from_text(
+    let declared = library.model(Path::new(name)).unwrap();
+    Model::from_text(
         Path::new(name),
         &(declared.text + effects),
         library.effects(),
@@ -117,12 +117,12 @@ pub fn system(name: &str, effects: &str) -> System {
     .unwrap()
 }
 
-fn physics(system: &System, integrator: Integrator, step_s: f64) -> ExportModel {
+fn physics(system: &Model, integrator: Integrator, step_s: f64) -> ExportModel {
     ExportModel::of_system(system, integrator, step_s, origin(system))
 }
 
 fn hybrid(
-    system: &System,
+    system: &Model,
     residual: &MlpWeights,
     integrator: Integrator,
     step_s: f64,
@@ -133,7 +133,7 @@ fn hybrid(
 }
 
 fn data_driven(
-    system: &System,
+    system: &Model,
     prior: &MlpWeights,
     integrator: Integrator,
     step_s: f64,
@@ -146,7 +146,7 @@ fn data_driven(
     ExportModel::new(system, numbers, integrator, step_s, origin(system))
 }
 
-fn origin(system: &System) -> serde_json::Value {
+fn origin(system: &Model) -> serde_json::Value {
     json!({"config": {"model": system.name}, "seed": 7})
 }
 

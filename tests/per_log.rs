@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use rand::SeedableRng;
-use residyn::data::Log;
+use residyn::data::{Joint, Log};
 use residyn::model::Library;
 use residyn::plant::Plant;
 use serde_json::Value;
@@ -125,7 +125,7 @@ fn a_simulated_rig_starts_where_it_is_not_where_its_sensor_reads() {
     let mut plant = Plant::from_text(Path::new("rig.toml"), &rig, &library).unwrap();
     let offset = [("q_z".to_owned(), 0.03)];
     plant
-        .add_effect(&library, "sensor_offset", 1, &offset)
+        .add_effect(&library, "sensor_offset", Joint::at(0), &offset)
         .unwrap();
     let log: Log = plant
         .record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(0))

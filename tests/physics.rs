@@ -4,7 +4,7 @@ use std::path::Path;
 
 use residyn::expr::{Program, SignForm};
 use residyn::lanes::Row;
-use residyn::model::{Dynamics, System};
+use residyn::model::{Dynamics, Model};
 use residyn::sim::{RK4, SCHEMES, Scheme, Stepper};
 
 use crate::common::{all_systems, dynamics, points, system};
@@ -17,7 +17,7 @@ struct Balanced {
 }
 
 impl Balanced {
-    fn new(system: &System) -> Self {
+    fn new(system: &Model) -> Self {
         Self {
             model: dynamics(system, &[], SignForm::Exact),
             energy: system.energy_program().expect("the file states an energy"),
@@ -66,7 +66,7 @@ const HOLD_S: f64 = 0.02;
 const STEPS: usize = 200;
 
 /// Change of energy less work in J over 5 s from rest near zero, under torques of up to 3 N m.
-fn imbalance(system: &System) -> f64 {
+fn imbalance(system: &Model) -> f64 {
     let balanced = Balanced::new(system);
     let n = system.joints;
     let mut stepper = Stepper::<1>::new(&balanced.model, RK4);
@@ -106,7 +106,7 @@ fn energy_less_work_stays_over_five_seconds() {
 #[test]
 fn the_acrobot_as_printed_makes_energy_from_nothing() {
     let text = include_str!("fixtures/acrobot_as_printed.toml");
-    let printed = System::from_text(Path::new("acrobot_as_printed.toml"), text, &[]).unwrap();
+    let printed = Model::from_text(Path::new("acrobot_as_printed.toml"), text, &[]).unwrap();
     let off = imbalance(&printed);
     // Measured 3.2 J of a motion between -15 and 21 J; other torques lose other amounts.
     assert!(off.abs() > 1.0, "{off} J");
@@ -184,7 +184,7 @@ fn lanes_with_steps_of_their_own_do_not_disturb_each_other() {
 fn the_rollout_tells_the_equations_the_time() {
     // qdd = t from rest: v = t^2 / 2, q = t^3 / 6, which a method of order 4 finds exactly.
     let text = "[system]\nname = \"clock\"\njoints = 1\n[dynamics]\nqdd1 = \"t\"\n";
-    let clock = System::from_text(Path::new("clock.toml"), text, &[]).unwrap();
+    let clock = Model::from_text(Path::new("clock.toml"), text, &[]).unwrap();
     let model = dynamics(&clock, &[], SignForm::Exact);
     let mut state = [Row([0.0]), Row([0.0])];
     let mut stepper = Stepper::<1>::new(&model, RK4);

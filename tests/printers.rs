@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use residyn::data::Joint;
 use residyn::expr::{Graph, Node, Program, Scope, SignForm, parse};
 use residyn::model::{Dynamics, Library};
 
@@ -188,7 +189,7 @@ fn an_effects_expression_names_its_joint_and_reads_back() {
                 let own = fitted.parameter_names(&taken);
                 let formula = parse(&fitted.expression(&own)).unwrap();
                 for name in formula.names() {
-                    let state = ["q", "qd", "tau", "load"].map(|s| format!("{s}{}", joint + 1));
+                    let state = ["q", "qd", "tau", "load"].map(|s| Joint::at(joint).name(s));
                     let known = own.iter().chain(&state).any(|known| known == name);
                     assert!(known, "{}: `{name}` in {}", effect.name, formula.text());
                     let declared = system.parameters.iter().any(|p| p.name == name);

@@ -2,10 +2,10 @@
 
 use residyn::model::Library;
 use residyn::plant::Plant;
-use residyn::train::Backend;
 use residyn::train::recipe::{Job, Recipe};
+use residyn::train::{Backend, Checkpoint};
 
-use crate::train::{configs, refused};
+use crate::train::{configs, json, refused};
 
 /// Recipes and plants; the demo's plant is part of the program, which reads it in its own tests.
 #[test]
@@ -102,4 +102,34 @@ fn bad_recipes_are_refused_with_place_and_remedy() {
     assert!(refused(dir, &["train", "--config", "no.toml"]).contains("no.toml: cannot be read"));
     let left: Vec<_> = std::fs::read_dir(dir).unwrap().collect();
     assert_eq!(left.len(), 1, "nothing is left behind: {left:?}");
+}
+
+/// Dry friction that reverses over another speed is another model: what the model file says of it holds in training and
+/// tuning as it does in evaluation.
+#[test]
+fn a_model_is_trained_and_tuned_with_its_own_smoothing_of_friction() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let pendulum = Library::system_text("pendulum").unwrap();
+    let text = pendulum.replace("joints = 1", "joints = 1\nsign_width = [0.3]")
+        + "\n[[effect]]\nname = \"coulomb_friction\"\njoint = 1\nF_c = 0.2\n";
+    std::fs::write(dir.join("model.toml"), text).unwrap();
+    let recipe = "model = \"model.toml\"\nkind = \"physics\"\n[data]\nplant = \"pendulum\"\ntrajectories = 4\n\
+                  step_s = 0.02\nposition = [[-1, 1]]\nvelocity = [[-1, 1]]\ntorque = [[-1, 1]]\n[fit]\nepochs = 1\n";
+    std::fs::write(dir.join("recipe.toml"), recipe).unwrap();
+    let library = Library::built_in();
+    let model = library.model(&dir.join("model.toml")).unwrap();
+    assert_eq!(model.sign_widths(), [0.3]);
+    let wanted = model.dynamics().program;
+    let has_program = |job: Job| job.model.to_dynamics().unwrap().program == wanted;
+    let recipe = Recipe::read(&dir.join("recipe.toml")).unwrap();
+    let job = Job::train(recipe.clone(), &library, Backend::NdArray, 0).unwrap();
+    assert!(has_program(job), "training");
+    json(
+        dir,
+        &["train", "--config", "recipe.toml", "--out", "trained"],
+    );
+    let checkpoint = Checkpoint::load(&dir.join("trained")).unwrap();
+    let job = Job::tune(&checkpoint, recipe, &library, Backend::NdArray, 0).unwrap();
+    assert!(has_program(job), "tuning");
 }

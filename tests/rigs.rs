@@ -63,7 +63,7 @@ fn published_parameter_sets_have_the_published_accelerations() {
     let rigs = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs");
     for (name, points) in CASES {
         let file = rigs.join(name).with_extension("toml");
-        let system = Library::built_in().system(&file).unwrap();
+        let system = Library::built_in().model(&file).unwrap();
         assert_eq!(system.name, name);
         let model = dynamics(&system, &[], SignForm::Exact);
         for (state, wanted) in points {

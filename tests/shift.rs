@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use residyn::expr::SignForm;
-use residyn::model::{Library, System};
+use residyn::model::{Library, Model};
 use serde_json::Value;
 
 use crate::common::{assert_near, dynamics, points};
@@ -78,7 +78,7 @@ fn a_wrong_mass_is_named_with_its_right_value() {
     );
     assert!(high - low < 0.01, "{parameter}");
     // The written model has it in its place, and predicts the same, as does the checkpoint's.
-    let written = System::read(&out.join("model.toml"), Library::built_in().effects()).unwrap();
+    let written = Model::read(&out.join("model.toml"), Library::built_in().effects()).unwrap();
     assert!(written.effects.is_empty());
     assert_eq!(written.parameters[0].value, number(&parameter["value"]));
     let error = |model: &[&str]| {
@@ -98,8 +98,8 @@ fn a_wrong_mass_is_named_with_its_right_value() {
     );
 }
 
-fn read(text: &str) -> System {
-    System::from_text(Path::new("model.toml"), text, Library::built_in().effects()).unwrap()
+fn read(text: &str) -> Model {
+    Model::from_text(Path::new("model.toml"), text, Library::built_in().effects()).unwrap()
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn what_is_fixed_may_be_shifted_but_not_gravity() {
     let found: Vec<(String, usize)> = read(&fixed)
         .shifts()
         .iter()
-        .map(|shift| (shift.effect.parameters[0].name.clone(), shift.joint))
+        .map(|shift| (shift.effect.parameters[0].name.clone(), shift.joint.index()))
         .collect();
     // The first link moves with the first joint alone; whatever else there is turns with the second.
     let wanted = [

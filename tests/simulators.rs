@@ -2,14 +2,13 @@
 
 use std::path::Path;
 
-use residyn::expr::SignForm;
 use residyn::formats::{ExportModel, FORMATS, find};
 use residyn::model::chain::model_text;
-use residyn::model::{Library, System};
+use residyn::model::{Library, Model};
 use residyn::sim::Integrator;
 use serde_json::json;
 
-use crate::common::{assert_near, dynamics, points, rng};
+use crate::common::{assert_near, points, rng};
 use crate::export::{client_agrees, predictions};
 use crate::mechanism::{fixture, read};
 use crate::models;
@@ -27,7 +26,7 @@ fn portable(name: &str, integrator: Integrator, effects: &[String]) -> ExportMod
 
 fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     let library = Library::built_in();
-    let system = System::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
+    let system = Model::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
     ExportModel::of_system(&system, integrator, 0.01, json!({}))
 }
 
@@ -196,9 +195,9 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
             let own = own.iter().find(|p| p.unit == "m/s^2");
             chain.gravity = own.map_or(chain.gravity, |g| down * g.value);
             let text = model_text(&chain);
-            let back = System::from_text(Path::new(name), &text, library.effects()).unwrap();
+            let back = Model::from_text(Path::new(name), &text, library.effects()).unwrap();
             let n = model.joints();
-            let back = dynamics(&back, &back.effects, SignForm::DEFAULT);
+            let back = back.dynamics();
             for point in points(&back, 50, 1) {
                 let moving = &point[..=3 * n];
                 let [found, wanted] = [&back, &model.equations]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use residyn::closeloop::{Proposal, Settings, Study, Unexplained, proposal, unexplained};
 use residyn::data::Log;
-use residyn::model::{FittedEffect, Library, System};
+use residyn::model::{FittedEffect, Library, Model};
 use residyn::plant::Plant;
 
 use crate::common::rng;
@@ -43,7 +43,9 @@ fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
     let library = library(&[effect("hidden", force)]);
     let text = format!("{RIG}sensor = {{ rate_hz = 100, {sensor} }}\n");
     let mut plant = Plant::from_text(Path::new("rig.toml"), &text, &library).unwrap();
-    plant.add_effect(&library, "hidden", 1, &[]).unwrap();
+    plant
+        .add_effect(&library, "hidden", Joint::at(0), &[])
+        .unwrap();
     let mut rng = rng(seed);
     (0..plant.recording.logs)
         .map(|_| plant.record(&mut rng).unwrap())
@@ -51,12 +53,12 @@ fn logs(sensor: &str, force: &str, seed: u64) -> Vec<Log> {
 }
 
 /// The pendulum with these effects declared, their sizes unknown.
-fn declared(effects: &[&str]) -> System {
+fn declared(effects: &[&str]) -> Model {
     let library = Library::built_in();
-    let mut system = library.system(Path::new("pendulum")).unwrap();
+    let mut system = library.model(Path::new("pendulum")).unwrap();
     system.parameters[0].value = -17.0;
     system.parameters[1].value = 4.0;
-    let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), 0);
+    let absent = |name: &&str| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0));
     system.effects = effects.iter().map(absent).collect();
     system
 }

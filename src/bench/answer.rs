@@ -26,10 +26,7 @@ pub fn answer(outcome: &Outcome) -> Answer {
             .iter()
             .map(|alternative| set(&alternative.effects))
             .collect(),
-        declared: outcome
-            .models
-            .parameters
-            .iter()
+        declared: (outcome.models.after.absorbed().all_parameters().iter())
             .filter(is_declared)
             .map(|parameter| estimate(&parameter.name, parameter))
             .collect(),
@@ -61,7 +58,7 @@ fn named(finding: &Finding) -> Named {
 
 fn label_of(effect: &FittedEffect) -> Label {
     let (name, parameters) = (&effect.effect.name, &effect.effect.parameters);
-    label(name, effect.joint + 1, &parameters[0].name)
+    label(name, effect.joint, &parameters[0].name)
 }
 
 fn estimate(name: &str, parameter: &Parameter) -> Estimate {

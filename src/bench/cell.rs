@@ -13,7 +13,7 @@ use super::told::told;
 use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
 use crate::data::{Log, LogError};
 use crate::files::content_hash;
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 
 /// The result of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ impl Cell {
     ///
     /// # Panics
     /// Never: the effects were checked when the grid was read.
-    pub fn record(&self, system: &System) -> Result<(Vec<Log>, Truth), LogError> {
+    pub fn record(&self, system: &Model) -> Result<(Vec<Log>, Truth), LogError> {
         match &self.source {
             Source::Files { logs, declared } => {
                 let read = |path| Log::read(path, system.joints, &system.columns);
@@ -79,7 +79,7 @@ impl Cell {
         let mut offset = [0.0; 2];
         for effect in &self.effects {
             if effect.name == "sensor_offset" {
-                offset[effect.joint - 1] = effect.values["q_z"] * rng.random_range(-1.0..=1.0);
+                offset[effect.joint] = effect.values["q_z"] * rng.random_range(-1.0..=1.0);
             }
         }
         offset
@@ -90,7 +90,7 @@ impl Cell {
     /// # Errors
     /// A model file or log that cannot be read, or logs on which closing the loop fails.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
-        let system = library.system(&self.model)?;
+        let system = library.model(&self.model)?;
         let (logs, truth) = self.record(&system)?;
         let mut split = Split::given(logs, Vec::new());
         split.test.extend(split.train.pop());
@@ -111,7 +111,7 @@ impl Cell {
 
 /// The system under test.
 fn close(
-    system: &System,
+    system: &Model,
     library: &Library,
     split: Split,
     seed: u64,

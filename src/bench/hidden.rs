@@ -9,11 +9,12 @@ use super::friction::{DryFriction, Presliding};
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use super::transmission::Transmission;
+use crate::data::Joint;
 
-/// `coulomb_friction@1`, the joint counted from 1; of a shift `parameter_shift(m1)`.
+/// `coulomb_friction@1`; of a shift `parameter_shift(m1)`.
 pub type Label = String;
 
-pub fn label(name: &str, joint: usize, parameter: &str) -> Label {
+pub fn label(name: &str, joint: Joint, parameter: &str) -> Label {
     match name {
         "parameter_shift" => format!("{name}({parameter})"),
         _ => format!("{name}@{joint}"),
@@ -24,8 +25,7 @@ pub fn label(name: &str, joint: usize, parameter: &str) -> Label {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hidden {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// Its numbers, in N m, rad and s; of a shift, the parameter's true value; of a sensor's offset, the
     /// spread `q_z` over the logs.
     #[serde(flatten)]
@@ -74,14 +74,14 @@ impl Machine {
 
     fn add(&mut self, hidden: &Hidden) -> Result<(), String> {
         let joints = self.joints();
-        if !(1..=joints).contains(&hidden.joint) {
+        if !hidden.joint.is_of(joints) {
             let name = &hidden.name;
             return Err(format!("`{name}`: `joint` is from 1 to {joints}"));
         }
         if hidden.name == "parameter_shift" {
             return self.shift(hidden);
         }
-        let j = hidden.joint - 1;
+        let j = hidden.joint.index();
         let mut numbers = Numbers {
             of: hidden,
             left: hidden.values.clone(),
@@ -181,11 +181,12 @@ mod tests {
     use crate::bench::drive::Approach;
     use crate::bench::machine::{Machine, State};
     use crate::bench::mechanics::tests::double_pendulum;
+    use crate::data::Joint;
 
     fn hidden(name: &str, values: &[(&str, f64)]) -> Hidden {
         Hidden {
             name: name.to_owned(),
-            joint: 1,
+            joint: Joint::at(0),
             values: values
                 .iter()
                 .map(|(name, value)| ((*name).to_owned(), *value))

@@ -99,8 +99,7 @@ fn values(effect: &Hidden, offsets: &[Pair]) -> BTreeMap<String, f64> {
     if effect.name != "sensor_offset" {
         return effect.values.clone();
     }
-    let in_log =
-        |(k, offset): (usize, &Pair)| (of_log("q_z", &log_name(k)), offset[effect.joint - 1]);
+    let in_log = |(k, offset): (usize, &Pair)| (of_log("q_z", &log_name(k)), offset[effect.joint]);
     offsets.iter().enumerate().map(in_log).collect()
 }
 
@@ -236,6 +235,7 @@ impl Coverage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Joint;
 
     fn named(label: &str, values: &[(&str, f64, [f64; 2])], error_reduction: f64) -> Named {
         let estimate = |(name, value, interval): &(&str, f64, [f64; 2])| Estimate {
@@ -354,7 +354,7 @@ mod tests {
     fn an_offset_is_asked_for_in_each_log() {
         let hidden = Hidden {
             name: "sensor_offset".to_owned(),
-            joint: 2,
+            joint: Joint::at(1),
             values: [("q_z".to_owned(), 0.1)].into(),
         };
         let values = values(&hidden, &[[0.0, 0.05], [0.0, -0.02]]);

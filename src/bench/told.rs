@@ -2,12 +2,12 @@
 
 use super::hidden::Hidden;
 use crate::closeloop::{Settings, Split, Study};
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 use crate::sim::metric::{Assessment, assess};
 
 /// Error of the model with the true effects, fitted from their true values to the logs that the search had:
 /// position, all joints together, at the middle horizon \[rad\]. `None` where the library lacks one of them.
-pub fn told(system: &System, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
+pub fn told(system: &Model, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
     let settings = Settings::default();
     let mut study = Study::new(system, &split.train, &settings);
     let declared = study.fit_declared().ok()?;
@@ -16,15 +16,10 @@ pub fn told(system: &System, library: &Library, split: &Split, effects: &[Hidden
         .map(|hidden| fitted(&study, library, hidden))
         .collect::<Option<_>>()?;
     let locals = declared.fit.locals.clone();
-    let model = study.refit(&truth, &declared.declared, locals, None).ok()?;
-    let tests = split.test.iter();
-    let values: Vec<Vec<f64>> = tests.map(|log| model.values_in(log)).collect();
-    let errors: Assessment = assess(
-        &model.dynamics,
-        |log| &values[log],
-        &split.test,
-        &settings.score.horizons_s,
-    );
+    let model = study
+        .refit(&declared.with_effects(truth), locals, None)
+        .ok()?;
+    let errors: Assessment = assess(&model.dynamics(), &split.test, &settings.score.horizons_s);
     Some(errors.position_rms())
 }
 
@@ -33,7 +28,7 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     if hidden.name == "parameter_shift" {
         return shift(study.system, hidden);
     }
-    let joint = hidden.joint - 1;
+    let joint = hidden.joint;
     let effect = library.effect(&hidden.name).ok()?;
     let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
     let mut fitted = FittedEffect::absent(&effect, joint);
@@ -50,7 +45,7 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     Some(fitted)
 }
 
-fn shift(system: &System, hidden: &Hidden) -> Option<FittedEffect> {
+fn shift(system: &Model, hidden: &Hidden) -> Option<FittedEffect> {
     let (name, value) = hidden.values.first_key_value()?;
     let declared = system.parameters.iter().find(|p| p.name == *name)?;
     let mut shifts = system.shifts().into_iter();

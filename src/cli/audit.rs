@@ -22,7 +22,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let system = Library::built_in().system(&arguments.model)?;
+    let system = Library::built_in().model(&arguments.model)?;
     let logs = inputs::logs(&arguments.logs, &system)?;
     inputs::print_notes(&logs);
     let audits: Vec<Audit> = logs.iter().map(audit).collect();

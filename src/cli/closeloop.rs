@@ -11,7 +11,7 @@ use crate::closeloop::{
     Outcome, Reference, Request, Settings, Split, Stage, Verdict, calibrate, close_loop,
 };
 use crate::data::{LeaveOut, Log};
-use crate::model::{Library, Origin, System};
+use crate::model::{Library, Model, Origin};
 use crate::plant::Plant;
 use crate::report;
 use crate::runs::RunFolder;
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     })?;
     bar.finish_and_clear();
     let origin = origin(arguments, &system);
-    let mut report = report::write(&arguments.out, &system, &outcome, &origin)?;
+    let mut report = report::write(&arguments.out, &outcome, &origin)?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
         let bar = progress::bar(runs.get());
@@ -100,7 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         )?;
         outcome.calibration = Some(calibration);
         bar.finish_and_clear();
-        report = report::write(&arguments.out, &system, &outcome, &origin)?;
+        report = report::write(&arguments.out, &outcome, &origin)?;
     }
     if arguments.common.json {
         inputs::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
@@ -110,8 +110,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(answer(&outcome))
 }
 
-fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(System, Split)> {
-    let system = library.system(model)?;
+fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {
+    let system = library.model(model)?;
     let mut train = inputs::logs(&arguments.train, &system)?;
     let mut test = inputs::logs(&arguments.test, &system)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
@@ -124,7 +124,7 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(S
     Ok((system, split))
 }
 
-fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
+fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(Model, Split)> {
     let plant = Plant::from_text(Path::new("configs/demo.toml"), DEMO, library)?;
     let record = |k: usize| -> Result<Log> {
         let mut log = plant.record(rng)?;
@@ -142,9 +142,9 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(System, Split)> {
 }
 
 /// Models that predict the same joints, in the same units.
-fn references(paths: &[PathBuf], system: &System, library: &Library) -> Result<Vec<Reference>> {
+fn references(paths: &[PathBuf], system: &Model, library: &Library) -> Result<Vec<Reference>> {
     let reference = |path: &PathBuf| {
-        let other = library.system(path)?;
+        let other = library.model(path)?;
         if other.prismatic != system.prismatic {
             bail!(
                 "--against {}: it has {}, {} has {}; give models of the same rig",
@@ -163,13 +163,13 @@ fn references(paths: &[PathBuf], system: &System, library: &Library) -> Result<V
 }
 
 /// `2 joint(s) (slide, turn)`
-fn joints(system: &System) -> String {
+fn joints(system: &Model) -> String {
     let kind = |slides: &bool| if *slides { "slide" } else { "turn" };
     let kinds: Vec<&str> = system.prismatic.iter().map(kind).collect();
     format!("{} joint(s) ({})", system.joints, kinds.join(", "))
 }
 
-fn origin(arguments: &Arguments, system: &System) -> Origin {
+fn origin(arguments: &Arguments, system: &Model) -> Origin {
     let paths = |paths: &[PathBuf]| {
         paths
             .iter()

@@ -26,7 +26,7 @@ use crate::runs::{Purpose, RunFolder, stream};
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
-    model: inputs::Model,
+    model: inputs::ModelArguments,
     /// Plant file, model file, or the name of a built-in plant or system
     #[arg(long, value_name = "NAME")]
     plant: PathBuf,
@@ -187,8 +187,8 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
             Ok(model.predictor(integrator))
         }
         Source::File(file) => {
-            let system = library.system(file)?;
-            let dynamics = system.dynamics(&system.sign());
+            let system = library.model(file)?;
+            let dynamics = system.dynamics();
             Ok(Predictor::of_equations(dynamics, task.integrator))
         }
     }
@@ -203,7 +203,7 @@ fn one(
 ) -> Result<Entry> {
     let seed = arguments.common.seed;
     let mut rng = stream(seed, Purpose::Judge(number));
-    let dynamics = plant.true_dynamics();
+    let dynamics = plant.dynamics();
     let start = task.draw_start(&mut rng);
     let mut rig = task.rig(plant, &dynamics, &start);
     let draws = stream(seed, Purpose::JudgePlan(number));

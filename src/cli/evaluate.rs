@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::inputs::{self, Source};
 use super::{Answer, Common};
-use crate::data::{LeaveOut, Log};
-use crate::identify::{Offsets, calibrate};
-use crate::model::{Dynamics, System};
+use crate::data::{Joint, LeaveOut, Log};
+use crate::identify::calibrate;
+use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Summary, assess, summarise};
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -19,7 +19,7 @@ use crate::sim::metric::{Summary, assess, summarise};
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
-    model: inputs::Model,
+    model: inputs::ModelArguments,
     /// Logs to predict
     #[arg(long, num_args = 1.., required = true, value_name = "LOG")]
     test: Vec<PathBuf>,
@@ -69,19 +69,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut logs = inputs::logs(&arguments.test, &system)?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     inputs::print_notes(&logs);
-    let values = dynamics.values();
     let offsets = arguments
         .calibrate
-        .map(|share| calibrate(&dynamics, &values, &mut logs, share))
+        .map(|share| calibrate(&dynamics, &mut logs, share))
         .transpose()?;
-    let known = logs.iter().map(|log| system.values_in(&dynamics, log));
-    let known: Vec<Vec<f64>> = known.collect();
-    let assessment = match &offsets {
-        Some(Offsets {
-            dynamics, values, ..
-        }) => assess(dynamics, |log| &values[log], &logs, &arguments.horizon),
-        None => assess(&dynamics, |log| &known[log], &logs, &arguments.horizon),
-    };
+    let model = offsets.as_ref().map_or(&dynamics, |found| &found.dynamics);
+    let assessment = assess(model, &logs, &arguments.horizon);
     let summary = summarise(&assessment.horizons, system.joints);
     if let Some(h) = summary.windows.iter().position(|count| *count == 0) {
         bail!(
@@ -113,12 +106,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 }
 
 /// The system, for its columns, and the dynamics to integrate.
-fn model(arguments: &Arguments) -> Result<(System, Dynamics)> {
+fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
     let library = arguments.effects.library()?;
     match arguments.model.source() {
         Source::File(file) => {
-            let system = library.system(file)?;
-            let dynamics = system.dynamics(&system.sign());
+            let system = library.model(file)?;
+            let dynamics = system.dynamics();
             Ok((system, dynamics))
         }
         Source::Checkpoint(dir) => {
@@ -133,15 +126,14 @@ fn table(summary: &Summary) -> String {
     let mut out =
         String::from("horizon  joint  windows  position rmse    median  velocity rmse  diverged\n");
     for (h, horizon) in summary.horizons_s.iter().enumerate() {
-        for j in 0..summary.position_rmse[h].len() {
+        for joint in Joint::all(summary.position_rmse[h].len()) {
             let _ = writeln!(
                 out,
-                "{horizon:>5} s  {:>5}  {:>7}  {:>13.6}  {:>8.6}  {:>13.6}  {:>8}",
-                j + 1,
+                "{horizon:>5} s  {joint:>5}  {:>7}  {:>13.6}  {:>8.6}  {:>13.6}  {:>8}",
                 summary.windows[h],
-                summary.position_rmse[h][j],
-                summary.position_median[h][j],
-                summary.velocity_rmse[h][j],
+                summary.position_rmse[h][joint],
+                summary.position_median[h][joint],
+                summary.velocity_rmse[h][joint],
                 summary.diverged[h]
             );
         }

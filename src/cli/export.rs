@@ -21,7 +21,7 @@ use crate::train::Manifest;
     residyn export --model closeloop-report/model.toml --format c --out pendulum.h --step 0.001")]
 pub(super) struct Arguments {
     #[command(flatten)]
-    model: inputs::Model,
+    model: inputs::ModelArguments,
     /// Format; `residyn list formats` shows all
     #[arg(long, value_parser = find)]
     format: &'static Format,
@@ -115,7 +115,7 @@ fn step_of(config: &Value) -> Option<f64> {
 }
 
 fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<ExportModel> {
-    let system = library.system(file)?;
+    let system = library.model(file)?;
     Ok(ExportModel::of_system(
         &system,
         arguments.integrator.unwrap_or(Integrator::RK4),

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::data::{LeaveOut, Log, leave_out};
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::train::{Backend, Checkpoint, HybridModel};
 
 /// The effects that model files may name: the built-in ones and the user's own.
@@ -31,7 +31,7 @@ impl Effects {
 /// The model of a command.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-pub(super) struct Model {
+pub(super) struct ModelArguments {
     /// Checkpoint of a trained model
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
@@ -46,7 +46,7 @@ pub(super) enum Source<'a> {
     File(&'a Path),
 }
 
-impl Model {
+impl ModelArguments {
     pub fn source(&self) -> Source<'_> {
         match (&self.checkpoint, &self.model) {
             (Some(dir), _) => Source::Checkpoint(dir),
@@ -61,17 +61,17 @@ pub(super) fn checkpoint(
     dir: &Path,
     library: &Library,
     backend: Backend,
-) -> Result<(Checkpoint, System, HybridModel)> {
+) -> Result<(Checkpoint, Model, HybridModel)> {
     let checkpoint = Checkpoint::load(dir)?;
     let file = dir.join("model.toml");
-    let system = System::from_text(&file, &checkpoint.model_toml, library.effects())?;
-    let physics = system.dynamics(&system.sign());
+    let system = Model::from_text(&file, &checkpoint.model_toml, library.effects())?;
+    let physics = system.dynamics();
     let model = checkpoint.model(&physics, &backend.device())?;
     Ok((checkpoint, system, model))
 }
 
 /// Read logs for a system and leave out the given intervals; notes go to standard error.
-pub(super) fn logs(paths: &[PathBuf], system: &System) -> Result<Vec<Log>> {
+pub(super) fn logs(paths: &[PathBuf], system: &Model) -> Result<Vec<Log>> {
     let read = |path: &PathBuf| Ok(Log::read(path, system.joints, &system.columns)?);
     paths.iter().map(read).collect()
 }

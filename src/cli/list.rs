@@ -8,7 +8,7 @@ use serde_json::json;
 use super::{Answer, Common, inputs};
 use crate::control::Task;
 use crate::formats::FORMATS;
-use crate::model::{Effect, Library, System};
+use crate::model::{Effect, Library, Model};
 use crate::plant::Plant;
 
 /// List systems, effects, plants, tasks or formats
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 fn systems(library: &Library) -> Result<(String, serde_json::Value)> {
     let (mut text, mut values) = (String::new(), Vec::new());
     for name in Library::system_names() {
-        let system: System = library.system(Path::new(&name))?;
+        let system: Model = library.model(Path::new(&name))?;
         let parameters: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
         let _ = writeln!(
             text,
@@ -102,7 +102,7 @@ fn plants(library: &Library) -> Result<(String, serde_json::Value)> {
     for name in Plant::names() {
         let plant = Plant::read(Path::new(name), library)?;
         let effects: Vec<String> = (plant.effects.iter())
-            .map(|e| format!("{} on joint {}", e.effect.name, e.joint + 1))
+            .map(|e| format!("{} on joint {}", e.effect.name, e.joint))
             .collect();
         let with = if effects.is_empty() {
             "no effects".to_owned()

@@ -8,7 +8,7 @@ use super::{Answer, Common, inputs};
 use crate::files::write_whole;
 use crate::formats::{FORMATS, Format, RobotReader};
 use crate::model::chain::model_text;
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let chain = (reader.read)(file)?;
     let text = model_text(&chain);
     let name = Path::new(&chain.name);
-    let system = System::from_text(name, &text, Library::built_in().effects())?;
+    let system = Model::from_text(name, &text, Library::built_in().effects())?;
     for note in &chain.notes {
         eprintln!("note: {note}");
     }

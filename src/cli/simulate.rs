@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
+use crate::data::Joint;
 use crate::model::Library;
 use crate::plant::Plant;
 
@@ -39,7 +40,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Clone)]
 struct EffectSetting {
     name: String,
-    joint: usize,
+    joint: Joint,
     parameter: Option<String>,
     value: f64,
 }
@@ -59,12 +60,10 @@ impl FromStr for EffectSetting {
         };
         let (name, joint) = match target.split_once('@') {
             Some((name, joint)) => {
-                let joint = joint
-                    .parse()
-                    .map_err(|_| format!("{joint:?} is not a joint's number; {usage}"))?;
+                let joint = joint.parse().map_err(|error| format!("{error}; {usage}"))?;
                 (name, joint)
             }
-            None => (target, 1),
+            None => (target, Joint::at(0)),
         };
         Ok(Self {
             name: name.to_owned(),
@@ -113,7 +112,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 /// Adds the effects, each with all settings for it on its joint.
 fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting]) -> Result<()> {
-    type Group<'s> = (&'s str, usize, Vec<(String, f64)>);
+    type Group<'s> = (&'s str, Joint, Vec<(String, f64)>);
     let mut groups: Vec<Group<'_>> = Vec::new();
     for setting in settings {
         let first = library

@@ -1,14 +1,13 @@
 use rayon::prelude::*;
 
 use super::fitted::Fitted;
-use super::per_log::values_on;
 use super::select::{gain, p_of_gains};
 use super::settings::ConfirmSettings;
 use super::study::Study;
-use crate::identify::{FitError, blocks, fit};
+use crate::identify::{FitError, Values, blocks, fit};
 use crate::model::FittedEffect;
 
-/// An effect that was chosen and did not stand.
+/// A selected effect that was not confirmed.
 #[derive(Debug, Clone)]
 pub struct TakenBack {
     pub effect: FittedEffect,
@@ -16,7 +15,7 @@ pub struct TakenBack {
     pub reason: String,
 }
 
-/// What came of confirming a choice.
+/// The selected model without the effects that were not confirmed.
 #[derive(Debug, Clone)]
 pub struct Confirmed {
     pub model: Fitted,
@@ -91,7 +90,7 @@ fn unconfirmed(
     let (locals, scale) = (model.fit.locals.clone(), model.fit.scale);
     // A model that cannot be fitted, or diverges, without an effect needs it.
     let without = study
-        .refit(&effects, &model.declared, locals, Some(scale))
+        .refit(&model.with_effects(effects), locals, Some(scale))
         .ok()?;
     let (p_value, reason) = match with {
         Err(_) => (
@@ -135,20 +134,14 @@ fn losses(
     members: &[usize],
 ) -> Result<Vec<f64>, FitError> {
     let locals = aside.shooting.initial_locals(0);
-    let values = values_on(aside.logs, &model.declared, &model.effects);
-    let is_known = |k: &usize| values.own.iter().any(|own| own.parameter == *k);
-    let parameters = &model.dynamics.parameters;
+    let dynamics = model.dynamics();
+    let known = Values::of(&dynamics, aside.logs).own;
+    let is_known = |k: &usize| known.iter().any(|own| own.parameter == *k);
+    let parameters = &dynamics.parameters;
     let unknown: Vec<usize> = (0..parameters.len())
         .filter(|k| parameters[*k].per_log && !parameters[*k].fixed && !is_known(k))
         .collect();
-    let found = fit(
-        &aside.shooting,
-        &model.dynamics,
-        &unknown,
-        values,
-        locals,
-        Some(scale),
-    )?;
+    let (_, found) = fit(&aside.shooting, &dynamics, &unknown, locals, Some(scale))?;
     let mut losses = vec![0.0; members.last().map_or(0, |last| last + 1)];
     for (terms, &member) in found.reduced.iter().zip(members) {
         losses[member] += terms.terms.cost;

@@ -125,7 +125,7 @@ fn on_all(study: &Study<'_>, before: &Fitted, chosen: &Fitted) -> Result<Fitted,
         return Ok(before.clone());
     }
     let locals = before.fit.locals.clone();
-    study.refit(&chosen.effects, &chosen.declared, locals, None)
+    study.refit(chosen, locals, None)
 }
 
 /// All added effects of a model, taken back for one reason.

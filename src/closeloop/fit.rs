@@ -4,7 +4,7 @@ use super::error::StudyError;
 use super::fitted::Fitted;
 use super::study::Study;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, identifiability};
-use crate::model::FittedEffect;
+use crate::model::Model;
 
 impl Study<'_> {
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
@@ -15,12 +15,11 @@ impl Study<'_> {
     /// # Errors
     /// No window, or a model that diverges even over short windows.
     pub fn fit_declared(&mut self) -> Result<Fitted, StudyError> {
-        let declared: Vec<f64> = self.system.parameters.iter().map(|p| p.value).collect();
         let windows = cut(self.logs, self.settings.fit.short_window_s);
         let short = Shooting::new(self.logs, windows, &self.shooting.noise);
-        let (first, held) = self.fit_and_hold(&short, &self.system.effects, &declared)?;
+        let (first, held) = self.fit_and_hold(&short, self.system)?;
         self.hold(held);
-        let (second, held) = self.fit_and_hold(&self.shooting, &first.effects, &first.declared)?;
+        let (second, held) = self.fit_and_hold(&self.shooting, &first)?;
         self.hold(held);
         Ok(second)
     }
@@ -28,37 +27,25 @@ impl Study<'_> {
     fn fit_and_hold(
         &self,
         shooting: &Shooting<'_>,
-        effects: &[FittedEffect],
-        declared: &[f64],
+        model: &Model,
     ) -> Result<(Fitted, Identifiability), FitError> {
-        let free = self.fit_on(
-            shooting,
-            effects,
-            declared,
-            shooting.initial_locals(0),
-            None,
-        )?;
-        let mut verdict = identifiability(&free.dynamics, &free.fit);
+        let model = self.smoothed(model);
+        let dynamics = model.dynamics();
+        let active = self.active(&dynamics);
+        let locals = shooting.initial_locals(0);
+        let (values, free) = fit(shooting, &dynamics, &active, locals, None)?;
+        let mut verdict = identifiability(&dynamics, &values, &free);
         // Only declared parameters are held: an effect that the file carries is asked about as it is.
-        verdict.hold.retain(|&k| k < declared.len());
+        verdict.hold.retain(|&k| k < model.parameters.len());
         if verdict.hold.is_empty() {
-            return Ok((free, verdict));
+            let fitted = Fitted::new(&model, &dynamics, (values, free), self.logs);
+            return Ok((fitted, verdict));
         }
         let kept = |k: &usize| !verdict.hold.contains(k);
-        let active: Vec<usize> = free.fit.active.iter().copied().filter(kept).collect();
-        let locals = free.fit.locals.clone();
-        let fit = fit(
-            shooting,
-            &free.dynamics,
-            &active,
-            free.fit.found(),
-            locals,
-            None,
-        )?;
-        Ok((
-            Fitted::new(free.dynamics, effects, fit, declared.len(), self.logs),
-            verdict,
-        ))
+        let active: Vec<usize> = active.into_iter().filter(kept).collect();
+        let start = values.put_into(&dynamics, self.logs);
+        let found = fit(shooting, &start, &active, free.locals, None)?;
+        Ok((Fitted::new(&model, &start, found, self.logs), verdict))
     }
 
     fn hold(&mut self, verdict: Identifiability) {

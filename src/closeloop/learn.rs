@@ -8,14 +8,13 @@ use std::path::Path;
 use rand::Rng;
 
 use super::fitted::Fitted;
-use super::per_log::joined;
 use super::refine::Refined;
 use super::settings::LearnSettings;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{Dynamics, Origin, absorbed};
-use crate::sim::{Point, as_modelled};
+use crate::model::{Dynamics, Origin};
+use crate::sim::as_modelled;
 
 /// What a residual network is trained on.
 #[derive(Debug)]
@@ -91,18 +90,14 @@ pub(super) fn learn(
 fn task(study: &Study<'_>, model: &Fitted) -> ResidualTask {
     let settings = study.settings.learn.clone();
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
-    let (declared, effects) = absorbed(&model.declared, &model.effects);
-    let equations = (study.system.dynamics_with(&effects, &study.sign))
-        .with_values(joined(&declared, &effects));
+    let equations = model.absorbed().dynamics();
     let thinning = Thinning {
         step_s: settings.step_s,
         length_s: settings.stretch_s,
     };
-    let of_log = |(k, log): (usize, &Log)| {
-        let point = Point::new(&model.dynamics, model.fit.values_of_log(k));
-        trajectories(&as_modelled(&point, log), thinning)
-    };
-    let stretches = (study.logs.iter().enumerate()).flat_map(of_log);
+    let dynamics = model.dynamics();
+    let of_log = |log: &Log| trajectories(&as_modelled(&*dynamics.in_log(log), log), thinning);
+    let stretches = study.logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
     for (k, stretch) in stretches.enumerate() {
         match (k + 1).is_multiple_of(settings.every) {

@@ -13,7 +13,6 @@ mod fit;
 mod fitted;
 mod learn;
 mod outcome;
-mod per_log;
 mod refine;
 mod remainder;
 mod request;
@@ -36,7 +35,6 @@ pub use find::{Found, find};
 pub use fitted::Fitted;
 pub use learn::{LearnError, LearnedResidual, ResidualLearner, ResidualTask};
 pub use outcome::{Effects, Given, Models, Outcome, Remainder};
-pub use per_log::joined;
 pub use remainder::{
     Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, proposal,
     unexplained,

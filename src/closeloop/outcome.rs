@@ -12,7 +12,7 @@ use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
 use crate::identify::{FitError, Identifiability};
-use crate::model::{Parameter, System};
+use crate::model::Model;
 
 /// Everything that closing the loop found out.
 #[non_exhaustive]
@@ -49,12 +49,8 @@ pub struct Given {
 pub struct Models {
     /// The declared model, fitted.
     pub before: Fitted,
-    /// With the effects that were found.
+    /// With the effects that were found, and with 95 % intervals.
     pub after: Fitted,
-    /// All parameters of `after`, with their intervals.
-    pub parameters: Vec<Parameter>,
-    /// Widths of the smoothed sign of each joint in `after`, in rad/s (or m/s).
-    pub sign_widths: Vec<f64>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
     /// Values in the model file that the fit of `after` contradicts.
@@ -88,7 +84,7 @@ pub struct Remainder {
 
 impl Outcome {
     /// The training logs as they were studied; `system` is the one that was declared.
-    pub fn study<'a>(&'a self, system: &'a System) -> Study<'a> {
+    pub fn study<'a>(&'a self, system: &'a Model) -> Study<'a> {
         let Given {
             train,
             audits,

@@ -2,7 +2,7 @@ use super::error::StudyError;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::split::Split;
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
 /// What closing the loop is asked for.
@@ -10,7 +10,7 @@ use crate::sim::metric::window_count;
 #[non_exhaustive]
 pub struct Request<'a> {
     /// The declared model.
-    pub system: &'a System,
+    pub system: &'a Model,
     /// The effects that it may lack.
     pub library: &'a Library,
     pub split: Split,
@@ -27,12 +27,12 @@ pub struct Reference {
     /// As the user calls it.
     pub name: String,
     /// With the same joints as the declared model.
-    pub system: System,
+    pub system: Model,
 }
 
 impl<'a> Request<'a> {
     /// A request with the default settings, without a residual network and without reference models.
-    pub fn new(system: &'a System, library: &'a Library, split: Split) -> Self {
+    pub fn new(system: &'a Model, library: &'a Library, split: Split) -> Self {
         Self {
             system,
             library,

@@ -15,8 +15,8 @@ use super::study::Study;
 use super::verdict::verdict;
 use crate::data::audit;
 
-/// Fit the declared model, add effects while they help on trajectories left out of the fit, train the residual
-/// network on what is left, and measure before and after on the test logs.
+/// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
+/// network on the remainder, and score the models before and after on the test logs.
 ///
 /// # Errors
 /// Logs without a usable window, or a declared model that diverges from its starting values.
@@ -95,13 +95,11 @@ fn remainder(study: &Study<'_>, found: &Found, refined: &Refined<'_>) -> Remaind
 }
 
 fn models_of(study: &Study<'_>, before: Fitted, refined: Refined<'_>) -> Models {
-    let declared = study.system.dynamics(&study.system.sign()).parameters;
+    let fitted = refined.model.absorbed().all_parameters();
     Models {
-        contradicted: contradicted(&declared, &refined.parameters),
+        contradicted: contradicted(&study.system.all_parameters(), &fitted),
         before,
         after: refined.model,
-        parameters: refined.parameters,
-        sign_widths: refined.study.sign_widths,
         identifiability: study.identifiability.clone(),
     }
 }

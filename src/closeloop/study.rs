@@ -1,28 +1,25 @@
 use std::sync::OnceLock;
 
 use super::fitted::Fitted;
-use super::per_log::values_on;
 use super::settings::{FitSettings, Settings};
 use crate::data::{Audit, Log, audit};
-use crate::expr::SignForm;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
-use crate::model::{Dynamics, FittedEffect, System};
+use crate::model::{Dynamics, Model};
 
-/// A declared system, logs to learn from, and what both imply.
+/// A declared system and the logs to learn from, with what follows from both.
 pub struct Study<'a> {
-    pub system: &'a System,
+    pub system: &'a Model,
     pub settings: &'a Settings,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
     pub(super) audits: OnceLock<Vec<Audit>>,
-    pub sign: Vec<SignForm>,
     /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
     /// Top speed and top torque of each joint.
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
     pub shooting: Shooting<'a>,
-    /// A few of its windows, spread evenly, for first looks.
+    /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
     /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
     pub identifiability: Identifiability,
@@ -53,14 +50,14 @@ impl<'a> Sample<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn new(system: &'a System, logs: &'a [Log], settings: &'a Settings) -> Self {
+    pub fn new(system: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
         let audits = logs.iter().map(audit).collect();
         Self::audited(system, logs, audits, settings)
     }
 
     /// A study of logs with their audits.
     pub(super) fn audited(
-        system: &'a System,
+        system: &'a Model,
         logs: &'a [Log],
         audits: Vec<Audit>,
         settings: &'a Settings,
@@ -104,7 +101,6 @@ impl<'a> Study<'a> {
             settings,
             logs,
             audits: audits.into(),
-            sign: smooth(&sign_widths),
             sign_widths,
             sample: Sample::of(&shooting, sample_windows),
             shooting,
@@ -126,7 +122,6 @@ impl<'a> Study<'a> {
             settings: self.settings,
             logs,
             audits: OnceLock::new(),
-            sign: self.sign.clone(),
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
@@ -150,45 +145,36 @@ impl<'a> Study<'a> {
         self.audits.get_or_init(of_logs)
     }
 
-    /// Fit a set of effects, starting from the values that they and the declared parameters carry.
+    /// Fit a model, starting from its values, with the study's smoothing of friction.
     ///
     /// # Errors
     /// As [`Study::fit_declared`].
     pub fn refit(
         &self,
-        effects: &[FittedEffect],
-        declared: &[f64],
+        model: &Model,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
-        self.fit_on(&self.shooting, effects, declared, locals, scale)
+        self.fit_on(&self.shooting, model, locals, scale)
     }
 
     pub(super) fn fit_on(
         &self,
         shooting: &Shooting<'_>,
-        effects: &[FittedEffect],
-        declared: &[f64],
+        model: &Model,
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
-        let dynamics = self.system.dynamics_with(effects, &self.sign);
-        let values = values_on(self.logs, declared, effects);
-        let fit = fit(
-            shooting,
-            &dynamics,
-            &self.active(&dynamics),
-            values,
-            locals,
-            scale,
-        )?;
-        Ok(Fitted::new(
-            dynamics,
-            effects,
-            fit,
-            declared.len(),
-            self.logs,
-        ))
+        let model = self.smoothed(model);
+        let dynamics = model.dynamics();
+        let active = self.active(&dynamics);
+        let found = fit(shooting, &dynamics, &active, locals, scale)?;
+        Ok(Fitted::new(&model, &dynamics, found, self.logs))
+    }
+
+    /// A model with the study's smoothing of friction.
+    pub(super) fn smoothed(&self, model: &Model) -> Model {
+        model.with_sign_widths(self.sign_widths.clone())
     }
 
     /// Parameters that a fit may change.
@@ -197,9 +183,4 @@ impl<'a> Study<'a> {
             |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
     }
-}
-
-pub(super) fn smooth(widths: &[f64]) -> Vec<SignForm> {
-    let smooth = |&width: &f64| SignForm::Smooth { width };
-    widths.iter().map(smooth).collect()
 }

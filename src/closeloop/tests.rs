@@ -15,9 +15,9 @@ use super::settings::Settings;
 use super::split::Split;
 use super::study::Study;
 use super::verdict::{Verdict, verdict};
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::identify::FitError;
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 use crate::plant::Plant;
 
 const RIG: &str = r#"
@@ -37,14 +37,15 @@ fn logs() -> Vec<Log> {
         .collect()
 }
 
-fn pendulum() -> System {
-    Library::built_in().system(Path::new("pendulum")).unwrap()
+fn pendulum() -> Model {
+    Library::built_in().model(Path::new("pendulum")).unwrap()
 }
 
 /// A model that moves no window: its values are no numbers.
 fn diverging(mut model: Fitted) -> Fitted {
-    model.declared.fill(f64::NAN);
-    model.fit.values.fill(f64::NAN);
+    for parameter in &mut model.model.parameters {
+        parameter.value = f64::NAN;
+    }
     model
 }
 
@@ -108,7 +109,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let bounded = "sin(q1) * (1 + 1e-9*sqrt(2 - abs(q1)))";
     let text = pendulum().declaration.replace("sin(q1)", bounded);
     let library = Library::built_in();
-    let system = System::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
+    let system = Model::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
     let (mut logs, settings) = (logs(), Settings::default());
     for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
         *tau += 8.0;
@@ -117,11 +118,14 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let study = Study::new(&system, &split.train, &settings);
     let bias = |size: f64| FittedEffect {
         values: vec![(size, None)],
-        ..FittedEffect::absent(library.effect("constant_torque").unwrap(), 0)
+        ..FittedEffect::absent(library.effect("constant_torque").unwrap(), Joint::at(0))
     };
-    let declared = [-17.4, 4.6];
+    let mut start = system.with_effects(vec![bias(-8.0)]);
+    for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
+        parameter.value = value;
+    }
     let locals = study.shooting.initial_locals(0);
-    let chosen = study.refit(&[bias(-8.0)], &declared, locals, None).unwrap();
+    let chosen = study.refit(&start, locals, None).unwrap();
     let refined = refine(&study, &chosen);
     let scorer = Scorer {
         test: &split.test,

@@ -163,7 +163,7 @@ impl Task {
     }
 
     /// `plant` at a true start state, with the integrator and sensor noise of the task; `dynamics` are the plant's
-    /// [own](Plant::true_dynamics).
+    /// [own](Plant::dynamics).
     ///
     /// # Panics
     /// When one of them is of another system.

@@ -11,6 +11,7 @@
 mod audit;
 mod columns;
 mod error;
+mod joint;
 mod lag;
 pub mod leave_out;
 mod local_cubic;
@@ -27,6 +28,7 @@ pub use audit::{
 };
 pub use columns::Columns;
 pub use error::{CellFault, LogError};
+pub use joint::Joint;
 pub use leave_out::{LeaveOut, LeaveOutError};
 pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};

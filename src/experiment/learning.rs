@@ -7,7 +7,7 @@ use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::files::{beside, beside_or_named, content_id};
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
-use crate::model::{Dynamics, Library, Origin, System};
+use crate::model::{Dynamics, Library, Model, Origin};
 use crate::runs::RunFolder;
 use crate::sim::Integrator;
 use crate::train::{Backend, Checkpoint, HybridModel};
@@ -46,7 +46,7 @@ impl Method {
     pub(super) fn read(
         method: &MethodConfig,
         config: &Config,
-        plant: &System,
+        plant: &Model,
         library: &Library,
         backend: Backend,
     ) -> Result<Self, ExperimentError> {
@@ -54,7 +54,7 @@ impl Method {
         let mut inputs = Vec::new();
         let mut dynamics = equations(plant);
         let prior = if let Some(file) = &method.model {
-            let system = library.system(&beside_or_named(&config.path, file))?;
+            let system = library.model(&beside_or_named(&config.path, file))?;
             dynamics = equations(&system);
             model_toml.clone_from(&system.declaration);
             inputs.push((file.clone(), content_id(model_toml.as_bytes())));

@@ -9,7 +9,7 @@ use super::{Config, ExperimentError, offline_prior, physics_prior, receding_hori
 use crate::control::{Predictor, Task};
 use crate::files::beside_or_named;
 use crate::mbrl::{Judge, Judged, Prior, Run, Schedule};
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 use crate::plant::Plant;
 use crate::runs::{Identity, RunFolder};
 use crate::train::Backend;
@@ -312,7 +312,7 @@ impl Session {
 
     /// The plant's own equations, integrated as those of models are.
     fn perfect(&self) -> Predictor {
-        Predictor::of_equations(self.plant.true_dynamics(), self.task.integrator)
+        Predictor::of_equations(self.plant.dynamics(), self.task.integrator)
     }
 
     fn seeds(&self) -> Vec<u64> {
@@ -337,13 +337,13 @@ impl Session {
     }
 }
 
-/// An effect of a plant: name, joint (from 1), values.
+/// An effect of a plant: name, joint, values.
 fn effect(effect: &FittedEffect) -> Value {
     let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
-    json!([effect.effect.name, effect.joint + 1, values])
+    json!([effect.effect.name, effect.joint, values])
 }
 
 /// The equations of a system with the declared values.
-pub(super) fn equations(system: &System) -> crate::model::Dynamics {
-    system.dynamics(&system.sign())
+pub(super) fn equations(system: &Model) -> crate::model::Dynamics {
+    system.dynamics()
 }

@@ -16,11 +16,6 @@ pub enum SignForm {
     Smooth { width: f64 },
 }
 
-impl SignForm {
-    /// Where no log says how fast a joint moves: over 0.01 rad/s (or m/s).
-    pub const DEFAULT: Self = Self::Smooth { width: 0.01 };
-}
-
 /// The names that a formula may use, and what they stand for.
 #[derive(Debug, Clone)]
 pub struct Scope {

@@ -3,14 +3,16 @@
 use serde::{Serialize, Serializer};
 
 use super::ExportModel;
+use crate::data::Joint;
 use crate::model::CommandFilter;
 
 /// The delay and lag of one joint for steps of fixed length. Both are linear, so the torque that acts is a linear
 /// combination of the lagged torque and of two earlier commands.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct DiscreteFilter {
-    /// Counted from 0.
-    pub joint: usize,
+    /// Saved as the place in a list of torques, from 0: that is how readers of a step use it.
+    #[serde(serialize_with = "as_index")]
+    pub joint: Joint,
     /// How many earlier commands matter; the oldest of them acts first.
     pub past: usize,
     /// Positions, in `[command of this step, earlier ones, newest first]`, of the command that acts when the step begins
@@ -41,7 +43,7 @@ const ROUNDING: f64 = 1e-9;
 impl DiscreteFilter {
     /// The filters of a model, one for each joint that has a delay or a lag.
     pub fn all(model: &ExportModel) -> Vec<Self> {
-        let of_joint = |joint: usize| {
+        let of_joint = |joint: Joint| {
             let delay = model.filter(joint, CommandFilter::Delay);
             let lag = model.filter(joint, CommandFilter::Lag);
             (delay.is_some() || lag.is_some()).then(|| {
@@ -49,11 +51,11 @@ impl DiscreteFilter {
                 Self::new(joint, delay, lag, model.step_s, model.integrator.substeps())
             })
         };
-        (0..model.joints()).filter_map(of_joint).collect()
+        Joint::all(model.joints()).filter_map(of_joint).collect()
     }
 
     /// `delay`, `lag` and `step_s` in s.
-    fn new(joint: usize, delay: f64, lag: Option<f64>, step_s: f64, substeps: usize) -> Self {
+    fn new(joint: Joint, delay: f64, lag: Option<f64>, step_s: f64, substeps: usize) -> Self {
         let (whole, rest) = whole_and_rest(delay / step_s);
         let change = rest * step_s;
         let mut lagged = Combination::LAGGED;
@@ -96,6 +98,10 @@ fn whole_and_rest(steps: f64) -> (usize, f64) {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a delay is not negative
     let whole = whole as usize;
     (whole, if rest < ROUNDING { 0.0 } else { rest })
+}
+
+fn as_index<S: Serializer>(joint: &Joint, serializer: S) -> Result<S::Ok, S::Error> {
+    joint.index().serialize(serializer)
 }
 
 impl Serialize for Combination {
@@ -142,11 +148,12 @@ impl Combination {
 #[cfg(test)]
 mod tests {
     use super::DiscreteFilter;
+    use crate::data::Joint;
 
     #[test]
     fn a_delay_of_whole_steps_is_an_earlier_command() {
         for (delay, past) in [(0.0, 0), (0.04, 2), (0.06, 3)] {
-            let filter = DiscreteFilter::new(0, delay, None, 0.02, 2);
+            let filter = DiscreteFilter::new(Joint::at(0), delay, None, 0.02, 2);
             assert_eq!((filter.past, filter.places), (past, [past, past]));
             assert!(filter.mean.iter().all(|sum| (sum.then - 1.0).abs() < 1e-12));
         }
@@ -154,7 +161,7 @@ mod tests {
 
     #[test]
     fn a_command_replaces_another_within_the_step() {
-        let filter = DiscreteFilter::new(0, 0.025, None, 0.02, 1);
+        let filter = DiscreteFilter::new(Joint::at(0), 0.025, None, 0.02, 1);
         assert_eq!((filter.past, filter.places), (2, [2, 1]));
         let mean = filter.mean[0];
         assert!((mean.first - 0.25).abs() < 1e-12 && (mean.then - 0.75).abs() < 1e-12);
@@ -162,7 +169,7 @@ mod tests {
 
     #[test]
     fn coefficients_of_a_constant_command_sum_to_one() {
-        let filter = DiscreteFilter::new(0, 0.03, Some(0.05), 0.02, 3);
+        let filter = DiscreteFilter::new(Joint::at(0), 0.03, Some(0.05), 0.02, 3);
         for sum in filter.mean.iter().chain([&filter.end]) {
             assert!(
                 (sum.lagged + sum.first + sum.then - 1.0).abs() < 1e-12,

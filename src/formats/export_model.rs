@@ -5,9 +5,10 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::verify::{Predictions, ReferenceModel, Samples, draw};
+use crate::data::Joint;
 use crate::expr::Op;
 use crate::model::{
-    CommandFilter, Dynamics, MlpWeights, ModelWeights, NetworkError, Parameter, System, nothing_but,
+    CommandFilter, Dynamics, MlpWeights, Model, ModelWeights, NetworkError, Parameter, nothing_but,
 };
 use crate::sim::Integrator;
 
@@ -16,7 +17,7 @@ use crate::sim::Integrator;
 #[derive(Debug, Clone)]
 pub struct ExportModel {
     /// What the model file says.
-    pub system: System,
+    pub system: Model,
     /// The equations without the networks, parameters at the values to export.
     pub equations: Dynamics,
     /// The network that replaces the equations, if any.
@@ -37,7 +38,7 @@ pub struct ExportModel {
 pub struct ExportedEffect {
     pub name: String,
     /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     pub expression: String,
     pub parameters: Vec<String>,
 }
@@ -46,7 +47,7 @@ impl ExportModel {
     /// The model of `system` with these numbers: values of all parameters, those of effects included, or a network in
     /// place of the equations; and a residual. `step_s` in s.
     pub fn new(
-        system: &System,
+        system: &Model,
         numbers: ModelWeights,
         integrator: Integrator,
         step_s: f64,
@@ -59,7 +60,7 @@ impl ExportModel {
         } = numbers;
         let mut equations = match &prior {
             Some(prior) => nothing_but(&system.name, system.joints, prior.on),
-            None => system.dynamics(&system.sign()).with_values(parameters),
+            None => system.dynamics().with_values(parameters),
         };
         keep_intervals(&mut equations);
         Self {
@@ -76,13 +77,13 @@ impl ExportModel {
 
     /// The model of a file, with the file's own values.
     pub fn of_system(
-        system: &System,
+        system: &Model,
         integrator: Integrator,
         step_s: f64,
         origin: serde_json::Value,
     ) -> Self {
         let numbers = ModelWeights {
-            parameters: system.dynamics(&system.sign()).values(),
+            parameters: system.dynamics().values(),
             prior: None,
             residual: None,
         };
@@ -91,7 +92,7 @@ impl ExportModel {
 
     /// The equations without effects.
     pub fn declared(&self) -> Dynamics {
-        let declared = self.system.dynamics_with(&[], &self.system.sign());
+        let declared = self.system.with_effects(Vec::new()).dynamics();
         declared.with_values(self.equations.values())
     }
 
@@ -126,8 +127,8 @@ impl ExportModel {
         }
     }
 
-    /// Units of position and torque of a joint (counted from 0).
-    pub(super) fn units(&self, joint: usize) -> [&'static str; 2] {
+    /// Units of position and torque of a joint.
+    pub(super) fn units(&self, joint: Joint) -> [&'static str; 2] {
         if self.system.prismatic[joint] {
             ["m", "N"]
         } else {
@@ -188,15 +189,15 @@ impl ExportModel {
         shown.into_iter().chain(own).collect()
     }
 
-    /// The parameter that is the time constant (s) of a joint's delay or lag, if it has one. Joints are counted from 0.
-    pub(super) fn filter_parameter(&self, joint: usize, kind: CommandFilter) -> Option<&Parameter> {
+    /// The parameter that is the time constant (s) of a joint's delay or lag, if it has one.
+    pub(super) fn filter_parameter(&self, joint: Joint, kind: CommandFilter) -> Option<&Parameter> {
         let mut filters = self.equations.filters.iter();
         let filter = filters.find(|filter| filter.joint == joint && filter.kind == kind)?;
         Some(&self.equations.parameters[filter.parameter])
     }
 
     /// Its value, in s.
-    pub(super) fn filter(&self, joint: usize, kind: CommandFilter) -> Option<f64> {
+    pub(super) fn filter(&self, joint: Joint, kind: CommandFilter) -> Option<f64> {
         self.filter_parameter(joint, kind).map(|p| p.value)
     }
 
@@ -252,7 +253,7 @@ fn keep_intervals(equations: &mut Dynamics) {
 }
 
 /// The effects of a model file; none where a network replaces the equations.
-fn exported_effects(system: &System, equations: &Dynamics) -> Vec<ExportedEffect> {
+fn exported_effects(system: &Model, equations: &Dynamics) -> Vec<ExportedEffect> {
     let mut first = system.parameters.len();
     if equations.parameters.len() < first {
         return Vec::new();
@@ -263,7 +264,7 @@ fn exported_effects(system: &System, equations: &Dynamics) -> Vec<ExportedEffect
         let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
         ExportedEffect {
             name: effect.effect.name.clone(),
-            joint: effect.joint + 1,
+            joint: effect.joint,
             expression: effect.expression(&names),
             parameters: names,
         }

@@ -112,7 +112,7 @@ fn effects(out: &mut String, model: &ExportModel) {
 
 /// How an effect enters the equations.
 fn place(effect: &FittedEffect) -> String {
-    let of_joint = |stem: &str| format!("${}$", latex_name(&format!("{stem}{}", effect.joint + 1)));
+    let of_joint = |stem: &str| format!("${}$", latex_name(&effect.joint.name(stem)));
     match &effect.effect.entry {
         Entry::Force(_) => format!("added to {}", of_joint("tau")),
         Entry::Torque(_) => format!("in place of {}", of_joint("tau")),

@@ -1,33 +1,35 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::fit::Fit;
+use super::values::Values;
 use crate::model::Dynamics;
 
-/// Which combinations of the free parameters the logs determine.
+/// Which combinations of the free parameters the logs determine: the practical identifiability of the model.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Identifiability {
     /// Number of free parameters.
     pub free: usize,
     /// Number of independent combinations that are determined.
     pub determined: usize,
-    /// Combinations that are not: for each, the parameters that take part and their relative weight.
-    /// Changing them together by these shares of their magnitude changes no prediction.
+    /// Undetermined combinations: for each, its parameters and their relative weights. Changing them together by these
+    /// shares of their magnitudes changes no prediction.
     pub undetermined: Vec<Vec<(String, f64)>>,
-    /// Parameters to hold so that the rest is determined.
+    /// Parameters to hold so that all others are determined, as indices among all parameters of the model.
     pub hold: Vec<usize>,
 }
 
-/// A combination counts as undetermined where its standard deviation, as a share of the parameters'
-/// magnitude, is beyond this: it may then be anything up to ten times its value.
+/// A combination is undetermined if its standard deviation, relative to the parameters' magnitudes, is larger than this:
+/// its 95 % interval then extends to seven times its value.
 const LOOSE: f64 = 3.0;
-/// Or where its information is this small beside the best determined one's: rounding, not data.
+/// It is also undetermined if its eigenvalue is smaller than this share of the largest one, which is rounding.
 const ROUNDING: f64 = 1e-11;
-/// Parts of a combination smaller than this are not named.
+/// Parameters with a smaller weight in a combination are not reported.
 const NAMED: f64 = 0.1;
 
-/// The verdict on a fit's free parameters, from the eigenvalues of its information matrix in relative units.
-pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
-    let information = relative_information(dynamics, fit);
+/// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in relative
+/// units.
+pub fn identifiability(dynamics: &Dynamics, found: &Values, fit: &Fit) -> Identifiability {
+    let information = relative_information(dynamics, found, fit);
     let loose = loose_directions(&information);
     let name = |i: usize| dynamics.parameters[fit.columns[i].parameter].name.clone();
     let undetermined = loose
@@ -48,7 +50,7 @@ pub fn identifiability(dynamics: &Dynamics, fit: &Fit) -> Identifiability {
     }
 }
 
-/// Hold the parameter that takes part most in what is loose, until nothing is.
+/// Hold the parameter with the largest weight in the undetermined directions, one after the other, until none is left.
 fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
     let mut hold = Vec::new();
@@ -72,14 +74,14 @@ fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
     }
 }
 
-fn relative_information(dynamics: &Dynamics, fit: &Fit) -> DMatrix<f64> {
-    let mut all = fit.nothing();
+fn relative_information(dynamics: &Dynamics, found: &Values, fit: &Fit) -> DMatrix<f64> {
+    let mut all = fit.zero_equations();
     fit.reduced
         .iter()
         .for_each(|window| window.add_to(&mut all));
     let magnitude = |i: usize| {
         let scale = dynamics.parameters[fit.columns[i].parameter].scale;
-        fit.value(i).abs().max(1e-3 * scale)
+        found.get(fit.columns[i]).abs().max(1e-3 * scale)
     };
     let size = fit.columns.len();
     DMatrix::from_fn(size, size, |i, j| {

@@ -9,20 +9,19 @@ use super::shooting::Shooting;
 pub struct Uncertainty {
     /// Covariance of the free values, in the order of the fit's columns.
     pub covariance: DMatrix<f64>,
-    /// Blocks of windows that count as independent.
+    /// Number of blocks of windows, which are taken as independent.
     pub blocks: usize,
-    /// The blocks that speak of each column: of a value that one log has of its own, those of that log.
+    /// Number of blocks that depend on each column: for a value of one log, the blocks of that log.
     blocks_of: Vec<usize>,
 }
 
-/// Windows nearer than this (s) belong to one block: what a model lacks is correlated over a swing or two.
+/// Length of a block in s: model errors are correlated over a swing or two.
 pub const BLOCK_S: f64 = 2.0;
-/// Short logs are cut into as many blocks as this, though not shorter than a window's half second: of fewer no test
-/// says anything.
+/// Short logs are cut into this many blocks, each at least as long as a window: no test has power with fewer.
 const ENOUGH_BLOCKS: f64 = 12.0;
 const SHORTEST_BLOCK_S: f64 = 0.5;
 
-/// For each window, the block it belongs to: stretches of a log of about two seconds.
+/// The block of each window: stretches of a log of about [`BLOCK_S`].
 pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
     let windows = &shooting.windows;
     let total_s: f64 = windows.iter().map(|w| w.duration_s(shooting.logs)).sum();
@@ -31,7 +30,7 @@ pub fn blocks(shooting: &Shooting<'_>) -> Vec<usize> {
     stretches(starts, length_s)
 }
 
-/// Numbers of the stretches of about `length_s` in which windows, given as log and start in s, begin.
+/// The stretch of about `length_s` (s) in which each window begins; windows are given as log and start in s.
 pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> Vec<usize> {
     let mut stretches = Vec::new();
     let mut current: Option<(usize, f64)> = None;
@@ -46,17 +45,17 @@ pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> 
     stretches
 }
 
-/// Covariance of the free values by the jackknife over blocks: it holds when residuals within a block are
-/// correlated, as they are wherever a model lacks something, and when few blocks carry most of what is
-/// known, where the plain sandwich is too sure (Bell and McCaffrey 2002). The fits without a block are not
-/// repeated: each window's loss is taken as quadratic around the joint optimum.
+/// Covariance of the free values by the jackknife over blocks. It holds when residuals are correlated within a block, as
+/// they are wherever a model lacks something, and when a few blocks carry most of the information, where the plain
+/// sandwich estimator is too small (Bell and McCaffrey 2002). The fits without a block are approximated: each window's
+/// loss is taken as quadratic around the joint optimum.
 pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
     let count = blocks.last().map_or(0, |last| last + 1);
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
-    let mut all = fit.nothing();
-    let mut parts = vec![fit.nothing(); count];
+    let mut all = fit.zero_equations();
+    let mut parts = vec![fit.zero_equations(); count];
     for (window, &block) in fit.reduced.iter().zip(&blocks) {
         window.add_to(&mut all);
         window.add_to(&mut parts[block]);
@@ -65,7 +64,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         .filter(|&i| blocks_of[i] < 2 && fit.columns[i].log.is_some())
         .collect();
     for part in &mut parts {
-        // Without the only block that speaks of a value nothing is known of it: it stays.
+        // Without its only block a value is undetermined, so it stays.
         alone.iter().for_each(|&i| part.gradient[i] = 0.0);
     }
     let (model, flat) = inverse(&all.hessian);
@@ -84,7 +83,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         let off = step - &mean;
         spread += &off * off.transpose() * (1.0 - share);
     }
-    // Its interval is then what the model itself says.
+    // The jackknife gives such a value no variance: the inverse of its information does.
     for i in alone {
         spread[(i, i)] += model[(i, i)];
     }
@@ -98,22 +97,21 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
 fn blocks_of(shooting: &Shooting<'_>, fit: &Fit, blocks: &[usize]) -> Vec<usize> {
     let count = |log: Option<usize>| {
         let windows = shooting.windows.iter().zip(blocks);
-        let mut speaking: Vec<usize> = windows
+        let mut dependent: Vec<usize> = windows
             .filter(|(window, _)| log.is_none_or(|log| window.log == log))
             .map(|(_, block)| *block)
             .collect();
-        speaking.dedup();
-        speaking.len()
+        dependent.dedup();
+        dependent.len()
     };
     fit.columns.iter().map(|column| count(column.log)).collect()
 }
 
-/// Directions with less than this share of the best one's information are flat: what the residuals say about
-/// them is rounding.
+/// Directions with less than this share of the largest eigenvalue are flat: their information is rounding.
 const FLAT: f64 = 1e-9;
 
-/// The inverse of an information matrix, and what it says of flat directions alone: there the sandwich, a
-/// product of two roundings, must not pretend to know anything.
+/// The inverse of an information matrix, and its part along flat directions. The jackknife, a product of two roundings
+/// there, would understate the variance along them.
 fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     if hessian.is_empty() {
         return (hessian.clone(), hessian.clone());
@@ -146,8 +144,8 @@ fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 }
 
 impl Uncertainty {
-    /// Half width of the 95 % interval of the i-th column: Student's t with one degree of freedom a block that
-    /// speaks of it, less one.
+    /// Half width of the 95 % interval of the i-th column: Student's t with one degree of freedom less than blocks that
+    /// depend on it.
     pub fn half_width(&self, i: usize) -> f64 {
         self.student(i).inverse_cdf(0.975) * self.covariance[(i, i)].max(0.0).sqrt()
     }

@@ -1,17 +1,16 @@
 use thiserror::Error;
 
 use super::{FitError, Shooting, fit};
-use crate::data::{Interval, Log};
+use crate::data::{Interval, Joint, Log};
 use crate::expr::Graph;
-use crate::model::{Dynamics, Parameter};
+use crate::model::{Dynamics, OwnValue, Parameter};
 use crate::sim::cut;
 
 /// A model with an unknown sensor offset per joint and log.
 #[derive(Debug, Clone)]
 pub struct Offsets {
+    /// Each log's offsets are values of its own.
     pub dynamics: Dynamics,
-    /// All parameters of that model, `[log][parameter]`.
-    pub values: Vec<Vec<f64>>,
     /// The sensor offsets in rad (or m), `[log][joint]`.
     pub offsets: Vec<Vec<f64>>,
 }
@@ -40,17 +39,14 @@ const WINDOW_S: f64 = 0.5;
 /// A fraction outside of 0 to 1, or a beginning that is too short.
 pub fn calibrate(
     dynamics: &Dynamics,
-    values: &[f64],
     logs: &mut [Log],
     fraction: f64,
 ) -> Result<Offsets, CalibrateError> {
     if !(fraction > 0.0 && fraction < 1.0) {
         return Err(CalibrateError::Fraction(fraction));
     }
-    let with_offsets = with_offsets(dynamics);
     let mut found = Offsets {
-        dynamics: with_offsets,
-        values: Vec::new(),
+        dynamics: with_offsets(dynamics),
         offsets: Vec::new(),
     };
     for log in logs {
@@ -62,14 +58,21 @@ pub fn calibrate(
         };
         let mut beginning = log.clone();
         beginning.leave_out.push(rest);
-        let all =
-            estimate(&found.dynamics, values, beginning).map_err(|source| CalibrateError::Fit {
+        let first = dynamics.parameters.len();
+        let offsets =
+            estimate(&found.dynamics, first, beginning).map_err(|source| CalibrateError::Fit {
                 log: log.name(),
                 seconds,
                 source,
             })?;
-        found.offsets.push(all[values.len()..].to_vec());
-        found.values.push(all);
+        let own = |(parameter, &value): (usize, &f64)| OwnValue {
+            log: log.path.display().to_string(),
+            parameter,
+            value,
+            ci95: None,
+        };
+        found.dynamics.own.extend((first..).zip(&offsets).map(own));
+        found.offsets.push(offsets);
         log.leave_out.push(Interval {
             start_s,
             end_s: start_s + seconds,
@@ -78,14 +81,15 @@ pub fn calibrate(
     Ok(found)
 }
 
-fn estimate(dynamics: &Dynamics, values: &[f64], log: Log) -> Result<Vec<f64>, FitError> {
+/// The offsets on a log, which are the parameters from `first` on.
+fn estimate(dynamics: &Dynamics, first: usize, log: Log) -> Result<Vec<f64>, FitError> {
     let logs = [log];
     let noise = vec![1e-3; dynamics.joints];
     let shooting = Shooting::new(&logs, cut(&logs, WINDOW_S), &noise);
-    let start = [values, &vec![0.0; dynamics.joints]].concat();
-    let active: Vec<usize> = (values.len()..start.len()).collect();
+    let active: Vec<usize> = (first..dynamics.parameters.len()).collect();
     let locals = shooting.initial_locals(0);
-    Ok(fit(&shooting, dynamics, &active, &start, locals, None)?.values)
+    let (found, _) = fit(&shooting, dynamics, &active, locals, None)?;
+    Ok(found.common[first..].to_vec())
 }
 
 /// The same equations in logged angles: the true angle is the logged one less the offset.
@@ -100,9 +104,9 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         .collect();
     let mut parameters = dynamics.parameters.clone();
     let logged = inputs[..n].to_vec();
-    for (joint, input) in inputs[..n].iter_mut().enumerate() {
+    for (joint, input) in Joint::all(n).zip(&mut inputs[..n]) {
         // Names with spaces cannot occur in formulas, so this name is free.
-        let name = format!("offset of q{}", joint + 1);
+        let name = format!("offset of q{joint}");
         let offset = graph.input(&name);
         *input = graph.sub(*input, offset);
         parameters.push(Parameter {
@@ -135,5 +139,6 @@ fn with_offsets(dynamics: &Dynamics) -> Dynamics {
         program: graph.finish(&outputs),
         filters: dynamics.filters.clone(),
         reading,
+        own: Vec::new(),
     }
 }

@@ -58,7 +58,7 @@ impl Tangent {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
                 continue;
             };
-            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint]]);
+            let by_torque = graph.jacobian(accelerations, &[inputs[2 * n + filter.joint.index()]]);
             for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
                 row[2 * n + column] = graph.mul(by_torque[0], slope);
             }
@@ -379,7 +379,6 @@ mod tests {
     use std::path::Path;
 
     use super::{LANES, Local, Tangent, TangentStepper};
-    use crate::expr::SignForm;
     use crate::lanes::Row;
     use crate::model::Library;
     use crate::sim::{Commands, Hold, Point, SCHEMES, Simulator};
@@ -390,8 +389,8 @@ mod tests {
 
     #[test]
     fn sensitivities_are_the_slopes_of_every_schemes_steps() {
-        let acrobot = Library::built_in().system(Path::new("acrobot")).unwrap();
-        let model = acrobot.dynamics(&[SignForm::Exact; 2]);
+        let acrobot = Library::built_in().model(Path::new("acrobot")).unwrap();
+        let model = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
         let active: Vec<usize> = (0..model.parameters.len()).collect();
         let tangent = Tangent::new(&model, &active, Local::State);
         let (time, tau) = ([0.0], HELD.map(|tau| vec![tau]));

@@ -446,9 +446,8 @@ impl WithSimd for Add<'_> {
 mod tests {
     use std::path::Path;
 
-    use super::Shooting;
-    use crate::data::Log;
-    use crate::expr::SignForm;
+    use super::{Shooting, Values};
+    use crate::data::{Joint, Log};
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::model::{FittedEffect, Library};
@@ -472,9 +471,9 @@ mod tests {
     fn gradients_by_effects_with_memory_are_slopes_of_the_cost() {
         let library = Library::built_in();
         let effects = ["actuator_delay", "actuator_lag", "backlash"]
-            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), 0));
-        let pendulum = library.system(Path::new("pendulum")).unwrap();
-        let model = pendulum.dynamics_with(&effects, &[SignForm::DEFAULT]);
+            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
+        let pendulum = library.model(Path::new("pendulum")).unwrap();
+        let model = pendulum.with_effects(effects.to_vec()).dynamics();
         let logs = [log()];
         let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
         for local in [Local::State, Local::StateAndForce] {
@@ -482,14 +481,17 @@ mod tests {
             let tangent = Tangent::new(&model, &[1, 2, 3, 4], local);
             for (delay, lag) in [(0.0, 0.0), (0.0073, 0.015)] {
                 let values = [15.0, 3.0, delay, lag, 0.01, 0.0];
+                let point = |values: &[f64]| Values {
+                    common: values.to_vec(),
+                    own: Vec::new(),
+                };
                 let cost = |values: &[f64]| -> f64 {
                     shooting
-                        .costs(&model, &values.into(), &locals, 1.0)
+                        .costs(&model, &point(values), &locals, 1.0)
                         .iter()
                         .sum()
                 };
-                let terms =
-                    shooting.linearise(&model, &tangent, &values.as_slice().into(), &locals, 1.0);
+                let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
                 for (column, k) in [1, 2, 3, 4].into_iter().enumerate() {
                     let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
                     let mut moved = values;

@@ -1,5 +1,5 @@
-use crate::model::Parameter;
-
+use crate::data::Log;
+use crate::model::{Dynamics, OwnValue, Parameter};
 use crate::sim::Window;
 
 /// The value that a parameter has in one log alone.
@@ -12,32 +12,48 @@ pub struct Own {
     pub value: f64,
 }
 
-/// Values of all parameters of a model: those that hold in every log, and those that one log has of its own.
+/// Values of all parameters of a model as a fit to a list of logs moves them: those that hold in every log, and those
+/// that one log has of its own, by its place in that list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Values {
-    /// One value a parameter, in the model's order; of a parameter with a value per log, what holds in a log
-    /// that has none of its own.
+    /// One value per parameter, in the model's order. For a parameter with a value per log, the one that holds in logs
+    /// without a value of their own.
     pub common: Vec<f64>,
     pub own: Vec<Own>,
 }
 
-impl From<&[f64]> for Values {
-    fn from(common: &[f64]) -> Self {
+impl Values {
+    /// The values of a model on these logs.
+    pub fn of(dynamics: &Dynamics, logs: &[Log]) -> Self {
+        let in_log = |(index, log)| {
+            dynamics.own_in(log).map(move |own| Own {
+                log: index,
+                parameter: own.parameter,
+                value: own.value,
+            })
+        };
         Self {
-            common: common.to_vec(),
-            own: Vec::new(),
+            common: dynamics.values(),
+            own: logs.iter().enumerate().flat_map(in_log).collect(),
         }
     }
-}
 
-impl From<&Vec<f64>> for Values {
-    fn from(common: &Vec<f64>) -> Self {
-        common.as_slice().into()
+    /// The model with these values; what it knows of other logs stays.
+    pub fn put_into(&self, dynamics: &Dynamics, logs: &[Log]) -> Dynamics {
+        let mut found = dynamics.clone().with_values(self.common.iter().copied());
+        found
+            .own
+            .retain(|own| !logs.iter().any(|log| log.is_called(&own.log)));
+        found.own.extend(self.own.iter().map(|own| OwnValue {
+            log: logs[own.log].path.display().to_string(),
+            parameter: own.parameter,
+            value: own.value,
+            ci95: None,
+        }));
+        found
     }
-}
 
-impl Values {
-    /// All parameters as they are in a log.
+    /// The values of all parameters in a log.
     pub fn of_log(&self, log: usize) -> Vec<f64> {
         let mut values = self.common.clone();
         for own in self.own.iter().filter(|own| own.log == log) {
@@ -46,8 +62,11 @@ impl Values {
         values
     }
 
-    pub(super) fn get(&self, column: Column) -> f64 {
-        value_of(&self.common, &self.own, column)
+    /// The value of a free value of a fit.
+    pub fn get(&self, column: Column) -> f64 {
+        let is_it = |own: &&Own| Some(own.log) == column.log && own.parameter == column.parameter;
+        let own = self.own.iter().find(is_it);
+        own.map_or(self.common[column.parameter], |own| own.value)
     }
 
     pub(super) fn set(&mut self, column: Column, value: f64) {
@@ -68,13 +87,6 @@ impl Values {
     }
 }
 
-pub(super) fn value_of(common: &[f64], own: &[Own], column: Column) -> f64 {
-    let is_it = |own: &&Own| Some(own.log) == column.log && own.parameter == column.parameter;
-    own.iter()
-        .find(is_it)
-        .map_or(common[column.parameter], |own| own.value)
-}
-
 /// One free value of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Column {
@@ -84,7 +96,7 @@ pub struct Column {
     pub log: Option<usize>,
 }
 
-/// The free values of a fit, and where those of each window stand among them.
+/// The columns of a fit, and which of them enter each window.
 #[derive(Debug, Clone)]
 pub(super) struct Layout {
     pub columns: Vec<Column>,

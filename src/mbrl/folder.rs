@@ -18,11 +18,12 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Read the rounds in `folder`.
+    /// Read the rounds in `folder`, which is made where it is missing.
     ///
     /// # Errors
-    /// A damaged file.
+    /// A folder that cannot be made, or a damaged file.
     pub fn open(folder: RunFolder) -> Result<Self, RunError> {
+        folder.make()?;
         let text = folder.text(ROUNDS)?.unwrap_or_default();
         let read = |(number, line): (usize, &str)| {
             serde_json::from_str(line)

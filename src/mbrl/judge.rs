@@ -49,7 +49,7 @@ impl Judge<'_> {
         predictor: &Predictor,
         replan: usize,
     ) -> Result<(Episode, usize), RunError> {
-        let dynamics = self.plant.true_dynamics();
+        let dynamics = self.plant.dynamics();
         let mut rng = stream(self.seed, Purpose::Judge(0));
         let start = self.task.draw_start(&mut rng);
         let mut rig = self.task.rig(self.plant, &dynamics, &start);

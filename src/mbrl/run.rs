@@ -62,7 +62,7 @@ impl Run<'_> {
     /// # Errors
     /// A plant that diverges.
     pub fn begin(&self) -> Result<Progress, RunError> {
-        let dynamics = self.plant.true_dynamics();
+        let dynamics = self.plant.dynamics();
         let mut rig = self.rig(&dynamics, 0);
         let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
         let mut noise = stream(self.seed, Purpose::Gather(0));
@@ -112,7 +112,7 @@ impl Run<'_> {
     }
 
     fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
-        let dynamics = self.plant.true_dynamics();
+        let dynamics = self.plant.dynamics();
         let mut rig = self.rig_now(&dynamics, progress)?;
         let of_round =
             |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(progress.rounds + 1));

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
 use crate::control::Task;
-use crate::expr::SignForm;
+use crate::data::Joint;
 use crate::model::{Angles, Dynamics, Library, MlpSettings, Origin};
 use crate::plant::{Noise, Plant};
 use crate::runs::RunFolder;
@@ -38,9 +38,14 @@ fn setting() -> Setting {
     };
     let mut plant = Plant::read(Path::new("pendulum-real"), &library).unwrap();
     plant
-        .add_effect(&library, "actuator_delay", 1, &[("d".to_owned(), 0.03)])
+        .add_effect(
+            &library,
+            "actuator_delay",
+            Joint::at(0),
+            &[("d".to_owned(), 0.03)],
+        )
         .unwrap();
-    let dynamics = plant.system.dynamics(&[SignForm::DEFAULT]);
+    let dynamics = plant.system.dynamics();
     let network = MlpSettings {
         hidden: vec![4],
         angles: Angles::SinCos,

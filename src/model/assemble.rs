@@ -1,30 +1,21 @@
+use std::ops::Range;
+
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::filter::{CommandFilter, Filter};
 use super::reader::Located;
-use super::system::{FittedEffect, Motion, System};
+use super::system::{FittedEffect, Model, Motion, OwnValue};
 use super::{Dynamics, Parameter};
+use crate::data::Joint;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
-impl System {
-    /// The declared equations with the file's own effects, ready to run.
-    pub fn dynamics(&self, sign: &[SignForm]) -> Dynamics {
-        self.dynamics_with(&self.effects, sign)
-    }
-
-    /// The declared equations with `effects` in place of the file's own.
+impl Model {
+    /// The equations and effects compiled into one program, with the model's own values and smoothing.
     ///
-    /// Filters of the command act first, then other effects of the torque, in the order given, then forces are
-    /// added. `load` is the torque before the latter. `sign` says for each joint how dry friction is written.
-    ///
-    /// # Panics
-    /// When an effect names a joint that the system does not have, or `sign` has not one entry a joint.
-    pub fn dynamics_with(&self, effects: &[FittedEffect], sign: &[SignForm]) -> Dynamics {
-        assert_eq!(
-            sign.len(),
-            self.joints,
-            "one form of the sign for each joint"
-        );
-        let mut assembly = Assembly::new(self, effects, sign);
+    /// Filters of the command act first, then other effects of the torque, in their order, then forces are added.
+    /// `load` is the torque before the latter.
+    pub fn dynamics(&self) -> Dynamics {
+        let sign = self.sign();
+        let mut assembly = Assembly::new(self, &self.effects, &sign);
         let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
@@ -37,32 +28,52 @@ impl System {
             joints: self.joints,
             parameters: assembly.parameters,
             program: assembly.graph.finish(&outputs),
-            filters: filters(self.parameters.len(), effects),
+            filters: self.filters(),
             reading,
+            own: self.own_values(),
         }
     }
-}
 
-/// The filters among `effects`, whose parameters follow the `declared` ones.
-fn filters(declared: usize, effects: &[FittedEffect]) -> Vec<Filter> {
-    let mut parameter = declared;
-    let mut filters = Vec::new();
-    for effect in effects {
-        if let Entry::Command(kind) = effect.effect.entry {
-            filters.push(Filter {
+    /// Every parameter of the model: the declared ones, then those of the effects, in their order.
+    pub fn all_parameters(&self) -> Vec<Parameter> {
+        let mut parameters = self.parameters.clone();
+        for effect in &self.effects {
+            let known = parameters.iter().map(|p| p.name.as_str());
+            let taken: Vec<&str> = self.own_names().chain(known).collect();
+            let of_effect = effect_parameters(effect, &taken, self.prismatic[effect.joint]);
+            parameters.extend(of_effect);
+        }
+        parameters
+    }
+
+    fn filters(&self) -> Vec<Filter> {
+        let filter = |(effect, place): (&FittedEffect, Range<usize>)| match effect.effect.entry {
+            Entry::Command(kind) => Some(Filter {
                 joint: effect.joint,
                 kind,
-                parameter,
-            });
-        }
-        parameter += effect.values.len();
+                parameter: place.start,
+            }),
+            _ => None,
+        };
+        self.placed().filter_map(filter).collect()
     }
-    filters
+
+    /// The values that single logs have of their own, each of the parameter at that index among all.
+    pub fn own_values(&self) -> Vec<OwnValue> {
+        let of_effect = |(effect, place): (&FittedEffect, Range<usize>)| {
+            let own = effect.own.iter().map(move |own| OwnValue {
+                parameter: place.start + own.parameter,
+                ..own.clone()
+            });
+            own.collect::<Vec<_>>()
+        };
+        self.placed().flat_map(of_effect).collect()
+    }
 }
 
 impl FittedEffect {
-    /// The effect on a joint (counted from 0) with all parameters zero.
-    pub fn absent(effect: &Effect, joint: usize) -> Self {
+    /// The effect on a joint with all parameters zero.
+    pub fn absent(effect: &Effect, joint: Joint) -> Self {
         Self {
             effect: effect.clone(),
             joint,
@@ -74,7 +85,7 @@ impl FittedEffect {
 
     /// What tells this effect from others in one model.
     pub fn label(&self) -> String {
-        format!("{} on joint {}", self.title(), self.joint + 1)
+        format!("{} on joint {}", self.title(), self.joint)
     }
 
     /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
@@ -88,7 +99,7 @@ impl FittedEffect {
     pub fn expression(&self, names: &[String]) -> String {
         match self.program(names) {
             Ok(program) => program.formula(0),
-            Err(filter) => filter.expression(&format!("tau{}", self.joint + 1), &names[0]),
+            Err(filter) => filter.expression(&self.joint.name("tau"), &names[0]),
         }
     }
 
@@ -106,12 +117,11 @@ impl FittedEffect {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         for name in EFFECT_NAMES {
-            let suffix = if name == "t" {
-                String::new()
-            } else {
-                (self.joint + 1).to_string()
+            let of_joint = match name {
+                "t" => name.to_owned(),
+                stem => self.joint.name(stem),
             };
-            let node = graph.input(&format!("{name}{suffix}"));
+            let node = graph.input(&of_joint);
             scope.bind(name, node);
         }
         for (parameter, name) in self.effect.parameters.iter().zip(names) {
@@ -126,10 +136,9 @@ impl FittedEffect {
 
     /// The names of the effect's parameters on its joint, told apart from names already `taken`.
     pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
-        let joint = self.joint + 1;
         let plain = |own: &str| match self.shifted() {
             Some(_) => format!("{own}_shift"),
-            None => format!("{own}{joint}"),
+            None => self.joint.name(own),
         };
         let name = |own: &str| match plain(own) {
             plain if taken.contains(&plain.as_str()) => {
@@ -147,7 +156,7 @@ impl FittedEffect {
 
 /// The graph while it grows.
 struct Assembly<'a> {
-    system: &'a System,
+    system: &'a Model,
     effects: Vec<(&'a FittedEffect, Vec<Node>)>,
     sign: &'a [SignForm],
     graph: Graph,
@@ -162,11 +171,11 @@ struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    fn new(system: &'a System, effects: &'a [FittedEffect], sign: &'a [SignForm]) -> Self {
+    fn new(system: &'a Model, effects: &'a [FittedEffect], sign: &'a [SignForm]) -> Self {
         let mut graph = Graph::new();
         let mut numbered = |stem: &str| -> Vec<Node> {
-            (1..=system.joints)
-                .map(|j| graph.input(&format!("{stem}{j}")))
+            Joint::all(system.joints)
+                .map(|joint| graph.input(&joint.name(stem)))
                 .collect()
         };
         let (q, qd, tau) = (numbered("q"), numbered("qd"), numbered("tau"));
@@ -176,15 +185,15 @@ impl<'a> Assembly<'a> {
             .iter()
             .map(|p| graph.input(&p.name))
             .collect();
-        let mut parameters = system.parameters.clone();
-        let mut with_nodes = Vec::new();
-        for effect in effects {
-            let of_effects = parameters.iter().map(|p| p.name.as_str());
-            let taken: Vec<&str> = system.own_names().chain(of_effects).collect();
-            let own = effect_parameters(effect, &taken, system.prismatic[effect.joint]);
-            with_nodes.push((effect, own.iter().map(|p| graph.input(&p.name)).collect()));
-            parameters.extend(own);
-        }
+        let parameters = system.all_parameters();
+        let of_effects = parameters[system.parameters.len()..].iter();
+        let mut nodes = of_effects
+            .map(|p| graph.input(&p.name))
+            .collect::<Vec<_>>()
+            .into_iter();
+        let with_nodes = (effects.iter())
+            .map(|effect| (effect, nodes.by_ref().take(effect.values.len()).collect()))
+            .collect();
         Self {
             system,
             effects: with_nodes,
@@ -216,7 +225,7 @@ impl<'a> Assembly<'a> {
 
     fn apply_forces(&mut self) {
         // All forces see the torque as it was before any of them.
-        let forces: Vec<(usize, Node)> = self
+        let forces: Vec<(Joint, Node)> = self
             .entries(|effect| matches!(effect.entry, Entry::Force(_)))
             .into_iter()
             .map(|(index, joint, formula)| (joint, self.effect_node(index, formula)))
@@ -227,7 +236,7 @@ impl<'a> Assembly<'a> {
     }
 
     /// The effects that enter in one way: number, joint and formula.
-    fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, usize, &'a Formula)> {
+    fn entries(&self, is_wanted: impl Fn(&Effect) -> bool) -> Vec<(usize, Joint, &'a Formula)> {
         let effects = self.effects.iter().enumerate();
         let wanted = effects.filter(|(_, (effect, _))| is_wanted(&effect.effect));
         wanted
@@ -257,7 +266,7 @@ impl<'a> Assembly<'a> {
 
     fn accelerations(&mut self) -> Vec<Node> {
         let scope = self.declared_scope();
-        match &self.system.motion {
+        match &self.system.equations.motion {
             Motion::Accelerations(formulas) => formulas
                 .iter()
                 .map(|formula| lower(&scope, &mut self.graph, formula))
@@ -319,17 +328,17 @@ impl<'a> Assembly<'a> {
     fn declared_scope(&mut self) -> Scope {
         let angles = self.declared_angles();
         let mut scope = Scope::new(self.narrowest_sign());
-        for j in 0..self.system.joints {
-            scope.bind(&format!("q{}", j + 1), angles[j]);
-            scope.bind(&format!("qd{}", j + 1), self.qd[j]);
-            scope.bind(&format!("tau{}", j + 1), self.tau[j]);
+        for joint in Joint::all(self.system.joints) {
+            scope.bind(&joint.name("q"), angles[joint]);
+            scope.bind(&joint.name("qd"), self.qd[joint]);
+            scope.bind(&joint.name("tau"), self.tau[joint]);
         }
         scope.bind("t", self.time);
         for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
             scope.bind(&parameter.name, *node);
         }
         self.bind_shifted(&mut scope);
-        for (name, formula) in &self.system.lets {
+        for (name, formula) in &self.system.equations.lets {
             let node = lower(&scope, &mut self.graph, formula);
             self.graph.label(node, name);
             scope.bind(name, node);

@@ -1,6 +1,10 @@
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::filter::Filter;
+use super::system::OwnValue;
+use crate::data::Log;
 use crate::expr::Program;
 
 /// A physical parameter of a model or an effect.
@@ -15,11 +19,11 @@ pub struct Parameter {
     pub bounds: [f64; 2],
     /// Held at `value` in every fit.
     pub fixed: bool,
-    /// Has a value of its own in each log.
+    /// Takes a value of its own in each log.
     pub per_log: bool,
     /// 95 % interval, once a fit has found one.
     pub ci95: Option<[f64; 2]>,
-    /// The magnitude in which steps are measured: the declared value's, or a typical one where that is zero.
+    /// Magnitude by which steps are scaled: that of the declared value, or 1 if it is zero; typical for effects.
     pub scale: f64,
 }
 
@@ -35,11 +39,11 @@ impl Parameter {
     }
 }
 
-/// A model ready to run: first-order differential equations as one program, and its parameters.
+/// A compiled model: first-order differential equations as one program, with the values of its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
 /// (N m or N), `t` (s), then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values),
-/// then `dqd/dt` (n values). The torques are those that act: what `filters` make of the commanded ones.
+/// then `dqd/dt` (n values). The torques are those that act, after `filters`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.
@@ -48,11 +52,13 @@ pub struct Dynamics {
     pub joints: usize,
     pub parameters: Vec<Parameter>,
     pub program: Program,
-    /// What the commanded torques go through first, see [`Commands`](crate::sim::Commands).
+    /// Filters of the commanded torques, see [`Commands`](crate::sim::Commands).
     pub filters: Vec<Filter>,
-    /// What the sensors show for the angles, from the same inputs, where that is not the rig's own: n outputs. The
-    /// torques are those that acted until then.
+    /// The measured angles, from the same inputs (n outputs), unless they equal the true ones. The torques are those that
+    /// acted until then.
     pub reading: Option<Program>,
+    /// Values of parameters in single logs; `parameter` is an index into `parameters`.
+    pub own: Vec<OwnValue>,
 }
 
 impl Dynamics {
@@ -61,13 +67,33 @@ impl Dynamics {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// The same with other values of the parameters, in their order.
+    /// The same model with other values of its parameters, in their order.
     #[must_use]
     pub fn with_values(mut self, values: impl IntoIterator<Item = f64>) -> Self {
         for (parameter, value) in self.parameters.iter_mut().zip(values) {
             parameter.value = value;
         }
         self
+    }
+
+    /// The model in a log: with the values that its parameters have there.
+    pub fn in_log(&self, log: &Log) -> Cow<'_, Self> {
+        let mut in_log = Cow::Borrowed(self);
+        for own in self.own_in(log) {
+            in_log.to_mut().parameters[own.parameter].value = own.value;
+        }
+        in_log
+    }
+
+    /// The values of parameters in one log, which is found by its path or else by its file name.
+    pub fn own_in<'a>(&'a self, log: &'a Log) -> impl Iterator<Item = &'a OwnValue> {
+        let is_path = |own: &OwnValue| log.path.as_os_str() == own.log.as_str();
+        let by_path = move |parameter: usize| {
+            let mut own = self.own.iter();
+            own.any(|own| own.parameter == parameter && is_path(own))
+        };
+        let called = self.own.iter().filter(|own| log.is_called(&own.log));
+        called.filter(move |own| is_path(own) || !by_path(own.parameter))
     }
 
     /// Number of states, 2n.

@@ -4,6 +4,7 @@ use super::effect::{Effect, EffectParameter};
 use super::reader::{FileError, Section};
 use super::sections::interval;
 use super::system::{FittedEffect, OwnValue};
+use crate::data::Joint;
 use crate::expr::suggestion;
 
 pub(super) fn read(
@@ -29,13 +30,9 @@ fn fitted(
         let message = format!("unknown effect `{name}`{near}; `residyn list effects` shows all");
         return Err(section.error_at("name", message));
     };
-    let joint = match section.whole("joint")? {
-        Some(joint) if (1..=joints).contains(&joint) => joint - 1,
-        _ => {
-            return Err(
-                section.error_at("joint", format!("`joint` is a number from 1 to {joints}"))
-            );
-        }
+    let joint = section.whole("joint")?.and_then(Joint::numbered);
+    let Some(joint) = joint.filter(|joint| joint.is_of(joints)) else {
+        return Err(section.error_at("joint", format!("`joint` is a number from 1 to {joints}")));
     };
     let mut known = vec!["name", "joint", "fixed"];
     known.extend(effect.parameters.iter().map(|p| p.name.as_str()));

@@ -1,14 +1,15 @@
 //! A model file, read whole and checked.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::effect::Effect;
 use super::reader::{Document, FileError, Located, Section};
-use super::system::System;
+use super::system::{Equations, Model};
 use super::{effects_in_file, sections};
 use crate::expr::{Formula, Graph, Scope, SignForm};
 
-impl System {
+impl Model {
     /// Read a model file. `library` is where its `[[effect]]` entries are looked up.
     ///
     /// # Errors
@@ -20,7 +21,7 @@ impl System {
     /// The model in `text`; `path` is for messages.
     ///
     /// # Errors
-    /// As [`System::read`].
+    /// As [`Model::read`].
     pub fn from_text(path: &Path, text: &str, library: &[Effect]) -> Result<Self, FileError> {
         let document = Document {
             path: path.to_owned(),
@@ -56,9 +57,11 @@ impl System {
             hidden: sections::hidden(top.section("residual")?, joints)?,
             text: document.text.clone(),
             declaration: sections::declaration(&document.text),
-            lets: sections::lets(document, &dynamics)?,
-            motion: sections::motion(document, &dynamics, joints)?,
-            energy: sections::energy(top.section("energy")?)?,
+            equations: Arc::new(Equations {
+                lets: sections::lets(document, &dynamics)?,
+                motion: sections::motion(document, &dynamics, joints)?,
+                energy: sections::energy(top.section("energy")?)?,
+            }),
         };
         system.check_names(&top)?;
         system.check_formulas(document)?;
@@ -75,7 +78,11 @@ impl System {
         let mut taken: Vec<String> = self.input_names();
         taken.truncate(3 * self.joints + 1);
         let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
-        let lets = self.lets.iter().map(|(name, _)| ("dynamics", name));
+        let lets = self
+            .equations
+            .lets
+            .iter()
+            .map(|(name, _)| ("dynamics", name));
         for (section, name) in parameters.chain(lets) {
             if taken.contains(name) {
                 let section = top.required_section(section)?;
@@ -101,15 +108,16 @@ impl System {
                 .lower(&mut graph, &formula.value)
                 .map_err(|error| document.formula_error(formula.at, &error))
         };
-        for (name, formula) in &self.lets {
+        for (name, formula) in &self.equations.lets {
             let node = lower(&scope, formula)?;
             scope.bind(name, node);
         }
         let energy = self
+            .equations
             .energy
             .iter()
             .flat_map(|energy| [&energy.total, &energy.power]);
-        for formula in self.motion.formulas().chain(energy) {
+        for formula in self.equations.motion.formulas().chain(energy) {
             lower(&scope, formula)?;
         }
         Ok(())

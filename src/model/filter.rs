@@ -1,5 +1,7 @@
 use serde::{Deserialize, Serialize};
 
+use crate::data::Joint;
+
 /// How a command is filtered; each kind has one parameter, in s. At zero both leave the command as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -31,8 +33,7 @@ impl CommandFilter {
 /// A filter of one joint's commanded torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Filter {
-    /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     pub kind: CommandFilter,
     /// Index into the model's parameters.
     pub parameter: usize,

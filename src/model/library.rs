@@ -4,7 +4,7 @@ use include_dir::{Dir, include_dir};
 
 use super::effect::Effect;
 use super::reader::FileError;
-use super::system::System;
+use super::system::Model;
 use crate::expr::suggestion;
 
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/models");
@@ -97,16 +97,16 @@ impl Library {
     /// A system from a file or, where there is no such file, an embedded one of that name.
     ///
     /// # Errors
-    /// As [`System::read`]; for a path that is neither, the names that exist.
-    pub fn system(&self, path: &Path) -> Result<System, FileError> {
+    /// As [`Model::read`]; for a path that is neither, the names that exist.
+    pub fn model(&self, path: &Path) -> Result<Model, FileError> {
         let embedded = path
             .to_str()
             .filter(|_| !path.is_file())
             .and_then(Self::system_text);
         if let Some(text) = embedded {
-            return System::from_text(path, text, &self.effects);
+            return Model::from_text(path, text, &self.effects);
         }
-        System::read(path, &self.effects).map_err(|mut error| {
+        Model::read(path, &self.effects).map_err(|mut error| {
             if error.place.is_none() {
                 error.message += &format!(
                     "; give a model file or one of {}",
@@ -150,7 +150,7 @@ mod tests {
         let library = Library::built_in();
         assert!(library.effects().len() >= 13);
         for name in Library::system_names() {
-            library.system(Path::new(&name)).unwrap();
+            library.model(Path::new(&name)).unwrap();
         }
         for effect in library.effects() {
             for other in effect.contains.iter().chain(&effect.confused_with) {

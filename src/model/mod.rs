@@ -17,6 +17,7 @@ mod shift;
 mod system;
 mod typeset;
 pub(crate) mod weights;
+mod written;
 
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
@@ -29,5 +30,4 @@ pub use network::{
 pub(crate) use network::{nothing_but, to_f32};
 pub use reader::FileError;
 pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
-pub use shift::absorbed;
-pub use system::{FittedEffect, OwnValue, System, put_own};
+pub use system::{FittedEffect, Model, OwnValue};

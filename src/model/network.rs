@@ -428,6 +428,7 @@ pub(crate) fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics
         program: graph.finish(&rates),
         filters: Vec::new(),
         reading: None,
+        own: Vec::new(),
     }
 }
 

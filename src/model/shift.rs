@@ -2,7 +2,8 @@
 
 use super::Parameter;
 use super::effect::{Effect, EffectParameter, Entry, Measure};
-use super::system::{FittedEffect, Motion, System};
+use super::system::{FittedEffect, Model, Motion};
+use crate::data::Joint;
 use crate::expr::{Formula, parse};
 
 /// The name of the effect.
@@ -12,7 +13,7 @@ const UNIT_OF_GRAVITY: &str = "m/s^2";
 /// What is positive keeps at least this share of its declared value.
 const LEAST: f64 = 1e-3;
 
-impl System {
+impl Model {
     /// For each parameter that the file declares fixed, the effect that it has another value: on the outermost
     /// joint whose equation it enters, still absent.
     pub fn shifts(&self) -> Vec<FittedEffect> {
@@ -27,7 +28,7 @@ impl System {
     }
 
     /// The last joint in whose equation a parameter appears, directly or through intermediates.
-    fn outermost_joint(&self, parameter: &str) -> Option<usize> {
+    fn outermost_joint(&self, parameter: &str) -> Option<Joint> {
         let mut carriers = vec![parameter];
         let carries = |formula: &Formula, carriers: &[&str]| {
             formula
@@ -35,19 +36,19 @@ impl System {
                 .iter()
                 .any(|name| carriers.contains(&&**name))
         };
-        for (name, formula) in &self.lets {
+        for (name, formula) in &self.equations.lets {
             if carries(&formula.value, &carriers) {
                 carriers.push(name);
             }
         }
-        let enters = |joint: &usize| match &self.motion {
+        let enters = |joint: &Joint| match &self.equations.motion {
             Motion::Accelerations(formulas) => carries(&formulas[*joint].value, &carriers),
             Motion::MassAndBias { mass, bias } => {
                 let mut row = mass[*joint].iter().chain([&bias[*joint]]);
                 row.any(|formula| carries(&formula.value, &carriers))
             }
         };
-        (0..self.joints).rev().find(enters)
+        Joint::all(self.joints).rev().find(enters)
     }
 }
 
@@ -106,16 +107,20 @@ impl FittedEffect {
     }
 }
 
-/// Shifts put into the declared values: these, and the effects that are left.
-pub fn absorbed(declared: &[f64], effects: &[FittedEffect]) -> (Vec<f64>, Vec<FittedEffect>) {
-    let mut declared = declared.to_vec();
-    for effect in effects {
-        if let Some(k) = effect.shifted() {
-            declared[k] += effect.values[0].0;
+impl Model {
+    /// The same model with each shift added to the declared value that it shifts.
+    #[must_use]
+    pub fn absorbed(&self) -> Self {
+        let all = self.all_parameters();
+        let mut absorbed = self.clone();
+        absorbed.effects.retain(|effect| effect.shifted().is_none());
+        for (effect, place) in self.placed() {
+            if let Some(k) = effect.shifted() {
+                absorbed.parameters[k] = self.parameters[k].shifted_by(&all[place.start]);
+            }
         }
+        absorbed
     }
-    let left = effects.iter().filter(|effect| effect.shifted().is_none());
-    (declared, left.cloned().collect())
 }
 
 impl Parameter {

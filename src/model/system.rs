@@ -1,10 +1,15 @@
+use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::effect::{Effect, Entry, Measure};
 use super::reader::Located;
 use super::{Dynamics, Parameter};
-use crate::data::{Columns, Log};
+use crate::data::{Columns, Joint, Log};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
+
+/// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
+const DEFAULT_SIGN_WIDTH: f64 = 0.01;
 
 /// How a model file states the motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,22 +34,21 @@ pub(super) struct Energy {
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedEffect {
     pub effect: Effect,
-    /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     /// One for each of the effect's parameters: value and 95 % interval.
     pub values: Vec<(f64, Option<[f64; 2]>)>,
-    /// Values that single logs have of their own; where there is none, that of `values` holds.
+    /// Values in single logs; in all other logs those of `values` hold.
     pub own: Vec<OwnValue>,
-    /// Held at the values given.
+    /// Held at these values in every fit.
     pub fixed: bool,
 }
 
-/// The value that a parameter of an effect has in one log.
+/// The value of a parameter in one log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnValue {
     /// The log's path or name.
     pub log: String,
-    /// Index into the effect's parameters.
+    /// Index into the parameters of what carries it: an effect or a compiled model.
     pub parameter: usize,
     pub value: f64,
     pub ci95: Option<[f64; 2]>,
@@ -61,27 +65,27 @@ impl OwnValue {
     }
 }
 
-/// Put what a log has of its own into the `values` of all parameters: `declared` ones, then those of the effects.
-pub fn put_own(values: &mut [f64], declared: usize, effects: &[FittedEffect], log: &Log) {
-    let mut first = declared;
-    for effect in effects {
-        for own in effect.own.iter().filter(|own| log.is_called(&own.log)) {
-            values[first + own.parameter] = own.value;
-        }
-        first += effect.values.len();
-    }
+/// The declared equations of motion, checked. Models that differ in values or effects share them.
+#[derive(Debug)]
+pub(super) struct Equations {
+    pub lets: Vec<(String, Located<Formula>)>,
+    pub motion: Motion,
+    pub energy: Option<Energy>,
 }
 
-/// A declared model: what a model file says, checked.
+/// A model: declared equations, effects on their joints, the values of all parameters and the smoothing of friction.
+///
+/// It is what a model file holds, what a fit returns and what is compiled for everything that runs it: see
+/// [`Model::dynamics`].
 #[derive(Debug, Clone)]
-pub struct System {
+pub struct Model {
     pub name: String,
     pub about: String,
     pub joints: usize,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
-    /// For each joint the speed (rad/s or m/s) over which dry friction reverses; where the file gives none,
-    /// fits choose it by the speeds in the logs.
+    /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump. `None` if the file sets none:
+    /// then fits choose it by the speeds in the logs.
     pub sign_width: Option<Vec<f64>>,
     pub columns: Columns,
     pub parameters: Vec<Parameter>,
@@ -92,15 +96,13 @@ pub struct System {
     pub text: String,
     /// The text of the declared part of the file: everything before the first effect.
     pub declaration: String,
-    pub(super) lets: Vec<(String, Located<Formula>)>,
-    pub(super) motion: Motion,
-    pub(super) energy: Option<Energy>,
+    pub(super) equations: Arc<Equations>,
 }
 
-impl System {
+impl Model {
     /// Names that effects must not take: of parameters and of intermediates.
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
-        let lets = self.lets.iter().map(|(name, _)| name.as_str());
+        let lets = self.equations.lets.iter().map(|(name, _)| name.as_str());
         self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
     }
 
@@ -117,29 +119,148 @@ impl System {
         names
     }
 
-    /// All parameters of `dynamics`, of this model or of one with a network on top, as they are in a log.
-    pub fn values_in(&self, dynamics: &Dynamics, log: &Log) -> Vec<f64> {
-        let mut values = dynamics.values();
-        put_own(&mut values, self.parameters.len(), &self.effects, log);
-        values
+    /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump.
+    pub fn sign_widths(&self) -> Vec<f64> {
+        let default = || vec![DEFAULT_SIGN_WIDTH; self.joints];
+        self.sign_width.clone().unwrap_or_else(default)
     }
 
-    /// How dry friction is written in each joint: as the file says, else in the default width.
-    pub fn sign(&self) -> Vec<SignForm> {
-        let width = |width: &f64| SignForm::Smooth { width: *width };
-        let given = self.sign_width.as_ref();
-        given.map_or(vec![SignForm::DEFAULT; self.joints], |widths| {
-            widths.iter().map(width).collect()
-        })
+    /// How dry friction is written in each joint.
+    pub(super) fn sign(&self) -> Vec<SignForm> {
+        let form = |width: f64| match width {
+            0.0 => SignForm::Exact,
+            width => SignForm::Smooth { width },
+        };
+        self.sign_widths().into_iter().map(form).collect()
     }
 
-    /// Whether an effect can act on a joint (counted from 0) of this system.
+    /// The same model with these effects in place of its own.
+    #[must_use]
+    pub fn with_effects(&self, effects: Vec<FittedEffect>) -> Self {
+        Self {
+            effects,
+            ..self.clone()
+        }
+    }
+
+    /// The same model with dry friction that reverses over these speeds (rad/s or m/s), one per joint; 0 for a jump.
+    ///
+    /// # Panics
+    /// When there is not one width a joint.
+    #[must_use]
+    pub fn with_sign_widths(&self, widths: Vec<f64>) -> Self {
+        assert_eq!(widths.len(), self.joints, "one width for each joint");
+        Self {
+            sign_width: Some(widths),
+            ..self.clone()
+        }
+    }
+
+    /// Values of all parameters: the declared ones, then those of the effects, in their order.
+    pub fn values(&self) -> Vec<f64> {
+        let declared = self.parameters.iter().map(|p| p.value);
+        let of_effects = self.effects.iter().flat_map(|effect| &effect.values);
+        declared
+            .chain(of_effects.map(|(value, _)| *value))
+            .collect()
+    }
+
+    /// The value of a parameter, by its index among all; in a log, the one that it has there.
+    pub fn value_of(&self, parameter: usize, log: Option<&Log>) -> f64 {
+        let in_log = |own: &OwnValue| log.is_some_and(|log| log.is_called(&own.log));
+        let own = self.own_values().into_iter();
+        let mut own = own.filter(|own| own.parameter == parameter);
+        own.find(in_log)
+            .map_or_else(|| self.values()[parameter], |own| own.value)
+    }
+
+    /// The same model with the values of a compiled form of it, those in single logs included. Intervals are dropped,
+    /// since they belong to other values.
+    ///
+    /// # Panics
+    /// If `compiled` has another number of parameters.
+    #[must_use]
+    pub fn at(&self, compiled: &Dynamics) -> Self {
+        let mut model = self.clone();
+        let slots = model.slots();
+        assert_eq!(
+            slots.len(),
+            compiled.parameters.len(),
+            "one value for each parameter"
+        );
+        for ((value, interval), parameter) in slots.into_iter().zip(&compiled.parameters) {
+            (*value, *interval) = (parameter.value, None);
+        }
+        for k in 0..model.effects.len() {
+            let place = self.place_of(k);
+            let of_effect = |own: &&OwnValue| place.contains(&own.parameter);
+            let own = compiled.own.iter().filter(of_effect).map(|own| OwnValue {
+                parameter: own.parameter - place.start,
+                ..own.clone()
+            });
+            model.effects[k].own = own.collect();
+        }
+        model
+    }
+
+    /// Set the interval of a parameter's value, or of its value in one log, by its half width; the parameter's bounds cut
+    /// it.
+    pub fn set_half_width(&mut self, parameter: usize, log: Option<&Log>, half: f64) {
+        let [low, high] = self.all_parameters()[parameter].bounds;
+        let around = |value: f64| Some([(value - half).max(low), (value + half).min(high)]);
+        let Some(log) = log else {
+            let (value, interval) = self.slots().swap_remove(parameter);
+            *interval = around(*value);
+            return;
+        };
+        let Some(k) = (0..self.effects.len()).find(|k| self.place_of(*k).contains(&parameter))
+        else {
+            return;
+        };
+        let first = self.place_of(k).start;
+        let mut own = self.effects[k].own.iter_mut();
+        let is_it =
+            |own: &&mut OwnValue| own.parameter == parameter - first && log.is_called(&own.log);
+        if let Some(own) = own.find(is_it) {
+            own.ci95 = around(own.value);
+        }
+    }
+
+    /// Value and interval of every parameter.
+    fn slots(&mut self) -> Vec<(&mut f64, &mut Option<[f64; 2]>)> {
+        let declared = self
+            .parameters
+            .iter_mut()
+            .map(|p| (&mut p.value, &mut p.ci95));
+        let of_effects = self
+            .effects
+            .iter_mut()
+            .flat_map(|effect| &mut effect.values);
+        declared
+            .chain(of_effects.map(|(value, ci95)| (value, ci95)))
+            .collect()
+    }
+
+    /// Indices of the parameters of the k-th effect among all.
+    pub fn place_of(&self, k: usize) -> Range<usize> {
+        let before = self.effects[..k].iter().map(|effect| effect.values.len());
+        let first = self.parameters.len() + before.sum::<usize>();
+        first..first + self.effects[k].values.len()
+    }
+
+    /// Each effect with the indices of its parameters among all.
+    pub(super) fn placed(&self) -> impl Iterator<Item = (&FittedEffect, Range<usize>)> {
+        let places = (0..self.effects.len()).map(|k| self.place_of(k));
+        self.effects.iter().zip(places)
+    }
+
+    /// Whether an effect can act on a joint of this system.
     ///
     /// # Errors
     /// Why not.
-    pub fn can_carry(&self, effect: &Effect, joint: usize) -> Result<(), String> {
+    pub fn can_carry(&self, effect: &Effect, joint: Joint) -> Result<(), String> {
         let name = &effect.name;
-        if effect.first_joint_only && (joint > 0 || self.prismatic[joint]) {
+        if effect.first_joint_only && (joint.index() > 0 || self.prismatic[joint]) {
             return Err(format!(
                 "`{name}` acts on the first joint, where that turns"
             ));
@@ -156,7 +277,7 @@ impl System {
     /// Whether an effect with its values can join `present` ones.
     ///
     /// # Errors
-    /// Why not: see [`System::can_carry`], a value outside of its bounds, or the same effect twice.
+    /// Why not: see [`Model::can_carry`], a value outside of its bounds, or the same effect twice.
     pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
         let name = &new.effect.name;
         self.can_carry(&new.effect, new.joint)?;
@@ -164,8 +285,7 @@ impl System {
         if let Some(old) = others.find(|old| old.excludes(new)) {
             return Err(format!(
                 "`{}` acts on joint {} already",
-                old.effect.name,
-                new.joint + 1
+                old.effect.name, new.joint
             ));
         }
         let common = (0..).zip(new.values.iter().map(|(value, _)| value));
@@ -186,13 +306,13 @@ impl System {
 
     /// Whether the file gives mass matrix and bias, which effects of the inertia need.
     pub fn has_mass_matrix(&self) -> bool {
-        matches!(self.motion, Motion::MassAndBias { .. })
+        matches!(self.equations.motion, Motion::MassAndBias { .. })
     }
 
-    /// Total energy and the power of the torques as a program of [`System::input_names`], where the file
+    /// Total energy and the power of the torques as a program of [`Model::input_names`], where the file
     /// states them: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
-        let energy = self.energy.as_ref()?;
+        let energy = self.equations.energy.as_ref()?;
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
         let inputs: Vec<Node> = self
@@ -208,7 +328,7 @@ impl System {
                 .lower(&mut graph, &formula.value)
                 .expect("formulas were checked when the file was read")
         };
-        for (name, formula) in &self.lets {
+        for (name, formula) in &self.equations.lets {
             let node = lower(&scope, formula);
             scope.bind(name, node);
         }

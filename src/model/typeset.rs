@@ -1,14 +1,14 @@
 use super::reader::Located;
-use super::system::{FittedEffect, Motion, System};
+use super::system::{FittedEffect, Model, Motion};
 use crate::expr::{Formula, Graph, Scope, SignForm, latex_name};
 
-impl System {
+impl Model {
     /// The declared equations as lines of a LaTeX `align` environment: intermediates, then the motion. Torques are
     /// those that effects leave.
     pub fn latex(&self) -> Vec<String> {
         let mut names = self.input_names();
         let mut lines = Vec::new();
-        for (name, formula) in &self.lets {
+        for (name, formula) in &self.equations.lets {
             lines.push(format!(
                 "{} &= {}",
                 latex_name(name),
@@ -27,7 +27,7 @@ impl System {
                 .map(|j| latex_name(&format!("{stem}{j}")))
                 .collect()
         };
-        match &self.motion {
+        match &self.equations.motion {
             Motion::Accelerations(formulas) => {
                 let pairs = column("qdd").into_iter().zip(each(formulas));
                 lines.extend(pairs.map(|(left, right)| format!("{left} &= {right}")));
@@ -53,7 +53,7 @@ impl FittedEffect {
         match self.program(names) {
             Ok(program) => program.latex_formula(0),
             Err(filter) => {
-                let tau = latex_name(&format!("tau{}", self.joint + 1));
+                let tau = latex_name(&self.joint.name("tau"));
                 filter.latex(&tau, &latex_name(&names[0]))
             }
         }

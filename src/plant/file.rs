@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Excitation;
+use crate::data::Joint;
 use crate::expr::suggestion;
 use crate::files::{beside_or_named, text_or_embedded};
-use crate::model::{FileError, FittedEffect, Library, System};
+use crate::model::{FileError, FittedEffect, Library, Model};
 
 /// Why a plant cannot be simulated.
 #[derive(Debug, Error)]
@@ -30,7 +31,7 @@ pub enum PlantError {
 /// A rig to simulate: its model, true parameters, hidden effects, excitation and sensors.
 #[derive(Debug, Clone)]
 pub struct Plant {
-    pub system: System,
+    pub system: Model,
     /// True values of the declared parameters, in their order.
     pub parameters: Vec<f64>,
     pub effects: Vec<FittedEffect>,
@@ -78,8 +79,7 @@ struct File {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HiddenEffect {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// Values of its parameters; the others have their typical values.
     #[serde(flatten)]
     pub values: BTreeMap<String, f64>,
@@ -106,13 +106,13 @@ impl Plant {
         match text_or_embedded(path, embedded) {
             Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
             // A model, or nothing that can be read: the library knows what to say of it.
-            _ => Ok(Self::of_system(library.system(path)?)),
+            _ => Ok(Self::of_system(library.model(path)?)),
         }
     }
 
     /// The model that a drawing of this rig declares: its equations with the rig's own parameters, without the effects
     /// that the rig hides.
-    pub fn declared(&self) -> System {
+    pub fn declared(&self) -> Model {
         let mut system = self.system.clone();
         for (parameter, value) in system.parameters.iter_mut().zip(&self.parameters) {
             *parameter = parameter.with_value(*value);
@@ -137,7 +137,7 @@ impl Plant {
         };
         let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
         let model = beside_or_named(path, &file.model);
-        let mut plant = Self::of_system(library.system(&model)?);
+        let mut plant = Self::of_system(library.model(&model)?);
         plant.set_parameters(&file.parameters).map_err(wrong)?;
         plant.hide(library, &file.effect)?;
         plant.sensor = file.sensor;
@@ -147,7 +147,7 @@ impl Plant {
         Ok(plant)
     }
 
-    fn of_system(system: System) -> Self {
+    fn of_system(system: Model) -> Self {
         let joints = system.joints;
         Self {
             parameters: system.parameters.iter().map(|p| p.value).collect(),
@@ -219,7 +219,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Add an effect on a joint (counted from 1). Parameters that are not given have their typical values.
+    /// Add an effect on a joint. Parameters that are not given have their typical values.
     ///
     /// # Errors
     /// Unknown effect, joint or parameter, with what is known.
@@ -227,11 +227,11 @@ impl Plant {
         &mut self,
         library: &Library,
         name: &str,
-        joint: usize,
+        joint: Joint,
         values: &[(String, f64)],
     ) -> Result<(), PlantError> {
         let effect = library.effect(name).map_err(PlantError::Effect)?;
-        if !(1..=self.system.joints).contains(&joint) {
+        if !joint.is_of(self.system.joints) {
             let message = format!(
                 "effect `{name}`: `joint` is from 1 to {}, found {joint}",
                 self.system.joints
@@ -256,7 +256,7 @@ impl Plant {
         }
         let new = FittedEffect {
             effect: effect.clone(),
-            joint: joint - 1,
+            joint,
             values: own,
             own: Vec::new(),
             fixed: false,

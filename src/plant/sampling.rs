@@ -56,7 +56,7 @@ impl Plant {
         sampling
             .check(self.system.joints)
             .map_err(PlantError::Sampling)?;
-        let dynamics = self.true_dynamics();
+        let dynamics = self.dynamics();
         if !dynamics.filters.is_empty() {
             return Err(PlantError::Sampling(
                 "the plant has an effect with memory, but random trajectories start without a past; leave the \

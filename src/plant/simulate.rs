@@ -2,26 +2,27 @@ use rand::Rng;
 use rand_distr::{Distribution, Normal};
 
 use super::file::{Plant, PlantError};
-use crate::closeloop::joined;
 use crate::data::Log;
-use crate::expr::SignForm;
 use crate::lanes::Row;
-use crate::model::Dynamics;
+use crate::model::{Dynamics, Model};
 use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
 /// Velocity over which dry friction reverses (rad/s): much sharper than in any fit.
 const SIGN_WIDTH: f64 = 1e-3;
 
 impl Plant {
-    /// The true equations of motion, with declared values.
-    pub fn dynamics(&self) -> Dynamics {
-        let sign = vec![SignForm::Smooth { width: SIGN_WIDTH }; self.system.joints];
-        self.system.dynamics_with(&self.effects, &sign)
+    /// The rig as a model: its true values and effects.
+    pub fn model(&self) -> Model {
+        let mut model = self.system.with_effects(self.effects.clone());
+        for (parameter, value) in model.parameters.iter_mut().zip(&self.parameters) {
+            parameter.value = *value;
+        }
+        model.with_sign_widths(vec![SIGN_WIDTH; model.joints])
     }
 
-    /// The true equations of motion with their true values.
-    pub fn true_dynamics(&self) -> Dynamics {
-        self.dynamics().with_values(self.values())
+    /// The true equations of motion, with their true values.
+    pub fn dynamics(&self) -> Dynamics {
+        self.model().dynamics()
     }
 
     /// Record one log. Velocities are backward differences of the measured angles, as on many rigs.
@@ -31,7 +32,7 @@ impl Plant {
     pub fn record(&self, rng: &mut impl Rng) -> Result<Log, PlantError> {
         let n = self.system.joints;
         let tones = self.excitation.draw(rng);
-        let dynamics = self.true_dynamics();
+        let dynamics = self.dynamics();
         let dt = 1.0 / self.sensor.rate_hz;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // checked to be a few thousand
@@ -57,12 +58,7 @@ impl Plant {
         Ok(log)
     }
 
-    /// Values of the declared parameters, then of the effects: what [`Plant::dynamics`] takes.
-    pub fn values(&self) -> Vec<f64> {
-        joined(&self.parameters, &self.effects)
-    }
-
-    /// A true state as the sensors read it: the equations are written in measured angles.
+    /// A true state as the sensors read it, which is what the equations are about.
     pub fn as_read(&self, state: &[f64]) -> Vec<f64> {
         let mut start = state.to_vec();
         let sensors = self.effects.iter().filter(|e| e.effect.is_of_sensor());

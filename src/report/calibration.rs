@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::wording::{listed, small, with_unit};
 use crate::closeloop::{Calibration, DetectionLimit, Smallest};
+use crate::data::Joint;
 use crate::model::{EffectParameter, FittedEffect};
 
 #[derive(Debug, Serialize)]
@@ -26,7 +27,7 @@ pub(super) struct CalibrationEntry {
 #[derive(Debug, Serialize)]
 struct AlarmEntry {
     name: String,
-    joint: usize,
+    joint: Joint,
     runs: usize,
 }
 
@@ -34,7 +35,7 @@ struct AlarmEntry {
 #[derive(Debug, Serialize)]
 struct SmallestEntry {
     effect: String,
-    joint: usize,
+    joint: Joint,
     parameter: String,
     /// `null` where there is none: `reason` says why.
     value: Option<f64>,
@@ -60,7 +61,7 @@ struct ValueEntry {
 #[derive(Debug, Serialize)]
 struct EffectEntry {
     name: String,
-    joint: usize,
+    joint: Joint,
 }
 
 impl CalibrationEntry {
@@ -82,11 +83,9 @@ impl CalibrationEntry {
 }
 
 fn alarms(calibration: &Calibration) -> Vec<AlarmEntry> {
-    let mut runs: BTreeMap<(&str, usize), usize> = BTreeMap::new();
+    let mut runs: BTreeMap<(&str, Joint), usize> = BTreeMap::new();
     for effect in calibration.named.iter().flatten() {
-        *runs
-            .entry((&effect.effect.name, effect.joint + 1))
-            .or_default() += 1;
+        *runs.entry((&effect.effect.name, effect.joint)).or_default() += 1;
     }
     runs.into_iter()
         .map(|((name, joint), runs)| AlarmEntry {
@@ -117,7 +116,7 @@ fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
         .filter(|(p, _)| !p.is_switch());
     SmallestEntry {
         effect: effect.effect.name.clone(),
-        joint: effect.joint + 1,
+        joint: effect.joint,
         parameter: name.clone(),
         value,
         unit: unit.clone(),
@@ -136,7 +135,7 @@ fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
         named_besides: besides(limit)
             .map(|other| EffectEntry {
                 name: other.effect.name.clone(),
-                joint: other.joint + 1,
+                joint: other.joint,
             })
             .collect(),
     }

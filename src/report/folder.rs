@@ -7,7 +7,7 @@ use super::plot::PlotError;
 use super::{model_file, picture, text};
 use crate::closeloop::{LearnError, Outcome};
 use crate::files::{OutputError, folder_of, move_to, write_whole};
-use crate::model::{Origin, System};
+use crate::model::Origin;
 
 /// Why results could not be written.
 #[derive(Debug, Error)]
@@ -25,12 +25,7 @@ pub enum WriteError {
 ///
 /// # Errors
 /// An unwritable folder or a full disk.
-pub fn write(
-    folder: &Path,
-    system: &System,
-    outcome: &Outcome,
-    origin: &Origin,
-) -> Result<Report, WriteError> {
+pub fn write(folder: &Path, outcome: &Outcome, origin: &Origin) -> Result<Report, WriteError> {
     let failed = |path: &Path| {
         let path = path.to_owned();
         move |source| OutputError { path, source }
@@ -44,7 +39,7 @@ pub fn write(
     let json =
         serde_json::to_string_pretty(&report).expect("a report has only finite numbers and texts");
     put("report.json", &(json + "\n"))?;
-    put(MODEL, &model_file(system, outcome))?;
+    put(MODEL, &model_file(outcome))?;
     put(TEXT, &text(outcome, origin.seed))?;
     let pictures = [
         picture::predictions(outcome)?,
@@ -56,7 +51,7 @@ pub fn write(
     }
     if let Some(learned) = &outcome.learned {
         let origin = Origin {
-            model_toml: model_file(system, outcome),
+            model_toml: model_file(outcome),
             ..origin.clone()
         };
         learned.save(&staging.path().join(CHECKPOINT), &origin)?;

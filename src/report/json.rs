@@ -5,7 +5,7 @@ use crate::closeloop::{
     Alternative, Contradicted, Curve, Finding, Outcome, Probed, ResidualForce, Separation,
     SplitMethod, TakenBack, Verdict,
 };
-use crate::data::Finding as AuditFinding;
+use crate::data::{Finding as AuditFinding, Joint};
 use crate::model::{FittedEffect, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
 
@@ -43,7 +43,7 @@ pub struct Report {
 #[derive(Debug, Serialize)]
 struct EffectEntry {
     name: String,
-    joint: usize,
+    joint: Joint,
     expression: String,
     parameters: Vec<ParameterEntry>,
     p_value: f64,
@@ -77,7 +77,7 @@ struct ContradictedEntry {
 #[derive(Debug, Serialize)]
 struct EffectName {
     name: String,
-    joint: usize,
+    joint: Joint,
     /// Of a shift: the parameter that is shifted.
     #[serde(skip_serializing_if = "Option::is_none")]
     parameter: Option<String>,
@@ -122,7 +122,7 @@ struct OmnibusEntry {
 /// A formula for what is left: no finding.
 #[derive(Debug, Serialize)]
 struct ProposalEntry {
-    joint: usize,
+    joint: Joint,
     formula: String,
     explains: f64,
 }
@@ -199,7 +199,7 @@ struct AuditEntry {
 #[derive(Debug, Serialize)]
 struct TriedEntry {
     name: String,
-    joint: usize,
+    joint: Joint,
     #[serde(skip_serializing_if = "Option::is_none")]
     parameter: Option<String>,
     /// Fall of the loss on left-out stretches, as a share.
@@ -225,14 +225,13 @@ pub(super) const PLOTS: [&str; 3] = ["predictions.svg", "residual.svg", "errors.
 impl Report {
     /// The outcome of a run with this seed.
     pub fn new(outcome: &Outcome, seed: u64) -> Self {
-        let system = &outcome.models.after.dynamics;
-        let declared = outcome.models.before.declared.len();
+        let model = outcome.models.after.absorbed();
         Self {
             schema: 1,
             version: env!("CARGO_PKG_VERSION"),
             seed,
-            system: system.name.clone(),
-            joints: system.joints,
+            system: model.name.clone(),
+            joints: model.joints,
             verdict: outcome.verdict,
             reason: outcome.reason.clone(),
             effects: outcome.effects.findings.iter().map(effect).collect(),
@@ -245,10 +244,7 @@ impl Report {
             taken_back: outcome.effects.taken_back.iter().map(taken_back).collect(),
             confirmed_on: outcome.effects.confirmed_on,
             unexplained: left(outcome),
-            parameters: outcome.models.parameters[..declared]
-                .iter()
-                .map(parameter)
-                .collect(),
+            parameters: model.parameters.iter().map(parameter).collect(),
             contradicted: outcome
                 .models
                 .contradicted
@@ -296,7 +292,7 @@ impl Report {
 fn effect(finding: &Finding) -> EffectEntry {
     EffectEntry {
         name: finding.effect.effect.name.clone(),
-        joint: finding.effect.joint + 1,
+        joint: finding.effect.joint,
         expression: finding.expression.clone(),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
@@ -336,7 +332,7 @@ fn contradicted(contradicted: &Contradicted) -> ContradictedEntry {
 fn effect_name(effect: &FittedEffect) -> EffectName {
     EffectName {
         name: effect.effect.name.clone(),
-        joint: effect.joint + 1,
+        joint: effect.joint,
         parameter: shifted(effect),
     }
 }
@@ -381,7 +377,7 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
             .proposal
             .as_ref()
             .map(|proposal| ProposalEntry {
-                joint: proposal.joint + 1,
+                joint: proposal.joint,
                 formula: proposal.formula.clone(),
                 explains: proposal.explains,
             }),
@@ -390,7 +386,7 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
 
 fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
     let verdict = &outcome.models.identifiability;
-    let name = |k: &usize| outcome.models.before.dynamics.parameters[*k].name.clone();
+    let name = |k: &usize| outcome.models.before.parameters[*k].name.clone();
     IdentifiabilityEntry {
         free: verdict.free,
         determined: verdict.determined,
@@ -400,7 +396,7 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
 }
 
 fn errors(outcome: &Outcome) -> ErrorEntry {
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     let model = |assessment: &Assessment| model_error(summarise(&assessment.horizons, joints));
     let contender = |(name, assessment): &(String, Assessment)| ContenderEntry {
         name: name.clone(),
@@ -461,7 +457,7 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
     let round = |round: &crate::closeloop::Round| {
         let entry = |(i, evidence): (usize, &crate::closeloop::Evidence)| TriedEntry {
             name: evidence.effect.effect.name.clone(),
-            joint: evidence.effect.joint + 1,
+            joint: evidence.effect.joint,
             parameter: shifted(&evidence.effect),
             gain: evidence.gain,
             p_value: evidence.p_value,

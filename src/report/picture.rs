@@ -6,7 +6,7 @@ use super::plot::{
 };
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
 use crate::closeloop::{ForceSample, Outcome, ResidualForce};
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::identify::FitError;
 use crate::model::Dynamics;
 use crate::sim::metric::{Assessment, Trace, summarise, traces};
@@ -24,42 +24,26 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let horizons = outcome.errors.before.horizons.iter().map(|h| h.horizon_s);
     // Differences between models grow with the horizon: the longest one shows them best.
     let horizon = horizons.fold(0.0, f64::max);
-    let mut models: Vec<(Role, &str, &Dynamics, Vec<f64>)> = vec![
-        (
-            Role::Before,
-            FITTED,
-            &outcome.models.before.dynamics,
-            outcome.models.before.values_in(log),
-        ),
-        (
-            Role::After,
-            WITH_EFFECTS,
-            &outcome.models.after.dynamics,
-            outcome.models.after.values_in(log),
-        ),
+    let fitted = &outcome.models;
+    let mut models: Vec<(Role, &str, Dynamics)> = vec![
+        (Role::Before, FITTED, fitted.before.dynamics()),
+        (Role::After, WITH_EFFECTS, fitted.after.dynamics()),
     ];
     if let Some(learned) = &outcome.learned {
-        models.push((
-            Role::Hybrid,
-            WITH_NETWORK,
-            learned.hybrid(),
-            learned.hybrid().values(),
-        ));
+        models.push((Role::Hybrid, WITH_NETWORK, learned.hybrid().clone()));
     }
-    let panel = |joint: usize| Panel {
-        joint: joint + 1,
+    let panel = |joint: Joint| Panel {
+        joint,
         kind: kind(outcome, joint),
         tracks: std::iter::once(measured(log, joint))
-            .chain(models.iter().map(|(role, label, dynamics, values)| Track {
+            .chain(models.iter().map(|(role, label, dynamics)| Track {
                 label: (*label).to_owned(),
                 role: *role,
-                segments: predicted(dynamics, values, log, joint, horizon),
+                segments: predicted(dynamics, log, joint, horizon),
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = (0..outcome.models.after.dynamics.joints)
-        .map(panel)
-        .collect();
+    let panels: Vec<Panel> = Joint::all(outcome.models.after.joints).map(panel).collect();
     let title = format!(
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
@@ -67,7 +51,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     super::plot::predictions(&panels, &title)
 }
 
-fn kind(outcome: &Outcome, joint: usize) -> JointKind {
+fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
     if outcome.given.prismatic[joint] {
         JointKind::Prismatic
     } else {
@@ -79,7 +63,7 @@ fn end(log: &Log) -> f64 {
     log.time.first().map_or(0.0, |start| start + SHOWN_S)
 }
 
-fn measured(log: &Log, joint: usize) -> Track {
+fn measured(log: &Log, joint: Joint) -> Track {
     let points = log.time.iter().copied().zip(log.q[joint].iter().copied());
     Track {
         label: "measured".into(),
@@ -88,37 +72,27 @@ fn measured(log: &Log, joint: usize) -> Track {
     }
 }
 
-fn predicted(
-    dynamics: &Dynamics,
-    values: &[f64],
-    log: &Log,
-    joint: usize,
-    horizon: f64,
-) -> Vec<Vec<(f64, f64)>> {
+fn predicted(dynamics: &Dynamics, log: &Log, joint: Joint, horizon: f64) -> Vec<Vec<(f64, f64)>> {
     let shown = |trace: Trace| -> Vec<(f64, f64)> {
         let points = trace.time.into_iter().zip(trace.q[joint].iter().copied());
         points.take_while(|(t, _)| *t <= end(log)).collect()
     };
-    let pieces = traces(dynamics, values, log, horizon)
-        .into_iter()
-        .map(shown);
+    let pieces = traces(dynamics, log, horizon).into_iter().map(shown);
     pieces.filter(|piece| piece.len() > 1).collect()
 }
 
 /// The residual generalised force over angle, speed, torque and time, without and with the effects.
 pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
     let (fitted, with_effects) = (&outcome.remainder.before, &outcome.remainder.after);
-    let panel = |joint: usize| ShapePanel {
-        joint: joint + 1,
+    let panel = |joint: Joint| ShapePanel {
+        joint,
         kind: kind(outcome, joint),
         models: vec![
             shape(Role::Before, FITTED, joint, fitted),
             shape(Role::After, WITH_EFFECTS, joint, with_effects),
         ],
     };
-    let panels: Vec<ShapePanel> = (0..outcome.models.after.dynamics.joints)
-        .map(panel)
-        .collect();
+    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.joints).map(panel).collect();
     super::plot::residual_shape(
         &panels,
         "Residual force: what each model leaves unexplained",
@@ -128,7 +102,7 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
 fn shape(
     role: Role,
     label: &str,
-    joint: usize,
+    joint: Joint,
     force: &Result<ResidualForce, FitError>,
 ) -> ShapeModel {
     let sample = |s: &ForceSample| ShapeSample {
@@ -137,7 +111,7 @@ fn shape(
     };
     let curve = |name: String| {
         let curves = force.iter().flat_map(|force| &force.curves);
-        let mut of_joint = curves.filter(|c| c.joint == joint + 1);
+        let mut of_joint = curves.filter(|c| c.joint == joint);
         of_joint.find(|c| c.variable == name).map(|c| ShapeCurve {
             x: c.x.clone(),
             force: c.force.clone(),
@@ -146,9 +120,7 @@ fn shape(
         })
     };
     let samples = force.iter().flat_map(|force| &force.samples);
-    let number = joint + 1;
-    let names = ["q", "qd", "tau"].map(|stem| format!("{stem}{number}"));
-    let [q, qd, tau] = names.map(curve);
+    let [q, qd, tau] = ["q", "qd", "tau"].map(|stem| curve(joint.name(stem)));
     ShapeModel {
         role,
         label: label.to_owned(),
@@ -160,7 +132,7 @@ fn shape(
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
 /// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     let errors = &outcome.errors;
     let named = |role: Role, label: &str, model: &Assessment| {
         let rmse = summarise(&model.horizons, joints).position_rmse;
@@ -174,8 +146,8 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     models.extend(hybrid.map(|m| named(Role::Hybrid, WITH_NETWORK, m)));
     let others = errors.against.iter().enumerate();
     models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
-    let row = |joint: usize, h: usize| ErrorRow {
-        joint: joint + 1,
+    let row = |joint: Joint, h: usize| ErrorRow {
+        joint,
         kind: kind(outcome, joint),
         horizon_s: errors.before.horizons[h].horizon_s,
         bars: models
@@ -187,9 +159,9 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
             })
             .collect(),
     };
-    let rows: Vec<ErrorRow> = (0..joints)
+    let rows: Vec<ErrorRow> = Joint::all(joints)
         .flat_map(|joint| (0..errors.before.horizons.len()).map(move |h| (joint, h)))
-        .map(|(j, h)| row(j, h))
+        .map(|(joint, h)| row(joint, h))
         .collect();
     super::plot::error_bars(&rows, "Open-loop position error on the test logs")
 }

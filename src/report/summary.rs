@@ -4,6 +4,7 @@ use super::calibration::line;
 use super::text::{headline, proposal_line};
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
+use crate::data::Joint;
 use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// The answer for a terminal: a few lines, and where the rest is.
@@ -14,7 +15,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         outcome.reason
     );
     for finding in &outcome.effects.findings {
-        let (name, joint) = (finding.effect.title(), finding.effect.joint + 1);
+        let (name, joint) = (finding.effect.title(), finding.effect.joint);
         let _ = writeln!(
             out,
             "  {name} on joint {joint}: {}\n    {}",
@@ -26,13 +27,13 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
     for &k in &outcome.models.identifiability.hold {
-        let name = &outcome.models.before.dynamics.parameters[k].name;
+        let name = &outcome.models.before.parameters[k].name;
         let _ = writeln!(
             out,
             "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
     let (before, after) = (
         numbers(&outcome.errors.before),
@@ -40,18 +41,17 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
     );
     out += "  open-loop position error on the test logs, root mean square:\n";
     for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
-        for j in 0..joints {
-            let unit = if outcome.given.prismatic[j] {
+        for joint in Joint::all(joints) {
+            let unit = if outcome.given.prismatic[joint] {
                 "m"
             } else {
                 "rad"
             };
-            let (before, after) = (small(before[h][j]), small(after[h][j]));
+            let (before, after) = (small(before[h][joint]), small(after[h][joint]));
             let seconds = horizon.horizon_s;
             let _ = writeln!(
                 out,
-                "  joint {}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}",
-                j + 1
+                "  joint {joint}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}"
             );
         }
     }
@@ -68,22 +68,25 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
 
 /// `joint 1 0.00942, 0.157, 0.375 rad at 0.1, 0.5, 1 s`
 fn errors(outcome: &Outcome, model: &Assessment) -> String {
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     let Summary {
         horizons_s,
         position_rmse,
         ..
     } = summarise(&model.horizons, joints);
     let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(", ");
-    let joint = |j: usize| {
-        let unit = if outcome.given.prismatic[j] {
+    let of_joint = |joint: Joint| {
+        let unit = if outcome.given.prismatic[joint] {
             "m"
         } else {
             "rad"
         };
-        let errors = list(&mut position_rmse.iter().map(|row| small(row[j])));
-        format!("joint {} {errors} {unit}", j + 1)
+        let errors = list(&mut position_rmse.iter().map(|row| small(row[joint])));
+        format!("joint {joint} {errors} {unit}")
     };
     let seconds = list(&mut horizons_s.iter().map(f64::to_string));
-    format!("{} at {seconds} s", list(&mut (0..joints).map(joint)))
+    format!(
+        "{} at {seconds} s",
+        list(&mut Joint::all(joints).map(of_joint))
+    )
 }

@@ -6,7 +6,7 @@ use super::wording::{
     reduction, small, value, values,
 };
 use crate::closeloop::{Finding, Outcome, Proposal, ResidualForce, SplitMethod, UNKNOWN, Verdict};
-use crate::data::Severity;
+use crate::data::{Joint, Severity};
 use crate::identify::FitError;
 use crate::sim::metric::{Summary, summarise};
 
@@ -35,7 +35,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 fn answer(outcome: &Outcome) -> String {
     format!(
         "# {}: {}\n\n{}.\n\n",
-        outcome.models.after.dynamics.name,
+        outcome.models.after.name,
         headline(outcome),
         capitalised(&outcome.reason)
     )
@@ -46,7 +46,7 @@ pub(super) fn headline(outcome: &Outcome) -> String {
         .effects
         .findings
         .iter()
-        .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint + 1))
+        .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint))
         .collect();
     match (outcome.verdict, found.is_empty()) {
         (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
@@ -71,7 +71,7 @@ fn effects(findings: &[Finding]) -> String {
             out,
             "| {} | {} | `{}` | {} | {} | {} |",
             finding.effect.title(),
-            finding.effect.joint + 1,
+            finding.effect.joint,
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
@@ -110,7 +110,7 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
     let hybrid = errors.hybrid.iter();
     models.extend(hybrid.map(|m| (WITH_NETWORK, m)));
     models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
-    let joints = outcome.models.after.dynamics.joints;
+    let joints = outcome.models.after.joints;
     models
         .into_iter()
         .map(|(name, model)| (name, summarise(&model.horizons, joints)))
@@ -136,16 +136,19 @@ fn errors(outcome: &Outcome) -> String {
     );
     let (before, after) = (&models[1].1, &models[2].1);
     for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for j in 0..outcome.models.after.dynamics.joints {
-            let rmse = |s: &Summary| s.position_rmse[h][j];
+        for joint in Joint::all(outcome.models.after.joints) {
+            let rmse = |s: &Summary| s.position_rmse[h][joint];
             let cell = |(_, s): &(&str, Summary)| {
-                format!("{} ({})", small(rmse(s)), small(s.position_median[h][j]))
+                format!(
+                    "{} ({})",
+                    small(rmse(s)),
+                    small(s.position_median[h][joint])
+                )
             };
             let cells: Vec<String> = models.iter().map(cell).collect();
             let _ = writeln!(
                 out,
-                "| {horizon} s | {} | {} | {} | {:.2} |",
-                j + 1,
+                "| {horizon} s | {joint} | {} | {} | {:.2} |",
                 before.windows[h],
                 cells.join(" | "),
                 rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
@@ -174,16 +177,18 @@ fn errors(outcome: &Outcome) -> String {
 }
 
 fn parameters(outcome: &Outcome) -> String {
-    let declared = outcome.models.before.declared.len();
     let mut out = String::from("## Parameters of the declared equations\n\n");
-    for (parameter, before) in outcome.models.parameters[..declared]
+    let after = outcome.models.after.absorbed();
+    for (parameter, before) in after
+        .parameters
         .iter()
-        .zip(&outcome.models.before.declared)
+        .zip(&outcome.models.before.parameters)
     {
         let _ = writeln!(
             out,
-            "- {}; fitted without the effects: {before:.5}",
-            value(parameter)
+            "- {}; fitted without the effects: {:.5}",
+            value(parameter),
+            before.value
         );
     }
     let verdict = &outcome.models.identifiability;
@@ -193,7 +198,7 @@ fn parameters(outcome: &Outcome) -> String {
         verdict.determined, verdict.free
     );
     for &k in &verdict.hold {
-        let name = &outcome.models.before.dynamics.parameters[k].name;
+        let name = &outcome.models.before.parameters[k].name;
         let _ = writeln!(
             out,
             "- `{name}` is held: the logs determine it only in combination with others. \
@@ -243,7 +248,7 @@ fn alternatives(outcome: &Outcome) -> String {
             out,
             "- **{}** on joint {}: {}. To tell them apart: {}.",
             alternative.effect.title(),
-            alternative.effect.joint + 1,
+            alternative.effect.joint,
             alternative.reason,
             alternative.experiment()
         );
@@ -338,7 +343,7 @@ fn proposed(proposal: &Proposal) -> String {
 pub(super) fn proposal_line(proposal: &Proposal) -> String {
     format!(
         "proposal, not a finding: force on joint {} ~ {} (explains {:.0} % of the remainder on held-out stretches)",
-        proposal.joint + 1,
+        proposal.joint,
         proposal.formula,
         100.0 * proposal.explains
     )
@@ -361,7 +366,7 @@ fn tried(outcome: &Outcome) -> String {
                 out,
                 "| {} | {} | {} | {} | {} |",
                 evidence.effect.title(),
-                evidence.effect.joint + 1,
+                evidence.effect.joint,
                 reduction(evidence.gain, "loss"),
                 probability(evidence.p_value),
                 if round.chosen == Some(i) { "added" } else { "" }
@@ -430,7 +435,8 @@ fn logs(outcome: &Outcome) -> String {
 fn footer(outcome: &Outcome, seed: u64) -> String {
     let widths: Vec<String> = outcome
         .models
-        .sign_widths
+        .after
+        .sign_widths()
         .iter()
         .map(|w| format!("{w:.3}"))
         .collect();

@@ -91,6 +91,14 @@ impl RunFolder {
         &self.path
     }
 
+    /// Make the folder where it is missing.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn make(&self) -> Result<(), RunFolderError> {
+        fs::create_dir_all(&self.path).map_err(failed("made", &self.path))
+    }
+
     /// Record that the folder belongs to `run`, or find that it does.
     ///
     /// # Errors
@@ -158,7 +166,7 @@ impl RunFolder {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write_text(&self, name: &str, text: &str) -> Result<(), RunFolderError> {
-        fs::create_dir_all(&self.path).map_err(failed("made", &self.path))?;
+        self.make()?;
         Ok(write_whole(&self.path.join(name), text.as_bytes())?)
     }
 

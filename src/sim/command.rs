@@ -1,7 +1,7 @@
 //! Delays and lags between commanded and acting torque: linear filters of the command, independent of the state.
 
 use super::{Hold, Point};
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::lanes::Row;
 use crate::model::{CommandFilter, Filter};
 
@@ -35,7 +35,7 @@ impl<'l> Commands<'l> {
     pub fn new<'p>(model: impl Into<Point<'p>>, time: &'l [f64], tau: &'l [Vec<f64>]) -> Self {
         let model = model.into();
         let (dynamics, values) = (model.dynamics, model.values());
-        let history = |joint: usize| {
+        let history = |joint: Joint| {
             let own = |kind: CommandFilter| {
                 let mut filters = dynamics.filters.iter();
                 filters.find(|filter| filter.joint == joint && filter.kind == kind)
@@ -50,7 +50,7 @@ impl<'l> Commands<'l> {
             tau,
             joints: dynamics.joints,
             filters: dynamics.filters.clone(),
-            histories: (0..dynamics.joints).map(history).collect(),
+            histories: Joint::all(dynamics.joints).map(history).collect(),
         }
     }
 
@@ -149,7 +149,7 @@ impl<const W: usize> StepTorque<W> {
     fn filter(&mut self, lane: usize, hold: &Hold<'_, W>) {
         let model = hold.commands[lane];
         let (from, to) = (hold.from[lane], hold.to[lane]);
-        for (joint, history) in model.histories.iter().enumerate() {
+        for (joint, history) in Joint::all(model.joints).zip(&model.histories) {
             let Some(history) = history else { continue };
             for (part, mean) in history.means(from, to, hold.substeps).enumerate() {
                 self.set(lane, joint, model, part, mean);
@@ -176,8 +176,8 @@ impl<const W: usize> StepTorque<W> {
         )
     }
 
-    fn set(&mut self, lane: usize, joint: usize, model: &Commands<'_>, part: usize, mean: Mean) {
-        self.mean[part * model.joints + joint][lane] = mean.value;
+    fn set(&mut self, lane: usize, joint: Joint, model: &Commands<'_>, part: usize, mean: Mean) {
+        self.mean[part * model.joints + joint.index()][lane] = mean.value;
         for (k, filter) in model.filters.iter().enumerate() {
             if filter.joint == joint {
                 self.slopes[part * model.filters.len() + k][lane] = match filter.kind {

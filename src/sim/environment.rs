@@ -89,6 +89,7 @@ mod tests {
     use std::path::Path;
 
     use super::Environment;
+    use crate::data::Joint;
     use crate::model::Library;
     use crate::plant::Plant;
     use crate::sim::Integrator;
@@ -101,9 +102,9 @@ mod tests {
         let torques = [1.0, -2.0, 3.0, 0.5, -1.5, 2.0];
         let delay = ("d".to_owned(), 0.04);
         plant
-            .add_effect(&library, "actuator_delay", 1, &[delay])
+            .add_effect(&library, "actuator_delay", Joint::at(0), &[delay])
             .unwrap();
-        let late = plant.true_dynamics();
+        let late = plant.dynamics();
         let steps = 4.try_into().unwrap();
         for integrator in [Integrator::SEMI_IMPLICIT_EULER, Integrator::fine(steps)] {
             let mut delayed = Environment::new(&late, integrator, 0.02);

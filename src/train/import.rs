@@ -24,7 +24,7 @@ pub fn save_imported(
         system,
         numbers,
     } = imported;
-    let dynamics = system.dynamics(&system.sign());
+    let dynamics = system.dynamics();
     let device = backend.device();
     let model = HybridModel::restored(&description.shape, &numbers, &dynamics, &device)?;
     let settings = FitSettings {

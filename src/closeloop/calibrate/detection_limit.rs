@@ -2,7 +2,6 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::select::{candidates, starts};
 use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::settings::Settings;
@@ -35,9 +34,9 @@ pub enum Smallest {
     /// One switch alone, the one that shows at the smallest multiple of its typical value; the values of all
     /// parameters, inner ones at the searched values that show the effect best, other switches at zero.
     Detectable { switch: usize, values: Vec<f64> },
-    /// No size: the motion does not tell it from what the model has.
+    /// None: the motion does not distinguish it from what the model has.
     Indistinguishable,
-    /// No parameter at zero switches the effect off, so that its size has no scale to start from.
+    /// No parameter at zero switches the effect off, so that its size has no natural zero.
     NotComputed,
     /// The model diverges with the effect.
     Diverged,
@@ -56,7 +55,7 @@ pub(super) fn detection_limits(
     let (chosen_by, _) = set_aside(study.logs, study.settings);
     let mut part = study.on(&chosen_by);
     part.identifiability = study.identifiability.clone();
-    let look = Look::new(&part, accepted)?;
+    let baseline = Baseline::new(&part, accepted)?;
     let all = candidates(&part, library, &accepted.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
     #[allow(clippy::cast_precision_loss)] // few trials
@@ -64,7 +63,7 @@ pub(super) fn detection_limits(
     Ok(all
         .into_iter()
         .map(|candidate| {
-            let smallest = look.size(&candidate, level);
+            let smallest = baseline.size(&candidate, level);
             DetectionLimit {
                 effect: candidate,
                 smallest,
@@ -75,7 +74,7 @@ pub(super) fn detection_limits(
 }
 
 /// An accepted model on the logs that effects are chosen by.
-struct Look<'a> {
+struct Baseline<'a> {
     study: &'a Study<'a>,
     accepted: &'a Fitted,
     locals: Vec<Vec<f64>>,
@@ -83,29 +82,15 @@ struct Look<'a> {
     loss: f64,
 }
 
-impl<'a> Look<'a> {
+impl<'a> Baseline<'a> {
     fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let values = values_on(study.logs, &accepted.declared, &accepted.effects);
+        let dynamics = accepted.dynamics();
         let scale = accepted.fit.scale;
         let states = study.shooting.initial_locals(0);
-        let locals = fit(
-            &study.shooting,
-            &accepted.dynamics,
-            &[],
-            values.clone(),
-            states,
-            Some(scale),
-        )?
-        .locals;
+        let (_, free) = fit(&study.shooting, &dynamics, &[], states, Some(scale))?;
+        let locals = free.locals;
         let active = &accepted.fit.active;
-        let fit = as_it_stands(
-            &study.shooting,
-            &accepted.dynamics,
-            active,
-            values,
-            locals.clone(),
-            scale,
-        )?;
+        let fit = as_it_stands(&study.shooting, &dynamics, active, locals.clone(), scale)?;
         let loss = left_out_losses(&fit, &folds(study)).iter().sum();
         Ok(Self {
             study,
@@ -195,14 +180,13 @@ impl<'a> Look<'a> {
         let accepted = self.accepted;
         let mut effects = accepted.effects.clone();
         effects.push(start.clone());
-        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
-        let values = values_on(self.study.logs, &accepted.declared, &effects);
-        let switch = values.common.len() - start.values.len() + switch;
+        let model = self.study.smoothed(&accepted.with_effects(effects));
+        let dynamics = model.dynamics();
+        let switch = dynamics.parameters.len() - start.values.len() + switch;
         as_it_stands(
             &self.study.shooting,
             &dynamics,
             &[accepted.fit.active.as_slice(), &[switch]].concat(),
-            values,
             self.locals.clone(),
             accepted.fit.scale,
         )
@@ -212,7 +196,7 @@ impl<'a> Look<'a> {
 /// Information on the last free value, the others free as well; `None` where it is no more than rounding.
 fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     let last = fit.columns.len() - 1;
-    let mut terms = fit.nothing();
+    let mut terms = fit.zero_equations();
     fit.reduced
         .iter()
         .for_each(|window| window.add_to(&mut terms));

@@ -1,4 +1,4 @@
-//! Stage 10: what some logs could show: how often the search names an effect where there is none, and how small an effect
+//! Stage 10: what some logs can show: how often the search names an effect where there is none, and how small an effect
 //! it would name.
 
 mod detection_limit;
@@ -18,14 +18,14 @@ use super::fitted::Fitted;
 use super::study::Study;
 use crate::data::Log;
 use crate::data::statistics::wilson;
-use crate::model::{FittedEffect, Library, System};
+use crate::model::{FittedEffect, Library, Model};
 
-/// What the search makes of logs simulated from the accepted model, with the torques and the noise of the user's.
+/// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// What was named in each simulation of the accepted model: every one a false alarm.
     pub named: Vec<Vec<FittedEffect>>,
-    /// In how many of them something was left that nothing explains.
+    /// Number of them with a significant unexplained remainder.
     pub unexplained: usize,
     pub limits: Vec<DetectionLimit>,
     /// Effects were hidden at this multiple of their smallest size.
@@ -103,7 +103,8 @@ pub fn calibrate(
     let mut repeat = Repeat {
         study,
         library,
-        declared: declared(study.system, accepted),
+        // Whatever is named beyond the accepted model is a false alarm.
+        declared: accepted.model.clone(),
         done: 0,
         of: runs + tried.count(),
         progress,
@@ -139,21 +140,11 @@ pub fn calibrate(
     })
 }
 
-/// The accepted model as a declared one: whatever is named beyond it is a false alarm.
-fn declared(system: &System, accepted: &Fitted) -> System {
-    let mut declared = system.clone();
-    for (parameter, value) in declared.parameters.iter_mut().zip(&accepted.declared) {
-        parameter.value = *value;
-    }
-    declared.effects.clone_from(&accepted.effects);
-    declared
-}
-
-/// The whole search, once again and again.
+/// Repeats the whole search.
 struct Repeat<'a> {
     study: &'a Study<'a>,
     library: &'a Library,
-    declared: System,
+    declared: Model,
     done: usize,
     of: usize,
     progress: &'a mut dyn FnMut(Repetition<'_>),

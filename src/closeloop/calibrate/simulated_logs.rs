@@ -1,17 +1,16 @@
 use rand::{Rng, RngExt};
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::study::Study;
 use crate::data::{Log, half_width_s};
-use crate::identify::{FitError, Window, blocks, fit};
+use crate::identify::{FitError, Values, Window, blocks, fit};
 use crate::model::FittedEffect;
 
 /// The training logs as they would be if an accepted model were the truth.
 ///
 /// A rig that balances upright cannot be simulated open loop over a whole log. Each window is simulated
-/// from its fitted start state instead, under the logged torques, and the windows stand apart in time:
-/// whatever cuts such logs into windows finds these again, and no motion leaps within one.
+/// from its fitted start state instead, under the logged torques, and the windows are set apart in time:
+/// cutting such logs into windows finds the same windows again, and no motion jumps within one.
 pub(super) struct SimulatedLogs<'a> {
     study: &'a Study<'a>,
     accepted: &'a Fitted,
@@ -31,23 +30,17 @@ impl<'a> SimulatedLogs<'a> {
     pub fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
         let apart = apart(study);
         let rig = study.on(&apart);
-        let values = values_on(&apart, &accepted.declared, &accepted.effects);
+        let dynamics = accepted.dynamics();
+        let values = Values::of(&dynamics, &apart);
         let states = rig.shooting.initial_locals(0);
         let scale = Some(accepted.fit.scale);
-        let locals = fit(
-            &rig.shooting,
-            &accepted.dynamics,
-            &[],
-            values.clone(),
-            states,
-            scale,
-        )?
-        .locals;
+        let (_, fit) = fit(&rig.shooting, &dynamics, &[], states, scale)?;
+        let locals = fit.locals;
         Ok(Self {
             study,
             accepted,
             windows: rig.shooting.windows.clone(),
-            residuals: rig.shooting.residuals(&accepted.dynamics, &values, &locals),
+            residuals: rig.shooting.residuals(&dynamics, &values, &locals),
             members: blocks(&rig.shooting),
             locals,
             apart,
@@ -59,8 +52,9 @@ impl<'a> SimulatedLogs<'a> {
     /// 2008): colour, rounding and size stay, whatever is systematic goes. `None` where the motion diverges.
     pub fn draw(&self, more: &[FittedEffect], rng: &mut impl Rng) -> Option<Vec<Log>> {
         let effects = [self.accepted.effects.as_slice(), more].concat();
-        let dynamics = self.study.system.dynamics_with(&effects, &self.study.sign);
-        let values = values_on(&self.apart, &self.accepted.declared, &effects);
+        let model = self.study.smoothed(&self.accepted.with_effects(effects));
+        let dynamics = model.dynamics();
+        let values = Values::of(&dynamics, &self.apart);
         let rig = self.study.on(&self.apart);
         let motion = rig.shooting.residuals(&dynamics, &values, &self.locals);
         if motion.iter().flatten().any(|x| !x.is_finite()) {

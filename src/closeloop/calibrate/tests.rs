@@ -45,8 +45,8 @@ fn logs(more: &str, seed: u64) -> Vec<Log> {
         .collect()
 }
 
-fn pendulum() -> System {
-    Library::built_in().system(Path::new("pendulum")).unwrap()
+fn pendulum() -> Model {
+    Library::built_in().model(Path::new("pendulum")).unwrap()
 }
 
 #[test]
@@ -65,13 +65,11 @@ fn the_windows_of_the_logs_are_found_again() {
     // The motion is the accepted model's, and each residual has its old size: only signs were drawn.
     let residuals = |study: &Study<'_>| {
         let states = study.shooting.initial_locals(0);
-        let values = &accepted.fit.values;
         let scale = Some(accepted.fit.scale);
-        let dynamics = &accepted.dynamics;
-        let found = crate::identify::fit(&study.shooting, dynamics, &[], values, states, scale);
-        study
-            .shooting
-            .residuals(dynamics, &values.into(), &found.unwrap().locals)
+        let dynamics = &accepted.dynamics();
+        let (values, found) =
+            crate::identify::fit(&study.shooting, dynamics, &[], states, scale).unwrap();
+        study.shooting.residuals(dynamics, &values, &found.locals)
     };
     let mut turned = 0;
     for (window, (old, new)) in residuals(&study).iter().zip(residuals(&again)).enumerate() {

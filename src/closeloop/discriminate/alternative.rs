@@ -7,7 +7,7 @@ use crate::closeloop::stage::{Progress, Stage};
 use crate::closeloop::study::Study;
 use crate::model::FittedEffect;
 
-/// Another explanation that the logs do not tell from the one reported.
+/// Another explanation that the logs do not distinguish from the one reported.
 #[derive(Debug, Clone)]
 pub struct Alternative {
     /// The whole set of effects.
@@ -77,7 +77,7 @@ impl Alternative {
         }
     }
 
-    /// The experiment that tells, in a sentence.
+    /// The experiment, in a sentence.
     pub fn experiment(&self) -> String {
         match &self.separation {
             Ok(separation) => separation.text(),

@@ -4,28 +4,24 @@ use super::menu::{Experiment, as_logged, experiments, spread};
 use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::select::Rival;
 use crate::closeloop::settings::DiscriminateSettings;
 use crate::closeloop::study::Study;
-use crate::data::Log;
-use crate::identify::{Fit, Own, Shooting, Values, fit, uncertainty};
-use crate::model::{Dynamics, FittedEffect};
+use crate::data::{Joint, Log};
+use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
+use crate::model::{Dynamics, FittedEffect, Model};
 
 /// One of two explanations.
 pub(super) struct Hypothesis {
     dynamics: Dynamics,
-    /// What differs by log, by the logs of the study.
-    values: Values,
     /// Of the residuals in refits.
     scale: f64,
 }
 
 impl Hypothesis {
-    pub fn new(study: &Study<'_>, effects: &[FittedEffect], declared: &[f64]) -> Self {
+    pub fn new(study: &Study<'_>, model: &Model) -> Self {
         Self {
-            dynamics: study.system.dynamics_with(effects, &study.sign),
-            values: values_on(study.logs, declared, effects),
+            dynamics: study.smoothed(model).dynamics(),
             scale: study.settings.discriminate.scale,
         }
     }
@@ -38,48 +34,34 @@ impl Hypothesis {
         };
         let effects: Vec<FittedEffect> =
             rival.model.effects.iter().filter(stands).cloned().collect();
-        Self::new(study, &effects, &rival.model.declared)
+        Self::new(study, &rival.model.with_effects(effects))
     }
 
     fn with(&self, payload: Option<&Payload>) -> Self {
         Self {
             dynamics: payload.map_or_else(|| self.dynamics.clone(), |p| p.on(&self.dynamics)),
-            values: self.values.clone(),
             scale: self.scale,
         }
     }
 
-    /// What it says the rig does; `None` where it diverges.
-    fn simulate(&self, motions: &[Motion], window_s: f64) -> Option<Record> {
-        Record::of(motions, &self.dynamics, &self.values, window_s)
+    /// The motion that it predicts; `None` where it diverges.
+    fn simulate(&self, study: &Study<'_>, motions: &[Motion]) -> Option<Record> {
+        let window_s = study.settings.fit.window_s;
+        Record::of(motions, study.logs, &self.dynamics, window_s)
     }
 
     /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
     /// present logs do not.
-    fn refit(
-        &self,
-        shooting: &Shooting<'_>,
-        origins: &[usize],
-        locals: Vec<Vec<f64>>,
-    ) -> Option<Fit> {
+    fn refit(&self, shooting: &Shooting<'_>, locals: Vec<Vec<f64>>) -> Option<(Values, Fit)> {
         let parameters = &self.dynamics.parameters;
         let active: Vec<usize> = (0..parameters.len())
             .filter(|&k| !parameters[k].fixed)
             .collect();
-        let own = |(log, &origin): (usize, &usize)| {
-            let of_origin = self.values.own.iter().filter(move |own| own.log == origin);
-            of_origin.map(move |own| Own { log, ..*own })
-        };
-        let values = Values {
-            common: self.values.common.clone(),
-            own: origins.iter().enumerate().flat_map(own).collect(),
-        };
-        let scale = Some(self.scale);
-        fit(shooting, &self.dynamics, &active, values, locals, scale).ok()
+        fit(shooting, &self.dynamics, &active, locals, Some(self.scale)).ok()
     }
 }
 
-/// One of two explanations taken for the truth, the other for what is to be told from it.
+/// Two explanations, of which one is simulated as the truth and the other is fitted to it.
 pub(super) struct Comparison<'a> {
     study: &'a Study<'a>,
     truth: Hypothesis,
@@ -97,12 +79,12 @@ pub(super) struct Comparison<'a> {
     inflation: f64,
 }
 
-/// What came of simulating one experiment.
+/// The result of simulating one experiment.
 pub(super) struct Trial {
     /// What to do.
     pub text: String,
-    /// The joint, counted from 0, on which the difference is largest beside the noise.
-    pub joint: usize,
+    /// The joint on which the difference is largest beside the noise.
+    pub joint: Joint,
     /// Root mean squares on that joint after refitting, in rad (or m): in the experiment, and in the present logs.
     pub difference: f64,
     pub present: f64,
@@ -129,19 +111,19 @@ impl<'a> Comparison<'a> {
             .into_iter()
             .map(|w| window_of(study, model, w))
             .collect();
-        let present = truth.simulate(&motions, study.settings.fit.window_s)?;
+        let present = truth.simulate(study, &motions)?;
         let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
-        let found = other.refit(&shooting, &present.origins, present.starts(0..))?;
+        let (values, found) = other.refit(&shooting, present.starts(0..))?;
         let loss = loss_of(&found);
         let windows = study.shooting.windows.iter();
         let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
-        // The logs did not tell, whatever the noise says: they hold no more than was needed.
+        // The present logs did not discriminate, whatever the noise suggests: they hold no more than was needed.
         let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
-        let differences = differences(&shooting, &other, &found, 0);
+        let differences = differences(&shooting, &other, &values, &found.locals, 0);
         Some(Self {
             inflation: inflation(study, model).max(too_sure),
             other: Hypothesis {
-                values: at_origins(found.found(), &present.origins),
+                dynamics: values.put_into(&other.dynamics, &present.logs),
                 ..other
             },
             locals: found.locals,
@@ -155,7 +137,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
-    pub fn trials(&self, model: &Fitted, joints: &[usize]) -> Vec<Trial> {
+    pub fn trials(&self, model: &Fitted, joints: &[Joint]) -> Vec<Trial> {
         let changes = experiments(self.study, model, joints);
         let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
         let payloads = self.payloads();
@@ -175,7 +157,6 @@ impl<'a> Comparison<'a> {
         let truth = &self.truth;
         Payload::all(
             &truth.dynamics,
-            &truth.values.common,
             declared,
             self.settings().payload,
             2.0 * latest_s + 10.0,
@@ -198,18 +179,18 @@ impl<'a> Comparison<'a> {
     fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
-            .simulate(&experiment.motions, self.study.settings.fit.window_s)
+            .simulate(self.study, &experiment.motions)
             .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
         let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
         let present = self.locals.len();
         let locals = [self.locals.clone(), both.starts(present..)].concat();
-        let found = other.refit(&shooting, &both.origins, locals)?;
+        let (values, found) = other.refit(&shooting, locals)?;
         let duration_s = both.duration_s(present..);
         let rate = (loss_of(&found) - self.loss).max(0.0) / duration_s;
-        let differences = differences(&shooting, &other, &found, present);
-        let share = |j: &usize| differences[*j] / self.noise[*j];
-        let joint = (0..differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
+        let differences = differences(&shooting, &other, &values, &found.locals, present);
+        let share = |joint: &Joint| differences[*joint] / self.noise[*joint];
+        let joint = Joint::all(differences.len()).max_by(|a, b| share(a).total_cmp(&share(b)))?;
         Some(Trial {
             text: experiment.text.clone(),
             joint,
@@ -220,26 +201,18 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    fn is_possible(&self, record: &Record, turns: Option<usize>) -> bool {
+    fn is_possible(&self, record: &Record, turns: Option<Joint>) -> bool {
         let fastest = self.settings().fastest;
         let slow = |log: &Log| {
             let mut joints = log.qd.iter().zip(&self.study.top_speed);
             joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= fastest * top))
         };
-        let turned = |j: usize| {
+        let turned = |joint: Joint| {
             let mut motions = record.motions.iter();
-            motions.any(|m| is_turn(&record.logs[m.log].q[j][m.first..=m.last]))
+            motions.any(|m| is_turn(&record.logs[m.log].q[joint][m.first..=m.last]))
         };
         record.logs.iter().all(slow) && turns.is_none_or(turned)
     }
-}
-
-/// Values of a fit to a record by the logs of the study.
-fn at_origins(mut values: Values, origins: &[usize]) -> Values {
-    for own in &mut values.own {
-        own.log = origins[own.log];
-    }
-    values
 }
 
 /// The motion of one window of the logs.
@@ -263,9 +236,15 @@ fn loss_of(fit: &Fit) -> f64 {
 }
 
 /// Difference of the positions that a fit leaves on each joint, root mean square over the windows from `first` on.
-fn differences(shooting: &Shooting<'_>, model: &Hypothesis, fit: &Fit, first: usize) -> Vec<f64> {
+fn differences(
+    shooting: &Shooting<'_>,
+    model: &Hypothesis,
+    values: &Values,
+    locals: &[Vec<f64>],
+    first: usize,
+) -> Vec<f64> {
     let n = model.dynamics.joints;
-    let residuals = shooting.residuals(&model.dynamics, &fit.found(), &fit.locals);
+    let residuals = shooting.residuals(&model.dynamics, values, locals);
     let residuals: Vec<f64> = residuals[first..].concat();
     let square = |j: usize| {
         residuals
@@ -287,7 +266,7 @@ fn differences(shooting: &Shooting<'_>, model: &Hypothesis, fit: &Fit, first: us
 fn inflation(study: &Study<'_>, model: &Fitted) -> f64 {
     let size = model.fit.columns.len();
     let covariance = uncertainty(&study.shooting, &model.fit).covariance;
-    let mut all = model.fit.nothing();
+    let mut all = model.fit.zero_equations();
     for window in &model.fit.reduced {
         window.add_to(&mut all);
     }

@@ -1,8 +1,9 @@
 use super::motion::Motion;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 
-/// What drives the rig.
+/// The torque of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drive {
     /// The logged torque times a factor, run off at another pace.
@@ -35,9 +36,9 @@ struct MenuItem {
     text: &'static str,
     drive: Drive,
     start: Start,
-    /// Rows in place of one.
+    /// Rows in place of each row.
     finer: u32,
-    /// Worth its name only where the joint goes round.
+    /// Applies only where the joint makes full turns.
     turns: bool,
 }
 
@@ -79,7 +80,7 @@ const fn turning(text: &'static str, torque: f64) -> MenuItem {
     }
 }
 
-/// Smallest changes of what the user does already first.
+/// Ordered by how little each changes the user's own experiment.
 const MENU: [MenuItem; 12] = [
     AS_LOGGED,
     MenuItem {
@@ -125,17 +126,21 @@ const MENU: [MenuItem; 12] = [
 pub(super) struct Experiment {
     pub text: String,
     pub motions: Vec<Motion>,
-    /// A joint that must go round.
-    pub turns: Option<usize>,
+    /// A joint that must make a full turn.
+    pub turns: Option<Joint>,
 }
 
 /// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
 /// states are where motions begin.
-pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[usize]) -> Vec<Experiment> {
+pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -> Vec<Experiment> {
     let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
     let mut all = Vec::new();
     for item in &MENU {
-        let joints = if of_one_joint(item) { joints } else { &[0] };
+        let joints = if of_one_joint(item) {
+            joints
+        } else {
+            &[Joint::at(0)]
+        };
         let able = joints
             .iter()
             .filter(|joint| item.is_possible(study, **joint));
@@ -150,11 +155,11 @@ pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[usize]) -
 
 /// Motions under the logged torque, for an experiment that changes the rig.
 pub(super) fn as_logged(study: &Study<'_>, model: &Fitted) -> Vec<Motion> {
-    AS_LOGGED.motions(study, model, 0)
+    AS_LOGGED.motions(study, model, Joint::at(0))
 }
 
 impl MenuItem {
-    fn is_possible(&self, study: &Study<'_>, joint: usize) -> bool {
+    fn is_possible(&self, study: &Study<'_>, joint: Joint) -> bool {
         let undriven = [AS_LOGGED.drive, Drive::Nothing].contains(&self.drive);
         let driven = match self.drive {
             Drive::Logged { .. } => study.top_torque.iter().any(|torque| *torque > 0.0),
@@ -169,7 +174,7 @@ impl MenuItem {
             && !(self.turns && (study.system.prismatic[joint] || goes_round(study, joint)))
     }
 
-    fn words(&self, study: &Study<'_>, joint: usize) -> String {
+    fn words(&self, study: &Study<'_>, joint: Joint) -> String {
         let (force, length) = if study.system.prismatic[joint] {
             ("N", "m")
         } else {
@@ -184,12 +189,12 @@ impl MenuItem {
             _ => 0.0,
         };
         self.text
-            .replace("{joint}", &(joint + 1).to_string())
+            .replace("{joint}", &joint.to_string())
             .replace("{torque}", &format!("{torque:.2} {force}"))
             .replace("{speed}", &format!("{speed:.1} {length}/s"))
     }
 
-    fn motions(&self, study: &Study<'_>, model: &Fitted, joint: usize) -> Vec<Motion> {
+    fn motions(&self, study: &Study<'_>, model: &Fitted, joint: Joint) -> Vec<Motion> {
         let motions = study.settings.discriminate.motions;
         let windows = &study.shooting.windows;
         let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
@@ -207,7 +212,7 @@ impl MenuItem {
     }
 
     /// One motion that begins like window `w` of the logs.
-    fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: usize) -> Motion {
+    fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: Joint) -> Motion {
         let settings = &study.settings.discriminate;
         let window = study.shooting.windows[w];
         let log = &study.logs[window.log];
@@ -253,7 +258,7 @@ impl MenuItem {
         motion
     }
 
-    fn state(&self, study: &Study<'_>, logged: &[f64], joint: usize) -> Vec<f64> {
+    fn state(&self, study: &Study<'_>, logged: &[f64], joint: Joint) -> Vec<f64> {
         let mut state = logged.to_vec();
         let velocities = &mut state[study.system.joints..];
         match self.start {
@@ -267,8 +272,8 @@ impl MenuItem {
     }
 }
 
-/// The torques with some more on one joint.
-fn with(torques: impl Iterator<Item = f64>, joint: usize, more: f64) -> Vec<f64> {
+/// The torques with an additional torque on one joint.
+fn with(torques: impl Iterator<Item = f64>, joint: Joint, more: f64) -> Vec<f64> {
     let mut torques: Vec<f64> = torques.collect();
     torques[joint] += more;
     torques
@@ -286,8 +291,8 @@ fn triangle(phase: f64) -> f64 {
     }
 }
 
-/// Whether the logs show the joint going round.
-fn goes_round(study: &Study<'_>, joint: usize) -> bool {
+/// Whether the logs show full turns of the joint.
+fn goes_round(study: &Study<'_>, joint: Joint) -> bool {
     study
         .logs
         .iter()

@@ -1,9 +1,9 @@
 use std::f64::consts::TAU;
 
 use crate::data::Log;
-use crate::identify::{Values, Window};
+use crate::identify::Window;
 use crate::model::Dynamics;
-use crate::sim::{Commands, FIT_S, Point, RK4, Simulator};
+use crate::sim::{Commands, FIT_S, RK4, Simulator};
 
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,12 +35,12 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Motions as a model has them, cut into windows of `length_s`. `values` gives its parameters in each log of the
-    /// study. `None` where it diverges.
+    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`. What differs by log is as
+    /// it is there. `None` where the model diverges.
     pub fn of(
         motions: &[Motion],
+        logs: &[Log],
         dynamics: &Dynamics,
-        values: &Values,
         length_s: f64,
     ) -> Option<Self> {
         let mut record = Self {
@@ -50,9 +50,9 @@ impl Record {
             windows: Vec::new(),
         };
         for motion in motions {
-            let index = record.log_of(motion.log, dynamics.joints);
+            let index = record.log_of(motion.log, &logs[motion.log]);
             let first = append(&mut record.logs[index], motion);
-            let model = Point::new(dynamics, values.of_log(motion.log));
+            let model = dynamics.in_log(&logs[motion.log]);
             simulate(&mut record.logs[index], first, &motion.start, &model)?;
             let log = &record.logs[index];
             record.motions.push(Window {
@@ -65,13 +65,16 @@ impl Record {
         Some(record)
     }
 
-    /// Number of the record's log for motions that begin in a log of the study.
-    fn log_of(&mut self, origin: usize, joints: usize) -> usize {
+    /// Number of the record's log for motions that begin in a log of the study: it is called as that log is.
+    fn log_of(&mut self, origin: usize, log: &Log) -> usize {
         if let Some(known) = self.origins.iter().position(|known| *known == origin) {
             return known;
         }
         self.origins.push(origin);
-        self.logs.push(Log::empty(joints));
+        self.logs.push(Log {
+            path: log.path.clone(),
+            ..Log::empty(log.joints())
+        });
         self.logs.len() - 1
     }
 
@@ -128,7 +131,7 @@ fn append(log: &mut Log, motion: &Motion) -> usize {
 }
 
 /// Fill in the states of a model from row `first` to the end of a log; `None` where it diverges.
-fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Point<'_>) -> Option<()> {
+fn simulate(log: &mut Log, first: usize, start: &[f64], model: &Dynamics) -> Option<()> {
     let commanded = log.clone();
     let commands = [&Commands::of_log(model, &commanded)];
     let mut simulator = Simulator::new(model, RK4);

@@ -18,18 +18,12 @@ pub(super) struct Payload {
 const OF_MASS: [&str; 2] = ["kg", "kg m^2"];
 impl Payload {
     /// A payload for each of the first `declared` parameters that one can add to.
-    pub fn all(
-        dynamics: &Dynamics,
-        values: &[f64],
-        declared: usize,
-        share: f64,
-        delay_s: f64,
-    ) -> Vec<Self> {
+    pub fn all(dynamics: &Dynamics, declared: usize, share: f64, delay_s: f64) -> Vec<Self> {
         let carries = |k: &usize| OF_MASS.contains(&dynamics.parameters[*k].unit.as_str());
         let of = |parameter: usize| Self {
             parameter,
             share,
-            extra: share * values[parameter],
+            extra: share * dynamics.parameters[parameter].value,
             delay_s,
         };
         (0..declared).filter(carries).map(of).collect()

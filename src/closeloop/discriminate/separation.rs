@@ -5,14 +5,15 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::Rival;
 use crate::closeloop::settings::DiscriminateSettings;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Separation {
     /// What to do; `None` where nothing that was simulated tells them apart.
     pub experiment: Option<String>,
-    /// Joint, counted from 1, on which the difference shows most.
-    pub joint: usize,
+    /// The joint on which the difference shows most.
+    pub joint: Joint,
     /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
     /// the other does, in rad (or m).
     pub difference_rad: f64,
@@ -28,12 +29,12 @@ pub struct Separation {
 
 /// The experiment that would tell a rival from the model chosen, by T-optimality (Atkinson and Fedorov 1975): each
 /// experiment of the menu is simulated with one of the two, the other is refitted to it and to the present logs
-/// together, all its parameters and start states free, and what then still differs is weighed against the noise.
+/// together, all its parameters and start states free, and the remaining difference is compared with the noise.
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
 pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
     let settings = &study.settings.discriminate;
-    let chosen = Hypothesis::new(study, &model.effects, &model.declared);
+    let chosen = Hypothesis::new(study, model);
     let other = Hypothesis::of_rival(study, model, rival);
     let comparison = if rival.contains_chosen() {
         Comparison::new(study, model, other, chosen)
@@ -49,7 +50,7 @@ pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Op
     let shown = best.unwrap_or(widest);
     Some(Separation {
         experiment: best.map(|trial| trial.text.clone()),
-        joint: shown.joint + 1,
+        joint: shown.joint,
         difference_rad: shown.difference,
         present_difference_rad: shown.present,
         noise_rad: shown.noise,
@@ -85,7 +86,7 @@ impl Separation {
 }
 
 impl Trial {
-    /// What the best experiment has least of: seconds, as far as they matter.
+    /// Length in s by which experiments are ranked: short ones are equal.
     fn worth(&self, settings: &DiscriminateSettings) -> f64 {
         self.seconds.max(settings.short_s)
     }

@@ -5,7 +5,7 @@ use crate::closeloop::study::Study;
 use crate::data::Log;
 use crate::identify::{FitError, Shooting, Window, cut, fit};
 
-/// What the model lacks over one short stretch of a log: the constant generalised force that, added to
+/// The residual force of a model over one short stretch of a log: the constant generalised force that, added to
 /// the torque, makes the model follow the logged positions best.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForceSample {
@@ -33,14 +33,7 @@ pub(super) fn residual_force(
     let windows = cut(study.logs, study.settings.remainder.stretch_s);
     let shooting = Shooting::new(study.logs, windows, &study.shooting.noise);
     let locals = shooting.initial_locals(joints);
-    let found = fit(
-        &shooting,
-        &model.dynamics,
-        &[],
-        model.fit.found(),
-        locals,
-        None,
-    )?;
+    let (_, found) = fit(&shooting, &model.dynamics(), &[], locals, None)?;
     let stretches = shooting.windows.iter().zip(&found.locals);
     let mut samples: Vec<ForceSample> = stretches
         .map(|(window, local)| {

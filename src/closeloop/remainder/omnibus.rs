@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
-use crate::data::Audit;
 use crate::data::statistics::{deviation, mean};
+use crate::data::{Audit, Joint};
+use crate::identify::Values;
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,17 +20,17 @@ pub struct Omnibus {
     pub p_value: f64,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
     pub shares: Vec<f64>,
-    /// What of the declared model's residual variance above noise is still there.
+    /// Share of the declared model's residual variance above noise that remains.
     pub fraction: f64,
 }
 
 impl Omnibus {
-    /// The joint (counted from 0) with the largest share, and that share.
-    pub fn most(&self) -> (usize, f64) {
-        let shares = self.shares.iter().copied().enumerate();
+    /// The joint with the largest share, and that share.
+    pub fn most(&self) -> (Joint, f64) {
+        let shares = Joint::all(self.shares.len()).zip(self.shares.iter().copied());
         shares
             .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((0, 0.0))
+            .unwrap_or((Joint::at(0), 0.0))
     }
 }
 
@@ -79,12 +80,12 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
     }
 }
 
-/// One window: its residual, and what the test needs to know of the fit and the sensor there.
+/// The residual of one window, with the fit and the sensor there.
 struct Window {
     joints: usize,
     /// In m or rad, `[row * joints + joint]`.
     residual: DVector<f64>,
-    /// What changes of the start state can do to the residual: orthonormal columns.
+    /// Basis of the residual's changes with the start state: orthonormal columns.
     absorbed: DMatrix<f64>,
     /// Smooth waves over the rows of the window: orthonormal columns.
     waves: DMatrix<f64>,
@@ -102,8 +103,9 @@ fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
     } = study.settings.remainder;
     let joints = study.system.joints;
     let shooting = &study.shooting;
-    let found = model.fit.found();
-    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&model.dynamics, &found, locals);
+    let dynamics = model.dynamics();
+    let values = Values::of(&dynamics, study.logs);
+    let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
     let sensors = sensors(study);
     let at = residuals(&model.fit.locals);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
@@ -146,7 +148,7 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
         let sensor = |j: usize| {
             let (step, seen) = (joints[j].q.resolution, joints[j].q.noise_std);
             let noise = (seen * seen - step * step / 12.0).max(0.0).sqrt();
-            // Where the audit sees neither, any noise will do: shares do not depend on its size.
+            // Where the audit finds neither, any noise will do: shares do not depend on its size.
             [
                 if step > 0.0 {
                     noise
@@ -173,9 +175,9 @@ fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
 }
 
 impl Window {
-    /// What the sensor adds to the model's positions.
+    /// A draw of the error that the sensor adds to the model's positions.
     fn noise(&self, rng: &mut impl Rng) -> DVector<f64> {
-        // Where within a step of the encoder the zero lies is not known to the fraction that matters.
+        // The zero's place within a step of the encoder is unknown.
         let phases: Vec<f64> = (0..self.joints).map(|_| rng.random()).collect();
         DVector::from_fn(self.positions.len(), |i, _| {
             let [noise, step] = self.sensor[i % self.joints];
@@ -191,7 +193,7 @@ impl Window {
         })
     }
 
-    /// Smooth and whole energy of what the fit of the start state leaves of `signal`, one each a joint.
+    /// Slow and total energy of what the fit of the start state leaves of `signal`, one each a joint.
     fn energies(&self, signal: &DVector<f64>) -> Vec<[f64; 2]> {
         let left = signal - &self.absorbed * (self.absorbed.tr_mul(signal));
         (0..self.joints)
@@ -258,7 +260,7 @@ impl NoiseShare {
         }
     }
 
-    /// In deviations.
+    /// In standard deviations.
     fn excess(&self, share: f64) -> f64 {
         (share - self.mean) / self.deviation.max(f64::MIN_POSITIVE)
     }

@@ -9,26 +9,27 @@ use crate::closeloop::select::best_start;
 use crate::closeloop::select::gain;
 use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
-/// A formula for what is left: a proposal to think about, no finding. Nothing but its fit speaks for it.
+/// A formula for the remainder: a proposal, not a finding. Supported only by its fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// Counted from 0.
-    pub joint: usize,
+    pub joint: Joint,
     /// Force in N m (or N), such as `-0.0012 * qd1^3`.
     pub formula: String,
-    /// Share of the loss that noise does not explain which it takes away, on stretches left out of its fit.
+    /// Share of the loss above noise that it takes away, on stretches left out of its fit.
     pub explains: f64,
-    /// The formula as an effect file, for a folder that `--effects` names.
+    /// The formula as an effect file, for a folder of a library.
     pub file: String,
 }
 
 /// A term of the joint's own variables, and the powers of q, qd, tau and t in its unit.
 type Term = (&'static str, [i32; 4]);
 
-/// What forces in machines are made of. Lines, squares and cubes have units that tell what their coefficients
-/// mean; functions of the angle and signs have none.
+/// Terms of forces in machines. Linear, square and cubic terms have units that give their coefficients a meaning;
+/// functions of the angle and signs have none.
 const TERMS: [Term; 31] = [
     ("1", [0, 0, 0, 0]),
     ("q", [1, 0, 0, 0]),
@@ -62,9 +63,9 @@ const TERMS: [Term; 31] = [
     ("t*qd", [0, 1, 0, 1]),
     ("t*tau", [0, 0, 1, 1]),
 ];
-/// A short sum of terms for the force that `model` lacks on the joint where most is left: terms are added while
-/// they lower the loss on stretches left out of the fit. `None` where nothing that matters is left, or no
-/// term follows it.
+/// A short sum of terms for the force that `model` lacks on the joint with the largest remainder: terms are added while
+/// they lower the loss on stretches left out of the fit. `None` where the remainder is not significant, or no term fits
+/// it.
 pub fn proposal(study: &Study<'_>, model: &Fitted, left: &Unexplained) -> Option<Proposal> {
     if !left.is_significant() {
         return None;
@@ -101,11 +102,11 @@ struct Sum {
     losses: Vec<f64>,
 }
 
-/// The sum with the one more term that helps most.
+/// The sum with one more term, the one that lowers the loss most.
 fn longer(
     study: &Study<'_>,
     model: &Fitted,
-    joint: usize,
+    joint: Joint,
     terms: &[Term],
     folds: &[usize],
 ) -> Option<Sum> {
@@ -124,9 +125,9 @@ fn longer(
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {
-            let effects = [model.effects.as_slice(), &[start]].concat();
+            let longer = model.with_effects([model.effects.as_slice(), &[start]].concat());
             let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-            let fitted = study.refit(&effects, &model.declared, locals, scale).ok()?;
+            let fitted = study.refit(&longer, locals, scale).ok()?;
             Some(Sum {
                 terms,
                 losses: left_out_losses(&fitted.fit, folds),

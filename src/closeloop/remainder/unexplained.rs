@@ -9,41 +9,41 @@ use crate::closeloop::select::{folds, left_out_losses};
 use crate::closeloop::select::{gain, p_value};
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
-/// What is left when no effect helps any more.
+/// The unexplained remainder: what the residuals hold beyond noise when no effect helps any more.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unexplained {
-    /// Share of the declared model's residual variance above the sensor's noise that is still there.
+    /// Share of the declared model's residual variance above the sensor's noise that remains.
     pub fraction: f64,
     /// Probability of so much structure in noise alone: the smaller of the omnibus test's and that of the probes
     /// which save something that matters, times two.
     pub p_value: f64,
-    /// The variable over which most of it lives: `q1`, `qd2`, `tau1`, `t`, products of them such as `q1*qd1`,
-    /// `unknown` where it follows none of them, `none` where nothing that matters is left.
+    /// The variable that most of it depends on: `q1`, `qd2`, `tau1`, `t`, products of them such as `q1*qd1`,
+    /// `unknown` where it depends on none of them, `none` where it is not significant.
     pub place: String,
-    /// The joint (counted from 0) where most of it is.
-    pub joint: usize,
+    /// The joint (counted from 0) with the largest remainder.
+    pub joint: Joint,
     pub omnibus: Omnibus,
     pub probes: Vec<Probed>,
 }
 
-/// What one flexible shape saw.
+/// The result of one flexible probe.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Probed {
-    /// The variables it asked about.
+    /// The variables that it depends on.
     #[serde(rename = "where")]
     pub place: String,
-    /// Counted from 0.
     #[serde(skip)]
-    pub joint: usize,
+    pub joint: Joint,
     /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
     pub p_value: f64,
     /// Fall of the loss on left-out stretches, as a share.
     pub gain: f64,
 }
 
-/// What is left follows no variable that was probed.
+/// The remainder depends on none of the variables tested.
 pub const UNKNOWN: &str = "unknown";
 const NONE: &str = "none";
 
@@ -53,8 +53,8 @@ impl Unexplained {
     }
 }
 
-/// Ask whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over
-/// each variable. Probes name nothing; what they save on left-out stretches is what an unknown effect would.
+/// Test whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over each
+/// variable. Probes name no effect; they lower the loss on left-out stretches as an unknown effect would.
 pub fn unexplained(
     study: &Study<'_>,
     probes: &[Effect],
@@ -91,7 +91,11 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
     effects.push(probe);
     let scale = Some(model.fit.scale);
     let fitted = study
-        .refit(&effects, &model.declared, model.fit.locals.clone(), scale)
+        .refit(
+            &model.with_effects(effects),
+            model.fit.locals.clone(),
+            scale,
+        )
         .ok()?;
     let without = left_out_losses(&fitted.fit, &folds(study));
     Some(Probed {
@@ -102,8 +106,8 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
     })
 }
 
-/// The variable and the joint of the probe that saves most; one test among all probes and the omnibus test.
-fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, usize) {
+/// The variable and the joint of the probe that lowers the loss most; one test among all probes and the omnibus test.
+fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, Joint) {
     let RemainderSettings {
         significance,
         noteworthy,
@@ -126,11 +130,11 @@ fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> 
     }
 }
 
-/// A probe is called by the variables that it asks about; those of a joint get the joint's number.
+/// A probe is named by its variables; those of a joint carry the joint's number.
 fn variables(probe: &FittedEffect) -> String {
     let numbered = |name: &str| match name {
         "t" => name.to_owned(),
-        own => format!("{own}{}", probe.joint + 1),
+        own => probe.joint.name(own),
     };
     let names: Vec<String> = probe.effect.name.split('*').map(numbered).collect();
     names.join("*")

@@ -2,12 +2,11 @@ use rayon::prelude::*;
 
 use super::errors::Scorer;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::take_over_intervals;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
-use crate::identify::{FitError, Uncertainty, uncertainty};
-use crate::model::{FittedEffect, OwnValue, Parameter, System};
+use crate::identify::FitError;
+use crate::model::{FittedEffect, Model, OwnValue, Parameter};
 use crate::sim::metric::Assessment;
 
 /// One effect that was added.
@@ -58,7 +57,6 @@ pub(in crate::closeloop) fn findings(
     with: &Assessment,
 ) -> Vec<Finding> {
     let declared = study.system.effects.len();
-    let uncertainty = uncertainty(&refined.study.shooting, &refined.model.fit);
     let finding = |k: usize| {
         // The refit without an effect takes the same two steps as the model with it: coarse, then refined.
         let coarse = without(study, chosen, k);
@@ -68,9 +66,9 @@ pub(in crate::closeloop) fn findings(
         let reduction = |less: Fitted| {
             1.0 - with.position_rms() / scorer.fitted(&less).position_rms().max(f64::MIN_POSITIVE)
         };
-        let (effect, expression, parameters) = reported(refined, &uncertainty, k);
+        let (expression, parameters) = described(study.system, &refined.model, k);
         Finding {
-            effect,
+            effect: refined.model.effects[k].clone(),
             expression,
             parameters,
             p_value: p_value(&refined.study, &refined.model, k)
@@ -92,58 +90,27 @@ fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted) -> f64 {
     p_of_gains(&losses(without), &losses(chosen))
 }
 
-/// The k-th effect of the refined model with intervals, what it adds, and the parameters that it is reported with.
-fn reported(
-    refined: &Refined<'_>,
-    uncertainty: &Uncertainty,
-    k: usize,
-) -> (FittedEffect, String, Vec<Parameter>) {
-    let Refined {
-        study,
-        model,
-        parameters,
-        ..
-    } = refined;
-    let own = parameters[model.range_of(k)].to_vec();
-    let mut effect = model.effects[k].clone();
-    let (expression, reported) = described(study.system, &effect, parameters, &own);
-    for (slot, parameter) in effect.values.iter_mut().zip(&own) {
-        *slot = (parameter.value, parameter.ci95);
-    }
-    take_over_intervals(
-        &mut effect,
-        model.range_of(k),
-        &model.fit,
-        uncertainty,
-        study.logs,
-    );
-    (effect, expression, reported)
-}
-
-/// What an effect with its `own` parameters adds, and the parameters that it is reported with: of a shift, what is
-/// shifted.
-fn described(
-    system: &System,
-    effect: &FittedEffect,
-    parameters: &[Parameter],
-    own: &[Parameter],
-) -> (String, Vec<Parameter>) {
+/// What the k-th effect of a model adds, and the parameters that it is reported with: of a shift, what is shifted.
+fn described(declared: &Model, model: &Model, k: usize) -> (String, Vec<Parameter>) {
+    let effect = &model.effects[k];
     match effect.shifted() {
-        Some(k) => {
-            let expression = system.parameters[k].expression_of_shift(parameters[k].value);
-            (expression, vec![parameters[k].clone()])
+        Some(shifted) => {
+            let actual = model.absorbed().parameters.swap_remove(shifted);
+            let expression = declared.parameters[shifted].expression_of_shift(actual.value);
+            (expression, vec![actual])
         }
         None => {
+            let own = model.all_parameters()[model.place_of(k)].to_vec();
             let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
-            (effect.expression(&names), own.to_vec())
+            (effect.expression(&names), own)
         }
     }
 }
 
 /// The model refitted without its k-th effect, its residuals on the same scale.
 fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Result<Fitted, FitError> {
-    let mut effects = model.effects.clone();
-    effects.remove(k);
+    let mut less = model.model.clone();
+    less.effects.remove(k);
     let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-    study.refit(&effects, &model.declared, locals, scale)
+    study.refit(&less, locals, scale)
 }

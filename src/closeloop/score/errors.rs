@@ -5,7 +5,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
-use crate::model::{Dynamics, System};
+use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Assessment, assess};
 
 /// Open-loop errors on the test logs.
@@ -34,7 +34,7 @@ impl Scorer<'_> {
     /// Score the declared model as it is, before and after the effects were added, and what else is to be compared.
     pub fn errors(
         &self,
-        declared: &System,
+        declared: &Model,
         [before, after]: [&Fitted; 2],
         hybrid: Option<&Dynamics>,
         against: &[Reference],
@@ -54,25 +54,14 @@ impl Scorer<'_> {
 
     /// The error of a fitted model.
     pub fn fitted(&self, model: &Fitted) -> Assessment {
-        self.assess(&model.dynamics, |log| model.values_in(log))
+        self.dynamics(&model.dynamics())
     }
 
-    fn as_it_is(&self, model: &System) -> Assessment {
-        let dynamics = model.dynamics(&model.sign());
-        self.assess(&dynamics, |log| model.values_in(&dynamics, log))
+    fn as_it_is(&self, model: &Model) -> Assessment {
+        self.dynamics(&model.dynamics())
     }
 
     fn dynamics(&self, model: &Dynamics) -> Assessment {
-        self.assess(model, |_| model.values())
-    }
-
-    fn assess(&self, dynamics: &Dynamics, values_in: impl Fn(&Log) -> Vec<f64>) -> Assessment {
-        let values: Vec<Vec<f64>> = self.test.iter().map(values_in).collect();
-        assess(
-            dynamics,
-            |log| &values[log],
-            self.test,
-            &self.settings.horizons_s,
-        )
+        assess(model, self.test, &self.settings.horizons_s)
     }
 }

@@ -1,9 +1,9 @@
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::per_log::values_on;
 use crate::closeloop::study::Study;
-use crate::identify::{Shooting, promise};
+use crate::data::Joint;
+use crate::identify::{Shooting, predicted_cost};
 use crate::model::{Effect, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
@@ -19,11 +19,11 @@ pub fn candidates(
     all
 }
 
-/// Every one of these effects on every joint where it can act and be seen.
+/// These effects on every joint where each can act and be observed.
 pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in effects {
-        for joint in 0..study.system.joints {
+        for joint in Joint::all(study.system.joints) {
             if is_driven_enough(study, effect, joint)
                 && study.system.can_carry(effect, joint).is_ok()
             {
@@ -38,8 +38,8 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     all
 }
 
-/// Effects of the torque cannot be seen where there is none.
-fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: usize) -> bool {
+/// Effects of the torque cannot be observed where there is none.
+fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: Joint) -> bool {
     !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
 }
 
@@ -60,8 +60,8 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     points.into_iter().map(at).collect()
 }
 
-/// The starting point of a candidate that promises most beside the model at hand, and the cost it promises: found
-/// on a sample of the windows where there are several, and asked of all of them.
+/// The starting point of a candidate with the largest predicted decrease beside a model, and the predicted cost: chosen
+/// on a sample of the windows where there are several, and predicted on all of them.
 pub fn best_start(
     study: &Study<'_>,
     model: &Fitted,
@@ -84,7 +84,7 @@ pub fn best_start(
     Some((start, cost))
 }
 
-/// The cost that a candidate promises on some windows.
+/// The cost of some windows that one Gauss-Newton step predicts for a candidate.
 fn promised(
     study: &Study<'_>,
     shooting: &Shooting<'_>,
@@ -94,10 +94,9 @@ fn promised(
 ) -> Option<f64> {
     let mut effects = model.effects.clone();
     effects.push(start.clone());
-    let dynamics = study.system.dynamics_with(&effects, &study.sign);
-    let values = values_on(study.logs, &model.declared, &effects);
+    let dynamics = study.smoothed(&model.with_effects(effects)).dynamics();
     let (active, scale) = (study.active(&dynamics), model.fit.scale);
-    promise(shooting, &dynamics, &active, values, locals, scale)
+    predicted_cost(shooting, &dynamics, &active, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
@@ -114,8 +113,8 @@ pub fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Op
         return None;
     }
     let mut beside = model.clone();
-    let found = beside.effects.split_off(study.system.effects.len());
-    beside.effects.extend(
+    let found = beside.model.effects.split_off(study.system.effects.len());
+    beside.model.effects.extend(
         found
             .into_iter()
             .filter(|present| !contains(candidate, present)),

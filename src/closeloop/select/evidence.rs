@@ -8,7 +8,7 @@ use crate::data::statistics::{mean, standard_error};
 use crate::identify::uncertainty;
 use crate::model::FittedEffect;
 
-/// What speaks for one candidate beside the effects that a model has already.
+/// The evidence for one candidate beside the effects that a model already has.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// The model with this candidate, fitted.
@@ -27,15 +27,16 @@ impl Evidence {
     /// Number of values, one a log where they differ by log, then of the simpler effects that it contains.
     pub(super) fn complexity(&self) -> (usize, usize) {
         let model = &self.model;
-        let range = model.range_of(model.effects.len() - 1);
-        let of_logs = (model.fit.own.iter()).filter(|own| range.contains(&own.parameter));
+        let range = model.place_of(model.effects.len() - 1);
+        let columns = model.fit.columns.iter();
+        let of_logs = columns.filter(|c| c.log.is_some() && range.contains(&c.parameter));
         let per_log = (self.effect.effect.parameters.iter()).filter(|p| p.per_log);
         let values = range.len() - per_log.count() + of_logs.count();
         (values, self.effect.effect.contains.len())
     }
 
     /// Judge a model whose last effect is the candidate against the one without it, by their losses on `folds`.
-    /// `None` where the fitted values make no sense together.
+    /// `None` where the fitted values are inconsistent with each other.
     pub(super) fn of(
         study: &Study<'_>,
         model: Fitted,
@@ -59,7 +60,7 @@ impl Evidence {
         })
     }
 
-    /// Whether the losses on left-out stretches do not tell this candidate from a better one.
+    /// Whether the losses on left-out stretches do not distinguish this candidate from a better one.
     pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
         let differences = differences(&self.losses, &best.losses);
         mean(&differences) <= settings.as_good * standard_error(&differences)
@@ -77,7 +78,7 @@ pub fn gain(before: &[f64], after: &[f64]) -> f64 {
 /// `None` for an effect that no value of a parameter switches off.
 pub fn p_value(study: &Study<'_>, model: &Fitted, k: usize) -> Option<f64> {
     let effect = &model.effects[k].effect;
-    let range = model.range_of(k);
+    let range = model.place_of(k);
     let is_switch = |parameter: usize| {
         range.contains(&parameter) && effect.parameters[parameter - range.start].is_switch()
     };
@@ -95,7 +96,10 @@ pub fn p_value(study: &Study<'_>, model: &Fitted, k: usize) -> Option<f64> {
         .select_columns(&switches);
     let values = nalgebra::DVector::from_iterator(
         switches.len(),
-        switches.iter().map(|&i| model.fit.value(i)),
+        switches.iter().map(|&i| {
+            let log = columns[i].log.map(|log| &study.logs[log]);
+            model.value_of(columns[i].parameter, log)
+        }),
     );
     let inverse = covariance.pseudo_inverse(1e-300).ok()?;
     let statistic = values.dot(&(inverse * &values));

@@ -19,11 +19,11 @@ pub fn folds(study: &Study<'_>) -> Vec<usize> {
 /// could tell them.
 pub fn left_out_losses(fit: &Fit, folds: &[usize]) -> Vec<f64> {
     let count = folds.iter().max().map_or(0, |last| last + 1);
-    let mut parts = vec![fit.nothing(); count];
+    let mut parts = vec![fit.zero_equations(); count];
     for (window, &fold) in fit.reduced.iter().zip(folds) {
         window.add_to(&mut parts[fold]);
     }
-    let mut all = fit.nothing();
+    let mut all = fit.zero_equations();
     for part in &parts {
         all.gradient += &part.gradient;
         all.hessian += &part.hessian;

@@ -13,14 +13,14 @@ use crate::closeloop::study::Study;
 use crate::identify::FitError;
 use crate::model::{Effect, EffectParameter, FittedEffect};
 
-/// One look at a model: what was tried beside the effects that it has, best first.
+/// One round of the search: the candidates tried beside the effects of a model, best first.
 #[derive(Debug, Clone)]
 pub struct Round {
-    /// Number of candidates that were looked at.
+    /// Number of candidates that were screened.
     pub candidates: usize,
-    /// Those that promised most, fitted, best first.
+    /// Those with the largest predicted decrease, fitted, best first.
     pub evidence: Vec<Evidence>,
-    /// Index of the one that the evidence is for.
+    /// Index of the one that is admitted.
     pub chosen: Option<usize>,
 }
 
@@ -43,7 +43,7 @@ impl Rival {
     }
 }
 
-/// Effects of a model whatever their order.
+/// The effects of a model, in no particular order.
 type Key = Vec<String>;
 
 fn key(effects: &[FittedEffect]) -> Key {
@@ -52,22 +52,22 @@ fn key(effects: &[FittedEffect]) -> Key {
     key
 }
 
-/// A search for the effects that a model lacks, and what it has seen so far.
+/// A search for the effects that a model lacks, with the rounds so far.
 pub struct Search<'a, 'p> {
     study: &'a Study<'a>,
     library: &'a [Effect],
     folds: Vec<usize>,
-    /// What has been looked at, by the effects of the model.
-    looks: HashMap<Key, Round>,
-    /// Models that the search has passed through.
+    /// Rounds so far, by the effects of the model.
+    known_rounds: HashMap<Key, Round>,
+    /// Models that the search has visited.
     passed: Vec<Key>,
-    /// What was looked at to add one more effect, in this order.
+    /// The rounds that were to add one more effect, in their order.
     pub rounds: Vec<Round>,
     progress: &'p mut dyn FnMut(Progress<'_>),
 }
 
 impl<'a, 'p> Search<'a, 'p> {
-    /// `progress` is told what is being tried.
+    /// `progress` hears what is being tried.
     pub fn new(
         study: &'a Study<'a>,
         library: &'a [Effect],
@@ -77,7 +77,7 @@ impl<'a, 'p> Search<'a, 'p> {
             study,
             library,
             folds: folds(study),
-            looks: HashMap::new(),
+            known_rounds: HashMap::new(),
             passed: Vec::new(),
             rounds: Vec::new(),
             progress,
@@ -92,7 +92,7 @@ impl<'a, 'p> Search<'a, 'p> {
     pub fn select(&mut self, declared: Fitted) -> Result<Fitted, FitError> {
         let mut model = declared;
         while model.effects.len() < self.declared() + self.study.settings.select.most_effects {
-            let round = self.look(&model, None);
+            let round = self.round(&model, None);
             self.rounds.push(round.clone());
             let next = match round.chosen {
                 Some(chosen) => Some(round.evidence[chosen].model.clone()),
@@ -108,7 +108,7 @@ impl<'a, 'p> Search<'a, 'p> {
         Ok(model)
     }
 
-    /// Tell what is being done.
+    /// Report progress.
     pub fn tell(&mut self, progress: Progress<'_>) {
         (self.progress)(progress);
     }
@@ -124,11 +124,11 @@ impl<'a, 'p> Search<'a, 'p> {
         known
     }
 
-    /// Weigh what could join `model`; `wanted` is among the candidates whatever it promises.
-    fn look(&mut self, model: &Fitted, wanted: Option<&FittedEffect>) -> Round {
+    /// Fit and rank the candidates that could join `model`; `wanted` is among them whatever its predicted decrease.
+    fn round(&mut self, model: &Fitted, wanted: Option<&FittedEffect>) -> Round {
         let at = key(&model.effects);
         let is_wanted = |c: &FittedEffect| wanted.is_some_and(|wanted| wanted.label() == c.label());
-        if let Some(known) = self.looks.get(&at)
+        if let Some(known) = self.known_rounds.get(&at)
             && (wanted.is_none() || known.evidence.iter().any(|e| is_wanted(&e.effect)))
         {
             return known.clone();
@@ -152,11 +152,11 @@ impl<'a, 'p> Search<'a, 'p> {
             chosen: choose(&evidence, trials, &study.settings.select),
             evidence,
         };
-        self.looks.insert(at, round.clone());
+        self.known_rounds.insert(at, round.clone());
         round
     }
 
-    /// Candidates at their most promising starting points, the most promising ones first.
+    /// Candidates at their best starting points, by predicted cost.
     fn screened(&mut self, model: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
         self.say(&format!("screening {} effects", all.len()));
         let study = self.study;
@@ -167,8 +167,8 @@ impl<'a, 'p> Search<'a, 'p> {
                 best_start(study, &beside, candidate)
             })
             .collect();
-        // A step away from "absent" promises little truth of an effect that cannot be absent: such candidates are
-        // always fitted.
+        // A Gauss-Newton step predicts badly for an effect that no value switches off: such candidates are always
+        // fitted.
         screened.sort_by(|a, b| {
             has_switch(&a.0)
                 .cmp(&has_switch(&b.0))
@@ -180,8 +180,7 @@ impl<'a, 'p> Search<'a, 'p> {
     /// The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
     fn rescaled(&self, model: &Fitted) -> Result<Fitted, FitError> {
         let locals = model.fit.locals.clone();
-        self.study
-            .refit(&model.effects, &model.declared, locals, None)
+        self.study.refit(model, locals, None)
     }
 
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
@@ -200,12 +199,12 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Look at every effect of the model again, beside all others: what came early was chosen without knowing
-    /// what would follow. The first other model that the evidence is for.
+    /// Weigh every effect of the model again, beside all others: early ones were chosen without those that followed. The
+    /// first other model that the evidence supports.
     fn exchanged(&mut self, model: &Fitted) -> Option<Fitted> {
         (self.declared()..model.effects.len()).find_map(|k| {
             let (present, without) = self.without(model, k)?;
-            let round = self.look(&without, Some(&present));
+            let round = self.round(&without, Some(&present));
             match round.chosen.map(|chosen| &round.evidence[chosen]) {
                 None => Some(without),
                 Some(best) if best.effect.label() == present.label() => None,
@@ -214,7 +213,7 @@ impl<'a, 'p> Search<'a, 'p> {
         })
     }
 
-    /// What explains the logs as well as one of the effects of a model does, beside all others.
+    /// Effects that explain the logs as well as one of a model's effects does, beside its others.
     pub fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
         let settings = &self.study.settings.select;
         let mut rivals = Vec::new();
@@ -222,7 +221,7 @@ impl<'a, 'p> Search<'a, 'p> {
             let Some((present, without)) = self.without(model, k) else {
                 continue;
             };
-            let round = self.look(&without, Some(&present));
+            let round = self.round(&without, Some(&present));
             let is_present = |e: &&Evidence| e.effect.label() == present.label();
             let Some(chosen) = round.evidence.iter().find(is_present) else {
                 continue;
@@ -264,7 +263,7 @@ fn weigh(
     start: FittedEffect,
     without: &[f64],
 ) -> Option<Evidence> {
-    let mut effects = beside(study, model, &start)?.effects;
+    let mut effects = beside(study, model, &start)?.model.effects;
     effects.push(start);
     let fitted = refit(study, model, &effects)?;
     Evidence::of(study, fitted, folds, without)
@@ -274,7 +273,11 @@ fn weigh(
 fn refit(study: &Study<'_>, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
     let locals = model.fit.locals.clone();
     study
-        .refit(effects, &model.declared, locals, Some(model.fit.scale))
+        .refit(
+            &model.with_effects(effects.to_vec()),
+            locals,
+            Some(model.fit.scale),
+        )
         .ok()
 }
 
@@ -287,7 +290,7 @@ fn has_switch(candidate: &FittedEffect) -> bool {
         .any(EffectParameter::is_switch)
 }
 
-/// Index of the evidence to act upon: of all candidates that are significant over so many trials, worthwhile
+/// Index of the candidate to admit: of all candidates that are significant over so many trials, worthwhile
 /// and as good as the best, the one with the fewest parameters.
 fn choose(evidence: &[Evidence], trials: usize, settings: &SelectSettings) -> Option<usize> {
     #[allow(clippy::cast_precision_loss)] // few trials

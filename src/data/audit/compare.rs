@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::channel::{Channel, SPIKE_MADS, SPIKE_RESOLUTION_STEPS, SPIKE_SHARE_OF_RANGE};
 use super::motion::Motion;
 use super::regressors::regressors;
+use crate::data::Joint;
 use crate::data::lag::{Lag, lag};
 use crate::data::projection::{explained_by, orthonormal};
 use crate::data::signal::{interpolate, resample};
@@ -151,7 +152,7 @@ fn velocity_lag(motion: &Motion, step_s: f64) -> Option<Lag> {
 pub(super) fn torque_lag(
     motions: &[Motion],
     fast_rad_s: &[f64],
-    joint: usize,
+    joint: Joint,
     step_s: f64,
 ) -> Option<TorqueLag> {
     let uniform = |values: &[f64]| resample(&motions[joint].time, values, lag_step_s(step_s));

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::motion::Motion;
 use super::regressors::regressors;
+use crate::data::Joint;
 use crate::data::local_cubic::LocalCubic;
 use crate::data::projection::{explained_by, orthonormal};
 use crate::data::statistics::{deviation, rms};
@@ -40,7 +41,7 @@ pub struct TorqueDemand {
 pub(super) fn torque_demand(
     motions: &[Motion],
     fast_rad_s: &[f64],
-    joint: usize,
+    joint: Joint,
     half_width_s: f64,
 ) -> Option<TorqueDemand> {
     let motion = &motions[joint];

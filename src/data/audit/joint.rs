@@ -6,6 +6,7 @@ use super::channel::{Channel, isolated_spikes};
 use super::compare::{Speeds, TorqueLag, VelocityCheck, torque_lag, velocity_check};
 use super::demand::{TorqueDemand, torque_demand};
 use super::motion::Motion;
+use crate::data::Joint;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
 use crate::data::log::Log;
 use crate::data::statistics::quantile;
@@ -20,8 +21,7 @@ const SLOW_S: f64 = 0.05;
 /// One joint of a log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct JointAudit {
-    /// Number of the joint, from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// The angle \[rad\].
     pub q: Channel,
     /// The velocity as logged \[rad/s\].
@@ -53,17 +53,17 @@ pub struct JointAudit {
 /// Audits every joint of a log.
 pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
     let smoothed = |half_width_s: f64| -> Vec<Motion> {
-        (0..log.joints())
+        Joint::all(log.joints())
             .map(|joint| Motion::of(log, joint, half_width_s))
             .collect()
     };
     let motions = smoothed(half_width_s(log.median_step()));
     let slow_s = half_width_s(log.median_step()).max(SLOW_S);
     let slow = smoothed(slow_s);
-    let mut joints: Vec<JointAudit> = (0..log.joints())
+    let mut joints: Vec<JointAudit> = Joint::all(log.joints())
         .map(|joint| JointAudit::of(log, joint, &motions[joint]))
         .collect();
-    for joint in 0..log.joints() {
+    for joint in Joint::all(log.joints()) {
         let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
         joints[joint].torque_lag = torque_lag(&slow, &fast, joint, log.median_step());
         joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
@@ -73,11 +73,9 @@ pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
 
 impl JointAudit {
     /// All but the torque's lag and demand, which need the other joints as well.
-    fn of(log: &Log, joint: usize, motion: &Motion) -> Self {
-        let number = joint + 1;
+    fn of(log: &Log, joint: Joint, motion: &Motion) -> Self {
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
-        let channel =
-            |kind: &str, values, spikes| Channel::of(format!("{kind}{number}"), values, spikes);
+        let channel = |kind: &str, values, spikes| Channel::of(joint.name(kind), values, spikes);
         let q_channel = channel("q", q, isolated_spikes(q));
         let qd_channel = channel("qd", qd, 0);
         // A log too short for derivatives still has a speed: the logged one.
@@ -96,7 +94,7 @@ impl JointAudit {
         let (check, spikes) = velocity_check(motion, &qd_channel, range, log.median_step());
         let at_rest = speeds.iter().filter(|speed| **speed <= rest_rad_s).count();
         Self {
-            joint: number,
+            joint,
             velocity: check,
             torque_lag: None,
             torque_demand: None,

@@ -1,5 +1,6 @@
 //! The motion of one joint as its angles tell it.
 
+use crate::data::Joint;
 use crate::data::local_cubic::local_cubic;
 use crate::data::log::Log;
 
@@ -27,8 +28,8 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// Follows joint `joint` (from 0) through the log, smoothed over `half_width_s` on either side.
-    pub fn of(log: &Log, joint: usize, half_width_s: f64) -> Self {
+    /// Follows a joint through the log, smoothed over `half_width_s` on either side.
+    pub fn of(log: &Log, joint: Joint, half_width_s: f64) -> Self {
         let mut motion = Self {
             time: vec![],
             q: vec![],

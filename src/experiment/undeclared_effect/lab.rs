@@ -4,7 +4,7 @@ use super::{Case, Experiment, Outcome, Trial};
 use crate::control::Task;
 use crate::experiment::ExperimentError;
 use crate::files::beside_or_named;
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::plant::Plant;
 use crate::runs::RunFolder;
 use crate::train::Backend;
@@ -13,7 +13,7 @@ use crate::train::Backend;
 pub struct Lab {
     pub experiment: Experiment,
     pub library: Library,
-    pub declared: System,
+    pub declared: Model,
     pub task: Task,
     /// One for each case.
     pub plants: Vec<Plant>,
@@ -35,7 +35,7 @@ impl Lab {
         first_seed: u64,
     ) -> Result<Self, ExperimentError> {
         let model = beside_or_named(&experiment.path, &experiment.model);
-        let declared = library.system(&model)?;
+        let declared = library.model(&model)?;
         let task = Task::read(&beside_or_named(&experiment.path, &experiment.task))?;
         if task.system != declared.name {
             return Err(experiment.wrong(format!(

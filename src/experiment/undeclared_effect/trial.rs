@@ -6,7 +6,7 @@ use crate::closeloop::{
     Finding, Outcome, Request, Settings, Split, StudyError, Verdict, close_loop,
 };
 use crate::control::Predictor;
-use crate::data::Log;
+use crate::data::{Joint, Log};
 use crate::experiment::ExperimentError;
 use crate::mbrl::{Experience, Judge, Judged, Learner, Prior, RunError};
 use crate::model::Dynamics;
@@ -60,8 +60,7 @@ pub struct Closed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Named {
     pub name: String,
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     pub parameters: Vec<(String, f64)>,
 }
 
@@ -82,16 +81,14 @@ impl Closed {
         let parameter = |p: &crate::model::Parameter| (p.name.clone(), p.value);
         let named = |finding: &Finding| Named {
             name: finding.effect.title(),
-            joint: finding.effect.joint + 1,
+            joint: finding.effect.joint,
             parameters: finding.parameters.iter().map(parameter).collect(),
         };
-        let declared = outcome.models.after.declared.len();
         Self {
             episodes,
             verdict: outcome.verdict,
             effects: outcome.effects.findings.iter().map(named).collect(),
-            parameters: outcome.models.parameters[..declared]
-                .iter()
+            parameters: (outcome.models.after.absorbed().parameters.iter())
                 .map(parameter)
                 .collect(),
         }
@@ -122,7 +119,7 @@ impl Lab {
             })
         };
         let declared = self.predictor(self.declared());
-        let truth = self.predictor(self.plants[case].true_dynamics());
+        let truth = self.predictor(self.plants[case].dynamics());
         let mut scores = vec![score(Contestant::Declared, 0, &declared)?];
         let mut closed = Vec::new();
         let mut logs = Vec::new();
@@ -154,7 +151,7 @@ impl Lab {
     }
 
     fn declared(&self) -> Dynamics {
-        self.declared.dynamics(&self.declared.sign())
+        self.declared.dynamics()
     }
 
     fn predictor(&self, dynamics: Dynamics) -> Predictor {
@@ -209,6 +206,5 @@ impl Lab {
 
 /// The model that closing the loop gives.
 fn fitted(outcome: &Outcome) -> Dynamics {
-    let values = outcome.models.after.fit.values.iter().copied();
-    outcome.models.after.dynamics.clone().with_values(values)
+    outcome.models.after.dynamics()
 }

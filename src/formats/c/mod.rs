@@ -11,6 +11,7 @@ pub(super) use names::Names;
 
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
+use crate::data::Joint;
 use crate::expr::Notation;
 use crate::model::CommandFilter;
 use crate::sim::{Scheme, Stage};
@@ -167,11 +168,12 @@ fn memory(model: &ExportModel, names: &Names) -> String {
         return include_str!("memoryless.h").to_owned();
     }
     let of_joints = |kind: CommandFilter| {
-        let of_joint = |joint: usize| names.filter(model, joint, kind);
-        let each: Vec<String> = (0..model.joints()).map(of_joint).collect();
+        let of_joint = |joint: Joint| names.filter(model, joint, kind);
+        let each: Vec<String> = Joint::all(model.joints()).map(of_joint).collect();
         each.join(", ")
     };
-    let delays = (0..model.joints()).filter_map(|joint| model.filter(joint, CommandFilter::Delay));
+    let delays =
+        Joint::all(model.joints()).filter_map(|joint| model.filter(joint, CommandFilter::Delay));
     let longest = delays.fold(0.0, f64::max);
     let past = (HEADROOM * longest / model.step_s).ceil() + 2.0;
     include_str!("memory.h")

@@ -1,5 +1,6 @@
 use std::collections::HashMap;
 
+use crate::data::Joint;
 use crate::expr::{Notation, Part};
 use crate::formats::ExportModel;
 use crate::model::CommandFilter;
@@ -134,10 +135,15 @@ impl Names {
     pub fn new(model: &ExportModel) -> Self {
         let lower = prefix(model.name());
         let n = model.joints();
-        let moving = (0..n)
-            .map(|j| (format!("q{}", j + 1), format!("state[{j}]")))
-            .chain((0..n).map(|j| (format!("qd{}", j + 1), format!("state[{}]", n + j))))
-            .chain((0..n).map(|j| (format!("tau{}", j + 1), format!("torque[{j}]"))))
+        let of_joints = |stem: &'static str, member: &'static str, first: usize| {
+            Joint::all(n).map(move |joint| {
+                let place = first + joint.index();
+                (joint.name(stem), format!("{member}[{place}]"))
+            })
+        };
+        let moving = of_joints("q", "state", 0)
+            .chain(of_joints("qd", "state", n))
+            .chain(of_joints("tau", "torque", 0))
             .chain([("t".to_owned(), "time".to_owned())]);
         let held = model.equations.parameters.iter().map(|parameter| {
             let field = variable(&parameter.name);
@@ -162,7 +168,7 @@ impl Names {
     }
 
     /// The time constant of a joint's filter, or zero.
-    pub fn filter(&self, model: &ExportModel, joint: usize, kind: CommandFilter) -> String {
+    pub fn filter(&self, model: &ExportModel, joint: Joint, kind: CommandFilter) -> String {
         let parameter = model.filter_parameter(joint, kind);
         parameter.map_or_else(|| "0".to_owned(), |p| self.name(&p.name))
     }

@@ -16,6 +16,7 @@ use self::variables::Variable;
 use super::c::{Names, compile, compiler, header};
 use super::verify::{Client, ClientError, Predictions, PythonClient, Samples};
 use super::{ExportError, ExportModel, File, Format};
+use crate::data::Joint;
 use crate::model::CommandFilter;
 
 /// What is specific to one version of the standard.
@@ -103,7 +104,7 @@ fn version() -> std::process::Command {
 
 /// Whether past torques matter.
 fn delays(model: &ExportModel) -> bool {
-    (0..model.joints()).any(|joint| model.filter(joint, CommandFilter::Delay).is_some())
+    Joint::all(model.joints()).any(|joint| model.filter(joint, CommandFilter::Delay).is_some())
 }
 
 impl Standard {
@@ -150,11 +151,11 @@ fn code(model: &ExportModel, names: &Names, token: &str) -> String {
         .iter()
         .map(|p| format!("&data->parameters.{}", names.field(&p.name)));
     let addresses: Vec<String> = addresses.chain(["NULL".to_owned()]).collect();
-    let lag_state = |joint: usize| match lags.iter().position(|lag| *lag == joint) {
+    let lag_state = |joint: Joint| match lags.iter().position(|lag| *lag == joint) {
         Some(k) => (2 * n + k).to_string(),
         None => "-1".to_owned(),
     };
-    let each = |of: &dyn Fn(usize) -> String| (0..n).map(of).collect::<Vec<_>>().join(", ");
+    let each = |of: &dyn Fn(Joint) -> String| Joint::all(n).map(of).collect::<Vec<_>>().join(", ");
     let filled = include_str!("unit.h")
         .replace("@TOKEN@", token)
         .replace("@LAGS@", &lags.len().to_string())

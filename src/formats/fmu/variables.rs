@@ -1,3 +1,4 @@
+use crate::data::Joint;
 use crate::formats::ExportModel;
 use crate::formats::c::Names;
 use crate::model::CommandFilter;
@@ -28,10 +29,9 @@ pub(super) enum Role {
     },
 }
 
-/// Joints (counted from 0) whose torque follows its command with a lag.
-pub(super) fn lags(model: &ExportModel) -> Vec<usize> {
-    let joints = 0..model.joints();
-    joints
+/// Joints whose torque follows its command with a lag.
+pub(super) fn lags(model: &ExportModel) -> Vec<Joint> {
+    Joint::all(model.joints())
         .filter(|joint| model.filter(*joint, CommandFilter::Lag).is_some())
         .collect()
 }
@@ -45,7 +45,7 @@ pub(super) fn variables(model: &ExportModel, names: &Names) -> Vec<Variable> {
         role: Role::Time,
     };
     let torques =
-        (0..model.joints()).map(|joint| torque(model, joint, "", "commanded", Role::Input));
+        Joint::all(model.joints()).map(|joint| torque(model, joint, "", "commanded", Role::Input));
     let mut all: Vec<Variable> = [time].into_iter().chain(torques).collect();
     let first = all.len();
     let states = states(model);
@@ -59,14 +59,14 @@ pub(super) fn variables(model: &ExportModel, names: &Names) -> Vec<Variable> {
 }
 
 fn states(model: &ExportModel) -> Vec<Variable> {
-    let of_joint = |joint: usize, what: &str, per: &str| Variable {
-        name: format!("joint[{}].{what}", joint + 1),
-        about: format!("{what} of joint {}", joint + 1),
+    let of_joint = |joint: Joint, what: &str, per: &str| Variable {
+        name: format!("joint[{joint}].{what}"),
+        about: format!("{what} of joint {joint}"),
         unit: format!("{}{per}", model.units(joint)[0]),
         role: Role::State { output: true },
     };
-    let positions = (0..model.joints()).map(|joint| of_joint(joint, "position", ""));
-    let velocities = (0..model.joints()).map(|joint| of_joint(joint, "velocity", "/s"));
+    let positions = Joint::all(model.joints()).map(|joint| of_joint(joint, "position", ""));
+    let velocities = Joint::all(model.joints()).map(|joint| of_joint(joint, "velocity", "/s"));
     let lagged = lags(model).into_iter().map(|joint| {
         let role = Role::State { output: false };
         torque(model, joint, "lagged_", "that acts after the lag", role)
@@ -74,15 +74,15 @@ fn states(model: &ExportModel) -> Vec<Variable> {
     positions.chain(velocities).chain(lagged).collect()
 }
 
-fn torque(model: &ExportModel, joint: usize, prefix: &str, about: &str, role: Role) -> Variable {
+fn torque(model: &ExportModel, joint: Joint, prefix: &str, about: &str, role: Role) -> Variable {
     let what = if model.system.prismatic[joint] {
         "force"
     } else {
         "torque"
     };
     Variable {
-        name: format!("joint[{}].{prefix}{what}", joint + 1),
-        about: format!("{what} on joint {} {about}", joint + 1),
+        name: format!("joint[{joint}].{prefix}{what}"),
+        about: format!("{what} on joint {joint} {about}"),
         unit: model.units(joint)[1].into(),
         role,
     }

@@ -66,6 +66,7 @@ impl SavedModel {
             program: self.equations.program()?,
             parameters: values.map(|(p, value)| p.restore(*value)).collect(),
             reading: None,
+            own: Vec::new(),
         };
         let networks = numbers.prior.iter().chain(&numbers.residual);
         ReferenceModel::new(equations, networks, self.integrator, self.step_s)
@@ -77,9 +78,8 @@ impl Equations {
     fn filters(&self, parameters: &[&str]) -> Result<Vec<Filter>, String> {
         let filter = |saved: &SavedFilter| {
             let parameter = parameters.iter().position(|name| *name == saved.parameter);
-            let joint = saved.joint.checked_sub(1);
             Ok(Filter {
-                joint: joint.ok_or("joints are counted from 1")?,
+                joint: saved.joint,
                 kind: saved.kind,
                 parameter: parameter.ok_or_else(|| format!("no parameter {}", saved.parameter))?,
             })

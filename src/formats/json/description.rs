@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::data::Joint;
 use crate::expr::{Op, Program};
 use crate::formats::discrete_filter::DiscreteFilter;
 use crate::formats::{ExportModel, ExportedEffect};
@@ -72,8 +73,7 @@ struct Equations {
 /// A delay or lag of one joint's command.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct SavedFilter {
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     pub kind: CommandFilter,
     /// The parameter that is its time constant, in s.
     pub parameter: String,
@@ -112,7 +112,7 @@ impl Equations {
             effects: model.effects.clone(),
             filters: (equations.filters.iter())
                 .map(|filter| SavedFilter {
-                    joint: filter.joint + 1,
+                    joint: filter.joint,
                     kind: filter.kind,
                     parameter: equations.parameters[filter.parameter].name.clone(),
                 })

@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::description::{Description, VERSION};
 use crate::model::weights::from_bytes;
 use crate::model::{
-    Effect, FileError, ModelShape, ModelWeights, Parameter, SavedModelError, System,
+    Effect, FileError, Model, ModelShape, ModelWeights, Parameter, SavedModelError,
 };
 
 /// A model read back from its two files.
@@ -16,7 +16,7 @@ use crate::model::{
 pub struct Imported {
     pub(crate) description: Description,
     /// What its model file says.
-    pub system: System,
+    pub system: Model,
     /// Values of the parameters, and the networks.
     pub numbers: ModelWeights,
 }
@@ -74,8 +74,8 @@ impl Imported {
         let shape = &description.shape;
         let file = description.weights.to_string_lossy();
         let numbers = from_bytes(shape, &bytes, &file, folder)?;
-        let system = System::from_text(path, &description.model_toml, effects)?;
-        let dynamics = system.dynamics(&system.sign());
+        let system = Model::from_text(path, &description.model_toml, effects)?;
+        let dynamics = system.dynamics();
         check(path, shape, &dynamics.parameters)?;
         Ok(Self {
             description,

@@ -14,6 +14,7 @@ use serde_json::json;
 use super::discrete_filter::DiscreteFilter;
 use super::verify::{Client, PythonClient};
 use super::{ExportError, ExportModel, File, Format};
+use crate::data::Joint;
 use builder::Builder;
 use derivative::Derivative;
 use proto::{Graph, Model, OperatorSet, Property};
@@ -109,11 +110,11 @@ fn packed(model: &ExportModel, graph: Graph) -> Vec<u8> {
     let parameters: Vec<_> = (model.equations.parameters.iter())
         .map(|p| json!({"name": p.name, "value": p.value, "unit": p.unit, "ci95": p.ci95}))
         .collect();
-    let units: Vec<_> = (0..model.joints())
+    let units: Vec<_> = Joint::all(model.joints())
         .map(|joint| model.units(joint))
         .collect();
     let memory: Vec<_> = (DiscreteFilter::all(model).iter())
-        .map(|f| json!({"joint": f.joint + 1, "past_torques": f.past, "lagged_torque": f.lags}))
+        .map(|f| json!({"joint": f.joint, "past_torques": f.past, "lagged_torque": f.lags}))
         .collect();
     let json = |value: serde_json::Value| value.to_string();
     let message = Model {

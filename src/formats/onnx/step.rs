@@ -3,6 +3,7 @@
 use super::builder::{Builder, Value};
 use super::derivative::Derivative;
 use super::proto::Graph;
+use crate::data::Joint;
 use crate::formats::ExportModel;
 use crate::formats::discrete_filter::{Combination, DiscreteFilter};
 use crate::sim::Scheme;
@@ -17,7 +18,9 @@ pub struct Inputs {
 
 pub fn inputs(builder: &mut Builder, model: &ExportModel, torque: &str) -> Inputs {
     let n = model.joints();
-    let units: Vec<_> = (0..n).map(|joint| model.units(joint).join(", ")).collect();
+    let units: Vec<_> = Joint::all(n)
+        .map(|joint| model.units(joint).join(", "))
+        .collect();
     let about = format!("of joints in {}", units.join("; "));
     let state = builder.input(
         "state",

@@ -13,6 +13,7 @@ use super::discrete_filter::{Combination, DiscreteFilter};
 use super::verify::{Client, PythonClient};
 use super::{ExportError, ExportModel, File, Format};
 use crate::control::Task;
+use crate::data::Joint;
 use crate::expr::Program;
 use crate::model::{Angles, MlpWeights, ResidualOn};
 use crate::sim::Scheme;
@@ -87,14 +88,8 @@ fn module(model: &ExportModel, task: Option<&Task>) -> String {
 
 fn head(model: &ExportModel) -> String {
     let n = model.joints();
-    let units: Vec<String> = (0..n)
-        .map(|joint| {
-            format!(
-                "joint {} in {}",
-                joint + 1,
-                model.units(joint).join(" and ")
-            )
-        })
+    let units: Vec<String> = Joint::all(n)
+        .map(|joint| format!("joint {joint} in {}", model.units(joint).join(" and ")))
         .collect();
     let about = json!(model.system.about).to_string();
     let provenance = json!(model.provenance().to_string());
@@ -193,7 +188,7 @@ fn filters(out: &mut String, model: &ExportModel) {
         let _ = writeln!(
             out,
             "    {{\"joint\": {}, \"past\": {}, \"lags\": {}, \"places\": {:?}, \"mean\": [{}], \"end\": {}}},",
-            filter.joint,
+            filter.joint.index(),
             filter.past,
             if filter.lags { "True" } else { "False" },
             filter.places,

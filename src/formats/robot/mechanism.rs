@@ -6,7 +6,7 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::expr::SignForm;
+use crate::data;
 use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
 use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
 use crate::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
@@ -107,8 +107,8 @@ impl Mechanism {
                 .map_or(0.0, |p| p.value)
         };
         let values: Vec<f64> = effect.parameters.iter().map(value).collect();
-        let k = effect.joint - 1;
-        let (joint, drive) = (&mut self.joints[k], &mut self.drives[k]);
+        let (joints, drives) = (&mut self.joints, &mut self.drives);
+        let (joint, drive) = (&mut joints[effect.joint], &mut drives[effect.joint]);
         match (effect.name.as_str(), &values[..]) {
             ("viscous_friction", [b]) => joint.drivetrain.damping += b,
             ("coulomb_friction", [level]) => joint.drivetrain.friction += level,
@@ -135,11 +135,10 @@ impl Mechanism {
 
     /// Refuse a constant torque beside a limit: there it is added before the limit, in the model after it.
     fn note_conflicts(&mut self) {
-        for (k, drive) in self.drives.iter_mut().enumerate() {
+        for (joint, drive) in data::Joint::all(self.joints.len()).zip(&mut self.drives) {
             if drive.limit.is_some() && drive.constant != 0.0 {
                 self.not_carried.push(format!(
-                    "constant_torque on joint {}, beside the limit of its drive",
-                    k + 1
+                    "constant_torque on joint {joint}, beside the limit of its drive"
                 ));
                 drive.constant = 0.0;
             }
@@ -209,11 +208,7 @@ fn at_zero(joint: &Joint) -> Pose {
 
 /// For each joint the velocity (rad/s or m/s) over which dry friction reverses; 0 where it jumps.
 pub(in crate::formats) fn friction_widths(model: &ExportModel) -> String {
-    let widths = model.system.sign().into_iter().map(|sign| match sign {
-        SignForm::Exact => 0.0,
-        SignForm::Smooth { width } => width,
-    });
-    numbers(widths)
+    numbers(model.system.sign_widths())
 }
 
 /// Numbers to 15 digits, separated by blanks; rounding errors about zero become zero.

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::equations::{Column, Kind};
 use super::series::{Wave, rounded};
+use crate::data::Joint;
 
 /// Least part of a column that is independent of the others, relative to its length.
 const INDEPENDENT: f64 = 1e-10;
@@ -18,7 +19,7 @@ pub(super) struct Base {
     /// Of the combination.
     pub value: f64,
     /// The other parameters: factor, kind and joint.
-    pub others: Vec<(f64, Kind, usize)>,
+    pub others: Vec<(f64, Kind, Joint)>,
 }
 
 impl Base {

@@ -7,6 +7,7 @@ use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
 
 use super::body::Joint;
 use super::series::{Series, Wave};
+use crate::data;
 
 /// A vector of functions.
 type Vector = [Series; 3];
@@ -42,7 +43,7 @@ const OF_TURNING: [Kind; 10] = [
 pub(super) struct Column {
     pub kind: Kind,
     /// Counted from 0.
-    pub joint: usize,
+    pub joint: data::Joint,
     pub value: f64,
     pub mass: Vec<Vec<Series>>,
     /// Potential energy per m/s^2 of gravity, without its constant.
@@ -103,7 +104,7 @@ pub(super) fn columns(joints: &[Joint], gravity: &Vector3<f64>) -> Vec<Column> {
     columns.extend(joints.iter().enumerate().map(|(k, joint)| Column {
         mass: rotor(joints.len(), k),
         kind: Kind::Rotor,
-        joint: k,
+        joint: data::Joint::at(k),
         value: Kind::Rotor.value(joint),
         potential: Series::default(),
     }));
@@ -192,7 +193,7 @@ impl Frame {
         };
         Column {
             kind,
-            joint: k,
+            joint: data::Joint::at(k),
             value: kind.value(joint),
             mass: (0..n).map(row).collect(),
             potential: potential.without_constant(),

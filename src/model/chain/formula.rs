@@ -1,6 +1,7 @@
 //! Sums of parameters times functions, as formulas of a model file.
 
 use super::series::{Series, Wave};
+use crate::data::Joint;
 
 /// A sum over parameters, each with its name and its coefficient.
 pub(super) fn sum(terms: &[(&str, &Series)]) -> String {
@@ -80,10 +81,11 @@ fn scaled(factor: f64, factors: &[String]) -> String {
 
 /// `q1^2`, `cos(q2 + q3)`.
 fn wave_factors(wave: &Wave) -> Vec<String> {
+    let coordinate = |j: usize| Joint::at(j).name("q");
     let power = |(j, power): (usize, &u8)| match power {
         0 => None,
-        1 => Some(format!("q{}", j + 1)),
-        _ => Some(format!("q{}^{power}", j + 1)),
+        1 => Some(coordinate(j)),
+        _ => Some(format!("{}^{power}", coordinate(j))),
     };
     let mut factors: Vec<String> = wave.powers.iter().enumerate().filter_map(power).collect();
     let mut angle = String::new();
@@ -93,10 +95,7 @@ fn wave_factors(wave: &Wave) -> Vec<String> {
         .enumerate()
         .filter(|(_, times)| **times != 0)
     {
-        join(
-            &mut angle,
-            &scaled(f64::from(*times), &[format!("q{}", j + 1)]),
-        );
+        join(&mut angle, &scaled(f64::from(*times), &[coordinate(j)]));
     }
     if !angle.is_empty() {
         factors.push(format!(

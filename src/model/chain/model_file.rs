@@ -7,6 +7,7 @@ use super::body::{Chain, Joint};
 use super::equations::{Kind, Lengths, columns};
 use super::formula::{factors, join, number, sum};
 use super::series::{Series, rounded};
+use crate::data;
 
 /// Lines of formulas are broken beyond this many characters.
 const WIDTH: usize = 110;
@@ -40,8 +41,13 @@ pub fn model_text(chain: &Chain) -> String {
 }
 
 /// `zz_1`
-fn name(kind: Kind, joint: usize) -> String {
-    format!("{}_{}", kind.stem(), joint + 1)
+fn name(kind: Kind, joint: data::Joint) -> String {
+    format!("{}_{joint}", kind.stem())
+}
+
+/// The joints of a chain with their numbers.
+fn numbered(chain: &Chain) -> impl Iterator<Item = (data::Joint, &Joint)> {
+    data::Joint::all(chain.joints.len()).zip(&chain.joints)
 }
 
 /// A TOML string.
@@ -67,12 +73,11 @@ impl Equations<'_> {
         let mut text = "# In the frame of each joint k, whose z is its axis: m_k mass, mx_k.. mass times centre of mass, xx_k.. inertia\n\
             # tensor of what moves with it up to the next joint, J_k inertia of its rotor.\n"
             .to_owned();
-        for (k, joint) in chain.joints.iter().enumerate() {
+        for (number, joint) in numbered(chain) {
             let does = if joint.slides { "slides" } else { "turns" };
             let _ = writeln!(
                 text,
-                "# joint {} ({}) {does} {}: z is {}, x is {} of its frame",
-                k + 1,
+                "# joint {number} ({}) {does} {}: z is {}, x is {} of its frame",
                 joint.name,
                 joint.body,
                 direction(&joint.axis),
@@ -89,9 +94,9 @@ impl Equations<'_> {
             quoted(ABOUT),
             self.joints()
         );
-        let slides: Vec<String> = (chain.joints.iter().enumerate())
+        let slides: Vec<String> = numbered(chain)
             .filter(|(_, joint)| joint.slides)
-            .map(|(k, _)| (k + 1).to_string())
+            .map(|(number, _)| number.to_string())
             .collect();
         if !slides.is_empty() {
             let _ = writeln!(text, "prismatic = [{}]", slides.join(", "));
@@ -245,15 +250,16 @@ impl Equations<'_> {
 
 /// `M12`
 fn mass_name(i: usize, j: usize) -> String {
-    format!("M{}{}", i + 1, j + 1)
+    format!("M{}{}", data::Joint::at(i), data::Joint::at(j))
 }
 
 /// `qd1^2`, `qd1*qd2`
 fn speeds(j: usize, k: usize) -> String {
+    let speed = |k: usize| data::Joint::at(k).name("qd");
     if j == k {
-        format!("qd{}^2", j + 1)
+        format!("{}^2", speed(j))
     } else {
-        format!("qd{}*qd{}", j + 1, k + 1)
+        format!("{}*{}", speed(j), speed(k))
     }
 }
 
@@ -343,9 +349,9 @@ fn about(base: &Base, joint: &Joint) -> String {
 /// Drivetrains as effects.
 fn effects(chain: &Chain, rotors: &[Base]) -> String {
     let mut text = String::new();
-    for (k, joint) in chain.joints.iter().enumerate() {
+    for (number, joint) in numbered(chain) {
         let mut effect = |name: &str, values: &[(&str, f64)]| {
-            let _ = write!(text, "\n[[effect]]\nname = \"{name}\"\njoint = {}\n", k + 1);
+            let _ = write!(text, "\n[[effect]]\nname = \"{name}\"\njoint = {number}\n");
             for (parameter, value) in values {
                 let _ = writeln!(text, "{parameter} = {value:?}");
             }
@@ -362,7 +368,7 @@ fn effects(chain: &Chain, rotors: &[Base]) -> String {
                 &[("k", spring.stiffness), ("q_0", spring.rest)],
             );
         }
-        if let Some(rotor) = rotors.iter().find(|rotor| rotor.column.joint == k) {
+        if let Some(rotor) = rotors.iter().find(|rotor| rotor.column.joint == number) {
             effect("rotor_inertia", &[("J", rounded(rotor.value))]);
         }
         if let Some(effort) = joint.drivetrain.effort {

@@ -2,7 +2,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use super::{SETTINGS, rng};
-use crate::expr::SignForm;
+use crate::data::Joint;
 use crate::lanes::Row;
 use crate::model::{Dynamics, FittedEffect, Library};
 use crate::plan::{Cem, Icem, Method, Mppi, Objective, Planner, Settings, Start};
@@ -10,8 +10,8 @@ use crate::sim::batch::Rollouts;
 use crate::sim::{Commands, Environment, Hold, Integrator, RK4, Simulator};
 
 fn pendulum(effects: &[FittedEffect]) -> Dynamics {
-    let system = Library::built_in().system(Path::new("pendulum")).unwrap();
-    system.dynamics_with(effects, &[SignForm::DEFAULT])
+    let system = Library::built_in().model(Path::new("pendulum")).unwrap();
+    system.with_effects(effects.to_vec()).dynamics()
 }
 
 fn swing_up(method: Method) -> Settings {
@@ -92,7 +92,7 @@ fn swung_up_late(rig: &Dynamics, model: &Dynamics) -> f64 {
 #[test]
 fn a_pendulum_is_swung_up_through_a_delay() {
     let library = Library::built_in();
-    let mut effect = FittedEffect::absent(library.effect("actuator_delay").unwrap(), 0);
+    let mut effect = FittedEffect::absent(library.effect("actuator_delay").unwrap(), Joint::at(0));
     effect.values[0].0 = 0.06;
     let late = pendulum(&[effect]);
     let [knows, does_not] = [&late, &pendulum(&[])].map(|model| swung_up_late(&late, model));

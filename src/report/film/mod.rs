@@ -7,6 +7,7 @@ use self::animation::{Animation, Chain, animation};
 use self::strips::{Strip, StripLine};
 use super::plot::{PlotError, Quantity};
 use crate::control::{Episode, Meter, Task};
+use crate::data::Joint;
 use crate::expr::FormulaError;
 
 /// An episode to watch, as SVG text; none for a task without a figure.
@@ -27,9 +28,9 @@ pub fn film(task: &Task, episode: &Episode, title: &str) -> Result<Option<String
         .log
         .tau
         .iter()
-        .enumerate()
-        .map(|(j, tau)| StripLine {
-            label: format!("joint {}", j + 1),
+        .zip(Joint::all(task.joints()))
+        .map(|(tau, joint)| StripLine {
+            label: format!("joint {joint}"),
             values: tau.clone(),
         });
     let last = episode.rewards.last().copied();

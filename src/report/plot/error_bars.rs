@@ -10,6 +10,7 @@ use super::legend::{Entry, Sample, begin};
 use super::scale::{Range, three_digits};
 use super::style::{MARGIN, Role, Stroke, TEXT_SIZE, WIDTH};
 use super::{JointKind, PlotError};
+use crate::data::Joint;
 
 const BAR_PX: f64 = 15.0;
 const BAR_PITCH_PX: f64 = 18.0;
@@ -26,8 +27,7 @@ const QUANTITY: &str = "position error, RMS";
 /// Position errors of one joint at one horizon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorRow {
-    /// Number of the joint, from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// How the joint moves.
     pub kind: JointKind,
     /// How far ahead the models predict.
@@ -51,7 +51,7 @@ pub struct Bar {
 /// An error that is not finite is written out as diverged.
 pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
     let (mut canvas, mut top) = begin(title, rows, entries)?;
-    let mut joints: Vec<usize> = Vec::new();
+    let mut joints: Vec<Joint> = Vec::new();
     for row in rows {
         if !joints.contains(&row.joint) {
             joints.push(row.joint);
@@ -194,6 +194,7 @@ fn readable(error: f64, unit: &str) -> (f64, String) {
 #[cfg(test)]
 mod tests {
     use super::{Bar, ErrorRow, error_bars};
+    use crate::data::Joint;
     use crate::report::plot::{JointKind, PlotError, Role};
 
     fn row(before: f64, after: Option<f64>) -> ErrorRow {
@@ -204,7 +205,7 @@ mod tests {
         };
         let before = bar(Role::Before, "before", before);
         ErrorRow {
-            joint: 1,
+            joint: Joint::at(0),
             kind: JointKind::Revolute,
             horizon_s: 0.5,
             bars: std::iter::once(before)

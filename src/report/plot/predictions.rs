@@ -7,6 +7,7 @@ use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, START_MARK_PX, WIDTH};
 use super::{JointKind, PlotError};
+use crate::data::Joint;
 
 /// About two points for each column of pixels: more cannot be seen.
 const MAX_TRACK_POINTS: usize = 4000;
@@ -31,8 +32,7 @@ pub struct Track {
 /// The curves of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Number of the joint, from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// How the joint moves.
     pub kind: JointKind,
     /// Its curves, in any order.
@@ -196,6 +196,7 @@ fn visible_lines(track: &Track, frame: &Frame) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::{Panel, Track, predictions};
+    use crate::data::Joint;
     use crate::report::plot::{JointKind, PlotError, Role};
 
     fn panel(role: Role, points: Vec<(f64, f64)>) -> Panel {
@@ -207,7 +208,7 @@ mod tests {
             segments,
         }];
         Panel {
-            joint: 1,
+            joint: Joint::at(0),
             kind: JointKind::Revolute,
             tracks,
         }

@@ -8,6 +8,7 @@ use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, WIDTH};
 use super::{JointKind, PlotError};
+use crate::data::Joint;
 
 /// Enough to show the cloud; a curve stands in front of it.
 const MAX_CLOUD_POINTS: usize = 1500;
@@ -50,8 +51,7 @@ pub struct ShapeModel {
 /// The residual forces of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapePanel {
-    /// Number of the joint, from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// How the joint moves.
     pub kind: JointKind,
     /// The models, from the back to the front.
@@ -212,11 +212,12 @@ fn with_curve(inner: SVG, frame: &Frame, role: Role, curve: &ShapeCurve) -> SVG 
 #[cfg(test)]
 mod tests {
     use super::{ShapeCurve, ShapeModel, ShapePanel, ShapeSample, residual_shape};
+    use crate::data::Joint;
     use crate::report::plot::{JointKind, PlotError, Role};
 
     fn panel(samples: Vec<ShapeSample>) -> ShapePanel {
         ShapePanel {
-            joint: 1,
+            joint: Joint::at(0),
             kind: JointKind::Revolute,
             models: vec![ShapeModel {
                 role: Role::Before,

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Rollouts, Rows, W};
-use crate::expr::SignForm;
+use crate::data::Joint;
 use crate::lanes::Row;
 use crate::model::{
     Angles, Dynamics, FittedEffect, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
@@ -17,8 +17,8 @@ const STEP_S: f64 = 0.02;
 const STEPS: usize = 12;
 
 fn equations(name: &str) -> Dynamics {
-    let system = Library::built_in().system(Path::new(name)).unwrap();
-    system.dynamics(&vec![SignForm::DEFAULT; system.joints])
+    let system = Library::built_in().model(Path::new(name)).unwrap();
+    system.dynamics()
 }
 
 fn network(joints: usize, angles: Angles, on: ResidualOn) -> MlpWeights {
@@ -156,16 +156,16 @@ type Filter = (&'static str, usize, f64);
 /// A system with these filters.
 fn filtered(name: &str, filters: &[Filter]) -> Dynamics {
     let library = Library::built_in();
-    let system = library.system(Path::new(name)).unwrap();
+    let system = library.model(Path::new(name)).unwrap();
     let effects: Vec<_> = filters
         .iter()
         .map(|(name, joint, value)| {
-            let mut effect = FittedEffect::absent(library.effect(name).unwrap(), *joint);
+            let mut effect = FittedEffect::absent(library.effect(name).unwrap(), Joint::at(*joint));
             effect.values[0].0 = *value;
             effect
         })
         .collect();
-    system.dynamics_with(&effects, &vec![SignForm::DEFAULT; system.joints])
+    system.with_effects(effects).dynamics()
 }
 
 fn filtered_rollouts(equations: &Dynamics, objective: &Objective) -> Rollouts {

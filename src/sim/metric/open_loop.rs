@@ -20,21 +20,16 @@ const STEP_TOLERANCE: f64 = 1e-3;
 /// Substeps are halved down to this, in s.
 const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
 
-/// The open-loop error of `dynamics` with parameters `values` on `logs`. `values` may differ by log (own
-/// sensor offsets, say): it is asked for each.
+/// The open-loop error of `dynamics` on `logs`, with the values that each log has of its own.
 ///
 /// Windows start every half horizon and last one; their start states come from the log alone. The
 /// logged torque is held over each step.
-pub fn assess<'v>(
-    dynamics: &Dynamics,
-    values: impl Fn(usize) -> &'v [f64] + Sync,
-    logs: &[Log],
-    horizons_s: &[f64],
-) -> Assessment {
+pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessment {
+    let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
     let mut step_s = PREDICTION_S;
-    let mut coarse = run(dynamics, &values, logs, horizons_s, step_s);
+    let mut coarse = run(&models, logs, horizons_s, step_s);
     loop {
-        let fine = run(dynamics, &values, logs, horizons_s, step_s / 2.0);
+        let fine = run(&models, logs, horizons_s, step_s / 2.0);
         let step_error = largest_change(&coarse, &fine, dynamics.joints);
         if step_error <= STEP_TOLERANCE || step_s / 2.0 <= SHORTEST_STEP_S {
             return Assessment {
@@ -48,15 +43,15 @@ pub fn assess<'v>(
     }
 }
 
-fn run<'v>(
-    dynamics: &Dynamics,
-    values: &(impl Fn(usize) -> &'v [f64] + Sync),
+/// `models` gives the model in each log.
+fn run(
+    models: &[Cow<'_, Dynamics>],
     logs: &[Log],
     horizons_s: &[f64],
     step_s: f64,
 ) -> Vec<OpenLoop> {
-    let replays: Vec<Replay<'_>> = (logs.iter().enumerate())
-        .map(|(index, log)| Replay::new(Point::new(dynamics, values(index)), log))
+    let replays: Vec<Replay<'_>> = (models.iter().zip(logs))
+        .map(|(model, log)| Replay::new(Point::from(&**model), log))
         .collect();
     let one = |&horizon_s: &f64| {
         let windows: Vec<Window> = logs

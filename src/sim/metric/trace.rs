@@ -13,8 +13,9 @@ pub struct Trace {
 }
 
 /// Consecutive predictions of `horizon_s` seconds along a log, each started from the log, for pictures.
-pub fn traces(dynamics: &Dynamics, values: &[f64], log: &Log, horizon_s: f64) -> Vec<Trace> {
-    let model = Point::new(dynamics, values);
+pub fn traces(dynamics: &Dynamics, log: &Log, horizon_s: f64) -> Vec<Trace> {
+    let in_log = dynamics.in_log(log);
+    let model = Point::from(&*in_log);
     let commands = Commands::of_log(&model, log);
     let own = with_own_angles(&model, log);
     // The windows of the error overlap by half: every second one covers the log once.

@@ -1,9 +1,8 @@
 use serde_json::{Value, json};
 
 use super::{Kind, Material, Recipe, RecipeError};
-use crate::expr::SignForm;
 use crate::files::{beside_or_named, content_id, text_or_embedded};
-use crate::model::{Dynamics, LastLayer, Library, MlpSettings, MlpWeights, Origin, System};
+use crate::model::{Dynamics, LastLayer, Library, MlpSettings, MlpWeights, Model, Origin};
 use crate::runs::{Identity, Purpose, RunFolder, stream};
 use crate::train::{Backend, Checkpoint, HybridModel, Training};
 
@@ -24,7 +23,7 @@ const COMMAND_LINE: &str = "command_line";
 
 /// A model file: its system and its text.
 pub(super) struct Declared {
-    pub system: System,
+    pub system: Model,
     pub text: String,
 }
 
@@ -40,7 +39,7 @@ impl Job {
         seed: u64,
     ) -> Result<Self, RecipeError> {
         let Declared { system, text } = declared(&recipe, library)?;
-        let mut dynamics = equations(&system);
+        let mut dynamics = system.dynamics();
         recipe.set_parameters(&mut dynamics)?;
         let material = Material::gather(&recipe, &system, library, seed)?;
         let last = recipe.kind.last_layer();
@@ -120,7 +119,7 @@ fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
 
 pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, RecipeError> {
     let path = beside_or_named(&recipe.path, &recipe.model);
-    let system = library.system(&path)?;
+    let system = library.model(&path)?;
     let text = text_or_embedded(&path, Library::system_text)
         .map_err(|source| RecipeError::Open { path, source })?;
     Ok(Declared {
@@ -129,13 +128,9 @@ pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, R
     })
 }
 
-pub(super) fn equations(system: &System) -> Dynamics {
-    system.dynamics(&vec![SignForm::DEFAULT; system.joints])
-}
-
 pub(super) fn new_network(
     recipe: &Recipe,
-    system: &System,
+    system: &Model,
     material: &Material,
     seed: u64,
     last: LastLayer,

@@ -1,11 +1,10 @@
 use std::path::PathBuf;
 
 use super::data::{Data, Logged, Simulated};
-use super::job::equations;
 use super::{Kind, Recipe, RecipeError};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::files::{beside, beside_or_named};
-use crate::model::{Library, System};
+use crate::model::{Library, Model};
 use crate::plant::Plant;
 use crate::runs::{Purpose, stream};
 use crate::sim::as_modelled;
@@ -29,7 +28,7 @@ impl Material {
     /// Unreadable logs, logs that are too short, another number of joints, or a plant that diverges.
     pub fn gather(
         recipe: &Recipe,
-        system: &System,
+        system: &Model,
         library: &Library,
         seed: u64,
     ) -> Result<Self, RecipeError> {
@@ -40,7 +39,7 @@ impl Material {
     }
 }
 
-fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Material, RecipeError> {
+fn from_logs(recipe: &Recipe, logged: &Logged, system: &Model) -> Result<Material, RecipeError> {
     let read =
         |path: &PathBuf| Log::read(beside(&recipe.path, path), system.joints, &system.columns);
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
@@ -48,7 +47,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
         step_s: logged.step_s,
         length_s: f64::INFINITY,
     };
-    let dynamics = equations(system);
+    let dynamics = system.dynamics();
     let modelled = |log: &Log| match recipe.kind {
         // A network alone has no effects: it learns from the commanded torques and the sensor readings.
         Kind::DataDriven => log.clone(),
@@ -84,7 +83,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &System) -> Result<Materi
 fn from_plant(
     recipe: &Recipe,
     simulated: &Simulated,
-    system: &System,
+    system: &Model,
     library: &Library,
     seed: u64,
 ) -> Result<Material, RecipeError> {

@@ -2,9 +2,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use super::job::{declared, equations, new_network};
+use super::job::{declared, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
-use crate::model::{LastLayer, Library, Origin, System};
+use crate::model::{LastLayer, Library, Model, Origin};
 use crate::train::{Backend, Checkpoint};
 
 impl Job {
@@ -31,7 +31,7 @@ impl Job {
             ));
         }
         // Only to refuse a checkpoint of another system: the equations are those saved with the weights.
-        let meant = equations(&declared(&recipe, library)?.system);
+        let meant = declared(&recipe, library)?.system.dynamics();
         let refused = |source| RecipeError::OtherModel {
             path: recipe.path.clone(),
             source: Box::new(source),
@@ -66,7 +66,7 @@ fn tuned(
     seed: u64,
 ) -> Result<Job, RecipeError> {
     let system = beside(checkpoint, library)?;
-    let dynamics = equations(&system);
+    let dynamics = system.dynamics();
     let prior = checkpoint.model(&dynamics, &backend.device())?;
     let material = Material::gather(&recipe, &system, library, seed)?;
     let residual = || new_network(&recipe, &system, &material, seed, LastLayer::Zero);
@@ -96,9 +96,9 @@ fn tuned(
     })
 }
 
-fn beside(checkpoint: &Checkpoint, library: &Library) -> Result<System, RecipeError> {
+fn beside(checkpoint: &Checkpoint, library: &Library) -> Result<Model, RecipeError> {
     let name = Path::new("the checkpoint's model.toml");
-    Ok(System::from_text(
+    Ok(Model::from_text(
         name,
         &checkpoint.model_toml,
         library.effects(),

@@ -2,15 +2,14 @@ use std::path::Path;
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::expr::SignForm;
 use crate::model::Library;
 use crate::sim::{Environment, Integrator};
 use crate::train::{Backend, HybridModel};
 
 #[test]
 fn an_environment_steps_as_training_does() {
-    let system = Library::built_in().system(Path::new("acrobot")).unwrap();
-    let dynamics = system.dynamics(&[SignForm::DEFAULT; 2]);
+    let system = Library::built_in().model(Path::new("acrobot")).unwrap();
+    let dynamics = system.dynamics();
     let device = Backend::NdArray.device();
     let model = HybridModel::physics(&dynamics, &device).unwrap();
     let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);

@@ -8,7 +8,6 @@ use burn::tensor::{Device, Gradients};
 use rand::RngExt;
 
 use super::{hybrid, one_joint, parameter, rng, transitions};
-use crate::expr::SignForm;
 use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
 use crate::train::hybrid::{PRIOR_ID, RESIDUAL_ID};
@@ -38,8 +37,8 @@ pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
 /// The library's equations, one of their parameters held.
 pub(super) fn equations(joints: usize) -> Dynamics {
     let name = ["pendulum", "acrobot"][joints - 1];
-    let system = Library::built_in().system(Path::new(name)).unwrap();
-    let mut dynamics = system.dynamics(&vec![SignForm::DEFAULT; joints]);
+    let system = Library::built_in().model(Path::new(name)).unwrap();
+    let mut dynamics = system.dynamics();
     dynamics.parameters[1].fixed = true;
     dynamics
 }

@@ -54,6 +54,7 @@ pub(super) fn one_joint(formula: &str, parameters: Vec<Parameter>) -> Dynamics {
         program: graph.finish(&[velocity, acceleration]),
         filters: Vec::new(),
         reading: None,
+        own: Vec::new(),
     }
 }
 

@@ -5,7 +5,7 @@ use burn::tensor::{Tensor, TensorData};
 use rand::RngExt;
 
 use super::{pendulum, rng, transitions};
-use crate::expr::{Program, SignForm};
+use crate::expr::Program;
 use crate::lanes::Row;
 use crate::model::{
     Angles, Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn,
@@ -117,8 +117,8 @@ fn tensors_and_the_written_out_program_agree() {
 
 #[test]
 fn two_joints_agree_too() {
-    let acrobot = Library::built_in().system(Path::new("acrobot")).unwrap();
-    let acrobot = acrobot.dynamics(&[SignForm::Exact; 2]);
+    let acrobot = Library::built_in().model(Path::new("acrobot")).unwrap();
+    let acrobot = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
     let mut rng = rng(12);
     // Positions, velocities, inputs of each row.
     let rows: Vec<[f32; 6]> = (0..ROWS)

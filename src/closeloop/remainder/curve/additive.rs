@@ -56,7 +56,8 @@ impl Additive {
         })
     }
 
-    /// The force at a value of the k-th variable, the others' shares taken off, and the half width of its 95 % band.
+    /// The force at a value of the k-th variable, without the shares of the others, and the half width of its 95 %
+    /// confidence band.
     pub fn at(&self, k: usize, basis: &Basis, x: f64) -> (f64, f64) {
         let mut row = DVector::zeros(self.coefficients.len());
         row[0] = 1.0;
@@ -122,7 +123,7 @@ impl Sums {
     }
 }
 
-/// The penalty of each variable that predicts stretches best that it was not fitted to, tried one after the other.
+/// The penalty of each variable that predicts left-out stretches best, by coordinate search.
 fn smoothness(
     parts: &[Sums],
     variables: usize,
@@ -167,8 +168,8 @@ fn smoothness(
     Some(penalty(&powers, rows))
 }
 
-/// Squared second differences of neighbouring coefficients. A trace of their squares is added: it holds what the
-/// data leave open, and where the penalty is large it takes away slopes as well.
+/// Squared second differences of neighbouring coefficients. A small multiple of their squares is added: it holds the
+/// directions that the data do not determine, and where the penalty is large it removes slopes as well.
 fn penalty(powers: &[i32], rows: usize) -> DMatrix<f64> {
     #[allow(clippy::cast_precision_loss)] // few samples
     let rows = rows as f64;

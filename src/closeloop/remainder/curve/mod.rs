@@ -8,13 +8,13 @@ use self::additive::Additive;
 use self::basis::Basis;
 use super::force::ForceSample;
 use crate::closeloop::settings::CurveSettings;
+use crate::data::Joint;
 use crate::identify::{BLOCK_S, stretches};
 
-/// The residual force of a joint as a smooth curve over one variable, the others' shares taken off.
+/// The residual force of a joint as a smooth curve over one variable, without the shares of the other variables.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Curve {
-    /// Counted from 1.
-    pub joint: usize,
+    pub joint: Joint,
     /// `q1`, `qd1`, `tau1` or `t`.
     pub variable: String,
     /// Of the variable.
@@ -22,17 +22,17 @@ pub struct Curve {
     pub x: Vec<f64>,
     /// In N m (or N).
     pub force: Vec<f64>,
-    /// Ends of the pointwise 95 % band.
+    /// Limits of the pointwise 95 % confidence band.
     pub low: Vec<f64>,
     pub high: Vec<f64>,
 }
 
-/// A variable that a force may follow.
+/// A variable that a force may depend on.
 struct Variable {
     name: &'static str,
     /// On a turning joint and on a sliding one.
     units: [&'static str; 2],
-    value: fn(&ForceSample, usize) -> f64,
+    value: fn(&ForceSample, Joint) -> f64,
 }
 
 const VARIABLES: [Variable; 4] = [
@@ -59,7 +59,7 @@ const VARIABLES: [Variable; 4] = [
 ];
 
 /// One curve for each joint and each variable that takes more than one value; none for logs too short to give
-/// a band. The curves of a joint are fitted together, so that none borrows the shape of another.
+/// a band. The curves of a joint are fitted together, so that none takes on the shape of another.
 pub(super) fn curves(
     samples: &[ForceSample],
     prismatic: &[bool],
@@ -72,8 +72,7 @@ pub(super) fn curves(
     {
         return Vec::new();
     }
-    let joints = 0..prismatic.len();
-    joints
+    Joint::all(prismatic.len())
         .flat_map(|joint| of_joint(samples, &blocks, joint, prismatic[joint], settings))
         .collect()
 }
@@ -81,7 +80,7 @@ pub(super) fn curves(
 fn of_joint(
     samples: &[ForceSample],
     blocks: &[usize],
-    joint: usize,
+    joint: Joint,
     prismatic: bool,
     settings: &CurveSettings,
 ) -> Vec<Curve> {
@@ -100,10 +99,10 @@ fn of_joint(
     let curve = |(k, (variable, basis)): (usize, &(&Variable, Basis))| {
         let numbered = match variable.name {
             "t" => "t".to_owned(),
-            name => format!("{name}{}", joint + 1),
+            stem => joint.name(stem),
         };
         let mut curve = Curve {
-            joint: joint + 1,
+            joint,
             variable: numbered,
             unit: variable.units[usize::from(prismatic)],
             x: Vec::new(),

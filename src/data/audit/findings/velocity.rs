@@ -4,6 +4,7 @@ use super::super::table::short;
 use super::super::{Audit, JointAudit, MAX_LAG_S, VelocityCheck};
 use super::Severity::{Info, Serious, Warning};
 use super::{Found, milliseconds, percent, spike_severity};
+use crate::data::Joint;
 
 /// A velocity that correlates less than this with the derivative of its angle is something else.
 const SAME_QUANTITY: f64 = 0.5;
@@ -72,7 +73,7 @@ impl Found {
         );
     }
 
-    fn about_velocity_scale(&mut self, name: &str, number: usize, check: VelocityCheck) {
+    fn about_velocity_scale(&mut self, name: &str, number: Joint, check: VelocityCheck) {
         let off = (check.scale - 1.0).abs();
         if off > SCALE_OFF {
             self.add(
@@ -85,7 +86,7 @@ impl Found {
         }
     }
 
-    fn about_velocity_lag(&mut self, name: &str, number: usize, check: VelocityCheck, step_s: f64) {
+    fn about_velocity_lag(&mut self, name: &str, number: Joint, check: VelocityCheck, step_s: f64) {
         let steps = check.lag_s.abs() / step_s;
         if steps < LAG_STEPS {
             return;

@@ -95,16 +95,15 @@ mod tests {
     use std::path::Path;
 
     use super::recover;
-    use crate::expr::SignForm;
-    use crate::model::{Library, System};
+    use crate::model::{Library, Model};
 
-    fn recovered(system: &System) -> Result<super::Recovered, String> {
-        let declared = system.dynamics_with(&[], &vec![SignForm::DEFAULT; system.joints]);
+    fn recovered(system: &Model) -> Result<super::Recovered, String> {
+        let declared = system.with_effects(Vec::new()).dynamics();
         recover(&declared, &system.prismatic)
     }
 
     fn built_in(name: &str) -> super::Recovered {
-        recovered(&Library::built_in().system(Path::new(name)).unwrap()).unwrap()
+        recovered(&Library::built_in().model(Path::new(name)).unwrap()).unwrap()
     }
 
     #[test]
@@ -136,7 +135,7 @@ mod tests {
             let text = format!(
                 "[system]\nname = \"odd\"\njoints = 1\n[dynamics]\nmass = [[\"1\"]]\nbias = [\"{bias}\"]\n"
             );
-            let odd = System::from_text(Path::new("odd.toml"), &text, &[]).unwrap();
+            let odd = Model::from_text(Path::new("odd.toml"), &text, &[]).unwrap();
             let error = recovered(&odd).unwrap_err();
             assert!(error.contains(said), "{bias}: {error}");
         }

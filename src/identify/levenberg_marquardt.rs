@@ -1,0 +1,392 @@
+use std::fmt;
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use super::fit::{Fit, FitError};
+use super::normal_equations::{Normal, Reduced, solve_with_held};
+use super::sensitivity::Tangent;
+use super::shooting::{Shooting, WindowTerms};
+use super::values::{Layout, Values};
+use crate::data::statistics::{SIGMA_PER_MAD, upper_median};
+use crate::model::Dynamics;
+
+/// Why a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Termination {
+    /// Converged: the last step lowered the cost by less than the share that matters.
+    SmallDecrease,
+    /// Converged: no step lowers the cost, and its quadratic model predicts that none would by a share that matters.
+    SmallPredictedDecrease,
+    /// Not converged: no step lowers the cost, although its quadratic model predicts a decrease.
+    NoDescent,
+    /// Not converged: the normal equations are not positive definite or not finite, however much they are damped.
+    Singular,
+    /// Not converged: the cost was still falling after the largest number of steps.
+    StepLimit,
+    /// No value was free to change but the windows' own, or none at all: the model was evaluated as it was given.
+    AsGiven,
+}
+
+impl Termination {
+    /// Whether the values may be taken as the minimum of the cost.
+    pub fn has_converged(self) -> bool {
+        match self {
+            Self::SmallDecrease | Self::SmallPredictedDecrease | Self::AsGiven => true,
+            Self::NoDescent | Self::Singular | Self::StepLimit => false,
+        }
+    }
+}
+
+impl fmt::Display for Termination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SmallDecrease => "converged: the last step hardly lowered the loss",
+            Self::SmallPredictedDecrease => "converged: no step lowers the loss any further",
+            Self::NoDescent => {
+                "not converged: no step lowers the loss, although its derivatives predict a decrease"
+            }
+            Self::Singular => "not converged: the normal equations cannot be solved",
+            Self::StepLimit => "not converged: the loss was still falling at the last step allowed",
+            Self::AsGiven => "evaluated as given",
+        })
+    }
+}
+
+/// A fit that estimates ends when a step lowers the cost by less than this share.
+const ENOUGH: f64 = 1e-6;
+/// A fit at a given scale is for comparing models, which differ by more than this share of the cost or not at all.
+const ENOUGH_TO_COMPARE: f64 = 1e-4;
+/// Damping of the first step, as a share of the diagonal of the normal equations, and the factors by which it changes
+/// with each step that lowers the cost and with each that does not.
+const FIRST_DAMPING: f64 = 1e-3;
+const DAMPING_ON_SUCCESS: f64 = 0.1;
+const DAMPING_ON_FAILURE: f64 = 10.0;
+/// Less damping than this is none, and with more the step is shorter than rounding.
+const DAMPING_RANGE: [f64; 2] = [1e-12, 1e12];
+
+/// A Levenberg-Marquardt search (Marquardt 1963) for the values of a model and the windows' own.
+pub(super) struct Search<'a> {
+    shooting: &'a Shooting<'a>,
+    dynamics: &'a Dynamics,
+    tangent: &'a Tangent,
+    layout: Layout,
+    values: Values,
+    locals: Vec<Vec<f64>>,
+    scale: f64,
+    cost: f64,
+    /// The share of the cost by which a step must lower it for another one to follow.
+    enough: f64,
+    damping: f64,
+    steps: usize,
+}
+
+/// A step of all values at once.
+struct Step {
+    values: Values,
+    locals: Vec<Vec<f64>>,
+}
+
+impl<'a> Search<'a> {
+    /// A search that starts at the model's values.
+    ///
+    /// # Errors
+    /// No window, or a model that diverges there.
+    pub fn new(
+        shooting: &'a Shooting<'a>,
+        dynamics: &'a Dynamics,
+        tangent: &'a Tangent,
+        locals: Vec<Vec<f64>>,
+        scale: Option<f64>,
+    ) -> Result<Self, FitError> {
+        if shooting.windows.is_empty() {
+            return Err(FitError::NoWindow);
+        }
+        let mut search = Self {
+            shooting,
+            dynamics,
+            tangent,
+            layout: Layout::new(&dynamics.parameters, &tangent.active, &shooting.windows),
+            values: Values::of(dynamics, shooting.logs),
+            locals,
+            scale: scale.unwrap_or(1.0),
+            cost: f64::INFINITY,
+            enough: scale.map_or(ENOUGH, |_| ENOUGH_TO_COMPARE),
+            damping: FIRST_DAMPING,
+            steps: 0,
+        };
+        let costs = shooting.costs(dynamics, &search.values, &search.locals, search.scale);
+        let diverged = costs.iter().filter(|cost| !cost.is_finite()).count();
+        if diverged > 0 {
+            return Err(FitError::Diverged {
+                diverged,
+                windows: costs.len(),
+            });
+        }
+        if scale.is_none() {
+            search.rescale();
+        } else {
+            search.cost = costs.iter().sum();
+        }
+        Ok(search)
+    }
+
+    /// Estimate the scale from the residuals at hand.
+    pub fn rescale(&mut self) {
+        let residuals = self
+            .shooting
+            .residuals(self.dynamics, &self.values, &self.locals);
+        self.scale = robust_scale(residuals.into_iter().flatten());
+        self.cost = self.total(&self.values, &self.locals);
+        self.damping = FIRST_DAMPING;
+    }
+
+    fn total(&self, values: &Values, locals: &[Vec<f64>]) -> f64 {
+        self.shooting
+            .costs(self.dynamics, values, locals, self.scale)
+            .iter()
+            .sum()
+    }
+
+    /// Take steps until none is worth taking, or until there have been `most`.
+    pub fn run(&mut self, most: usize) -> Termination {
+        while self.steps < most {
+            if let Some(termination) = self.step() {
+                return termination;
+            }
+        }
+        Termination::StepLimit
+    }
+
+    /// Take one step that lowers the cost; says why no other one is to follow.
+    fn step(&mut self) -> Option<Termination> {
+        self.steps += 1;
+        let terms = self.linearised();
+        let mut is_solvable = false;
+        while self.damping < DAMPING_RANGE[1] {
+            if let Some(Step { values, locals }) = self.propose(&terms) {
+                is_solvable = true;
+                let cost = self.total(&values, &locals);
+                if cost < self.cost {
+                    let gain = (self.cost - cost) / self.cost.max(f64::MIN_POSITIVE);
+                    (self.values, self.locals, self.cost) = (values, locals, cost);
+                    self.damping = (self.damping * DAMPING_ON_SUCCESS).max(DAMPING_RANGE[0]);
+                    return (gain <= self.enough).then_some(Termination::SmallDecrease);
+                }
+            }
+            self.damping *= DAMPING_ON_FAILURE;
+        }
+        Some(if !is_solvable {
+            Termination::Singular
+        } else if self.predicts_enough(&terms) {
+            Termination::NoDescent
+        } else {
+            Termination::SmallPredictedDecrease
+        })
+    }
+
+    /// Whether the quadratic model of the cost predicts a decrease that would be worth another step. A loss below 1 is
+    /// that of a single residual, so that a share of it is no more than rounding.
+    fn predicts_enough(&mut self, terms: &[WindowTerms]) -> bool {
+        self.damping = FIRST_DAMPING;
+        let predicted = self.predicted_decrease(terms);
+        predicted.is_none_or(|decrease| decrease > self.enough * self.cost.max(1.0))
+    }
+
+    /// Predicted decrease of the cost by the next step; `None` where there is none.
+    fn predicted_decrease(&self, terms: &[WindowTerms]) -> Option<f64> {
+        let normal = self.normal(terms);
+        let step = self.bounded_solution(&normal)?;
+        Some(normal.predicted_decrease(&step)).filter(|decrease| decrease.is_finite())
+    }
+
+    /// The cost that the next step is predicted to reach; `None` where there is none.
+    pub fn predicted_cost(&self) -> Option<f64> {
+        let decrease = self.predicted_decrease(&self.linearised())?;
+        Some(self.cost - decrease)
+    }
+
+    fn linearised(&self) -> Vec<WindowTerms> {
+        self.shooting.linearise(
+            self.dynamics,
+            self.tangent,
+            &self.values,
+            &self.locals,
+            self.scale,
+        )
+    }
+
+    fn normal(&self, terms: &[WindowTerms]) -> Normal {
+        let shared = self.tangent.active.len();
+        Normal::new(
+            terms,
+            &self.shooting.windows,
+            &self.layout,
+            shared,
+            self.damping,
+        )
+    }
+
+    fn propose(&self, terms: &[WindowTerms]) -> Option<Step> {
+        let normal = self.normal(terms);
+        let step = self.bounded_solution(&normal)?;
+        let mut values = self.values.clone();
+        let mut taken = DVector::zeros(step.len());
+        for (i, &column) in self.layout.columns.iter().enumerate() {
+            let [low, high] = self.dynamics.parameters[column.parameter].bounds;
+            let before = self.values.get(column);
+            let after = (before + step[i]).clamp(low, high);
+            values.set(column, after);
+            taken[i] = after - before;
+        }
+        let windows = normal.windows.iter().zip(&self.shooting.windows);
+        let locals = windows.zip(&self.locals).map(|((part, window), local)| {
+            let step = part.local_step(&taken.select_rows(self.layout.places(window)));
+            step.iter().zip(local).map(|(d, x)| x + d).collect()
+        });
+        Some(Step {
+            locals: locals.collect(),
+            values,
+        })
+    }
+
+    /// The damped step, with parameters that a bound would stop taken out one after the other.
+    fn bounded_solution(&self, normal: &Normal) -> Option<DVector<f64>> {
+        let matrix = self.damped(&normal.matrix);
+        let right = -&normal.gradient;
+        let mut held = vec![false; right.len()];
+        loop {
+            let step = solve_with_held(&matrix, &right, &held)?;
+            let columns = &self.layout.columns;
+            let stopped = columns.iter().enumerate().position(|(i, &column)| {
+                let [low, high] = self.dynamics.parameters[column.parameter].bounds;
+                let at = self.values.get(column);
+                !held[i] && ((at <= low && step[i] < 0.0) || (at >= high && step[i] > 0.0))
+            });
+            match stopped {
+                Some(i) => held[i] = true,
+                None => return Some(step),
+            }
+        }
+    }
+
+    fn damped(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut matrix = matrix.clone();
+        for (i, column) in self.layout.columns.iter().enumerate() {
+            // Steps are damped against each parameter's own magnitude: a flat direction stays where it is.
+            let floor = 1e-9 / self.dynamics.parameters[column.parameter].scale.powi(2);
+            matrix[(i, i)] += self.damping * matrix[(i, i)] + floor;
+        }
+        matrix
+    }
+
+    /// What has been found.
+    pub fn finish(self, termination: Termination) -> (Values, Fit) {
+        let terms = self.linearised();
+        let windows = terms.iter().zip(&self.shooting.windows);
+        let reduced = windows
+            .map(|(terms, window)| Reduced::of(terms, self.layout.places(window)))
+            .collect();
+        let fit = Fit {
+            active: self.tangent.active.clone(),
+            columns: self.layout.columns,
+            locals: self.locals,
+            scale: self.scale,
+            cost: self.cost,
+            reduced,
+            steps: self.steps,
+            termination,
+        };
+        (self.values, fit)
+    }
+}
+
+/// Standard deviation of a normal sample with the same median absolute value; never zero.
+fn robust_scale(residuals: impl Iterator<Item = f64>) -> f64 {
+    let sizes: Vec<f64> = residuals.map(f64::abs).collect();
+    (SIGMA_PER_MAD * upper_median(&sizes)).max(1e-6)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{Search, Termination};
+    use crate::data::Log;
+    use crate::identify::sensitivity::{Local, Tangent};
+    use crate::identify::{FitError, Shooting, cut};
+    use crate::model::{Dynamics, Model};
+
+    /// One joint that follows `formula`, where `k` starts at `value`.
+    fn joint(formula: &str, value: f64) -> Dynamics {
+        let text = format!(
+            "[system]\nname = \"joint\"\njoints = 1\n[parameters]\nk = {{ value = {value} }}\n\
+             [dynamics]\nqdd1 = \"{formula}\"\n"
+        );
+        let model = Model::from_text(Path::new("joint.toml"), &text, &[]).unwrap();
+        model.with_sign_widths(vec![0.0]).dynamics()
+    }
+
+    /// 4 s at 100 Hz of an acceleration of 2.
+    fn log() -> Log {
+        let time: Vec<f64> = (0..400).map(|row| 0.01 * f64::from(row)).collect();
+        let mut log = Log::empty(1);
+        log.q = vec![time.iter().map(|t| t * t).collect()];
+        log.qd = vec![time.iter().map(|t| 2.0 * t).collect()];
+        log.tau = vec![vec![0.0; time.len()]];
+        log.time = time;
+        log
+    }
+
+    /// How a fit of `k` ends that may take so many steps, and the value that it finds.
+    fn end(formula: &str, value: f64, most: usize) -> Result<(Termination, f64), FitError> {
+        let (logs, dynamics) = ([log()], joint(formula, value));
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
+        let tangent = Tangent::new(&dynamics, &[0], Local::State);
+        let locals = shooting.initial_locals(0);
+        let mut search = Search::new(&shooting, &dynamics, &tangent, locals, Some(1.0))?;
+        let termination = search.run(most);
+        let (found, fit) = search.finish(termination);
+        assert_eq!(fit.termination, termination);
+        Ok((termination, found.common[0]))
+    }
+
+    #[test]
+    fn a_fit_says_that_it_has_converged() {
+        let (termination, k) = end("k", 1.0, 40).unwrap();
+        assert!(termination.has_converged(), "{termination:?}");
+        assert!((k - 2.0).abs() < 1e-6, "{k}");
+    }
+
+    #[test]
+    fn a_fit_that_starts_at_the_minimum_has_converged() {
+        let (termination, k) = end("k", 2.0, 40).unwrap();
+        assert!(termination.has_converged(), "{termination:?}");
+        assert!((k - 2.0).abs() < 1e-6, "{k}");
+    }
+
+    #[test]
+    fn a_fit_out_of_steps_says_so() {
+        let (termination, k) = end("exp(k)", -3.0, 1).unwrap();
+        assert_eq!(termination, Termination::StepLimit);
+        assert!(!termination.has_converged() && k.exp() < 1.9, "{k}");
+    }
+
+    /// The square root has no derivative at zero: no step can be solved for, and none is taken in silence.
+    #[test]
+    fn normal_equations_that_are_not_finite_are_singular() {
+        let (termination, k) = end("sqrt(k)", 0.0, 40).unwrap();
+        assert_eq!((termination, k), (Termination::Singular, 0.0));
+        assert!(!termination.has_converged());
+    }
+
+    /// The derivative at 1 points up to 2, but off 1 the model is far away on either side.
+    #[test]
+    fn a_fit_that_its_derivatives_mislead_has_not_converged() {
+        let (termination, k) = end("k + 100*abs(sign(k - 1))", 1.0, 40).unwrap();
+        assert_eq!((termination, k), (Termination::NoDescent, 1.0));
+        assert!(!termination.has_converged());
+    }
+}

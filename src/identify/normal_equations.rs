@@ -1,0 +1,162 @@
+//! Normal equations of windows. A window's own values (its start state, and forces where they are free) enter no other
+//! window, so they are eliminated by the Schur complement before windows are summed.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::shooting::WindowTerms;
+use super::values::Layout;
+use crate::sim::Window;
+
+/// The normal equations of one window in some of a fit's free values, its own values eliminated.
+#[derive(Debug, Clone)]
+pub struct Reduced {
+    /// Which of the fit's free values, in the order of `terms`.
+    pub columns: Vec<usize>,
+    pub terms: WindowTerms,
+}
+
+impl Reduced {
+    pub(super) fn of(terms: &WindowTerms, columns: &[usize]) -> Self {
+        let part = Eliminated::new(terms, columns.len(), 0.0);
+        Self {
+            columns: columns.to_vec(),
+            terms: WindowTerms {
+                cost: terms.cost,
+                gradient: part.gradient,
+                hessian: part.matrix,
+            },
+        }
+    }
+
+    /// Add this window to the normal equations in all free values.
+    pub fn add_to(&self, all: &mut WindowTerms) {
+        all.cost += self.terms.cost;
+        self.add_gradient_to(&mut all.gradient);
+        scatter_matrix(&self.terms.hessian, &mut all.hessian, &self.columns);
+    }
+
+    /// The same for the gradient alone.
+    pub fn add_gradient_to(&self, all: &mut DVector<f64>) {
+        scatter(&self.terms.gradient, all, &self.columns);
+    }
+}
+
+/// The normal equations of all windows in the free values of a fit.
+pub(super) struct Normal {
+    pub windows: Vec<Eliminated>,
+    pub matrix: DMatrix<f64>,
+    pub gradient: DVector<f64>,
+}
+
+impl Normal {
+    /// `shared` free values enter each window; its own ones are damped by `damping`, a share of the diagonal.
+    pub fn new(
+        terms: &[WindowTerms],
+        windows: &[Window],
+        layout: &Layout,
+        shared: usize,
+        damping: f64,
+    ) -> Self {
+        let size = layout.columns.len();
+        let mut normal = Self {
+            windows: Vec::with_capacity(terms.len()),
+            matrix: DMatrix::zeros(size, size),
+            gradient: DVector::zeros(size),
+        };
+        for (terms, window) in terms.iter().zip(windows) {
+            let part = Eliminated::new(terms, shared, damping);
+            scatter_matrix(&part.matrix, &mut normal.matrix, layout.places(window));
+            scatter(&part.gradient, &mut normal.gradient, layout.places(window));
+            normal.windows.push(part);
+        }
+        normal
+    }
+
+    /// By how much a step of the free values lowers the quadratic model of the cost, the windows' own values following.
+    pub fn predicted_decrease(&self, step: &DVector<f64>) -> f64 {
+        let own: f64 = self.windows.iter().map(|window| window.own_decrease).sum();
+        -self.gradient.dot(step) - 0.5 * step.dot(&(&self.matrix * step)) + own
+    }
+}
+
+/// One window's normal equations with its own values eliminated.
+pub(super) struct Eliminated {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+    /// Step of the own values = -(own^-1 gradient) - (own^-1 cross) step of the shared ones.
+    local_gradient: DVector<f64>,
+    local_cross: DMatrix<f64>,
+    /// Predicted decrease of the cost where the own values alone take a step.
+    own_decrease: f64,
+}
+
+impl Eliminated {
+    fn new(terms: &WindowTerms, shared: usize, damping: f64) -> Self {
+        let locals = terms.gradient.len() - shared;
+        let part = |first: (usize, usize), size: (usize, usize)| {
+            terms.hessian.view(first, size).into_owned()
+        };
+        let mut own = part((shared, shared), (locals, locals));
+        for i in 0..locals {
+            own[(i, i)] += damping * own[(i, i)] + 1e-12;
+        }
+        let cross = part((shared, 0), (locals, shared));
+        let own_gradient = terms.gradient.rows(shared, locals).into_owned();
+        let inverse = own.clone().cholesky().map_or_else(
+            // Not positive definite: the window does not determine its own values, which then stay.
+            || DMatrix::zeros(locals, locals),
+            |cholesky| cholesky.inverse(),
+        );
+        let local_gradient = &inverse * &own_gradient;
+        let local_cross = &inverse * &cross;
+        let matrix =
+            terms.hessian.view((0, 0), (shared, shared)) - cross.transpose() * &local_cross;
+        let gradient = terms.gradient.rows(0, shared) - cross.transpose() * &local_gradient;
+        Self {
+            matrix,
+            gradient,
+            own_decrease: 0.5 * own_gradient.dot(&local_gradient),
+            local_gradient,
+            local_cross,
+        }
+    }
+
+    /// The step of the window's own values that belongs to a step of the shared ones.
+    pub fn local_step(&self, shared_step: &DVector<f64>) -> DVector<f64> {
+        -(&self.local_gradient + &self.local_cross * shared_step)
+    }
+}
+
+/// The solution with the held unknowns at zero; `None` where the matrix of the others is not positive definite or not
+/// finite.
+pub(super) fn solve_with_held(
+    matrix: &DMatrix<f64>,
+    right: &DVector<f64>,
+    held: &[bool],
+) -> Option<DVector<f64>> {
+    let free: Vec<usize> = (0..held.len()).filter(|&i| !held[i]).collect();
+    let mut step = DVector::zeros(held.len());
+    if free.is_empty() {
+        return Some(step);
+    }
+    let part = matrix.select_rows(&free).select_columns(&free);
+    let solution = part.cholesky()?.solve(&right.select_rows(&free));
+    for (&i, value) in free.iter().zip(solution.iter()) {
+        step[i] = *value;
+    }
+    step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+fn scatter(part: &DVector<f64>, all: &mut DVector<f64>, places: &[usize]) {
+    for (value, &place) in part.iter().zip(places) {
+        all[place] += value;
+    }
+}
+
+fn scatter_matrix(part: &DMatrix<f64>, all: &mut DMatrix<f64>, places: &[usize]) {
+    for (j, &column) in places.iter().enumerate() {
+        for (i, &row) in places.iter().enumerate() {
+            all[(row, column)] += part[(i, j)];
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! A model as the text of a model file.
+
+use std::fmt::Write;
+
+use super::system::{FittedEffect, Model, OwnValue};
+
+impl Model {
+    /// The model as a model file. What the user declared stays as it is, comments included; only numbers of
+    /// `[parameters]` and the smoothing of friction change. The effects follow.
+    pub fn file_text(&self) -> String {
+        let mut text = self.declaration_with_values();
+        for effect in &self.effects {
+            let _ = write!(
+                text,
+                "\n[[effect]]\nname = \"{}\"\njoint = {}\n",
+                effect.effect.name, effect.joint
+            );
+            for (k, parameter) in effect.effect.parameters.iter().enumerate() {
+                let (value, ci95) = effect.values[k];
+                let entry = value_and_interval(value, ci95) + &of_logs(effect, k);
+                let _ = writeln!(text, "{} = {{ {entry} }}", parameter.name);
+            }
+            if effect.fixed {
+                text += "fixed = true\n";
+            }
+        }
+        text
+    }
+
+    fn declaration_with_values(&self) -> String {
+        let mut document: toml_edit::DocumentMut =
+            (self.declaration.parse()).expect("the declaration was read as TOML before");
+        for parameter in &self.parameters {
+            let entry = &mut document["parameters"][&parameter.name];
+            if let Some(table) = entry.as_table_like_mut() {
+                table.insert("value", toml_edit::value(parameter.value));
+                match parameter.ci95 {
+                    Some([low, high]) if low.is_finite() && high.is_finite() => {
+                        let interval: toml_edit::Array = [low, high].into_iter().collect();
+                        table.insert("ci95", toml_edit::value(interval));
+                    }
+                    _ => {
+                        table.remove("ci95");
+                    }
+                }
+            }
+        }
+        // Predictions are only the same again with the same smoothing of dry friction.
+        if let Some(widths) = &self.sign_width {
+            let widths: toml_edit::Array = widths.iter().copied().collect();
+            document["system"]["sign_width"] = toml_edit::value(widths);
+        }
+        document.to_string()
+    }
+}
+
+fn value_and_interval(value: f64, ci95: Option<[f64; 2]>) -> String {
+    let interval = ci95.map(|[low, high]| format!(", ci95 = [{low:?}, {high:?}]"));
+    format!("value = {value:?}{}", interval.unwrap_or_default())
+}
+
+/// What is known of single logs, each called by its file name, or by its path where that is not enough.
+fn of_logs(effect: &FittedEffect, k: usize) -> String {
+    let own: Vec<&OwnValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
+    if own.is_empty() {
+        return String::new();
+    }
+    let entry = |of: &&OwnValue| {
+        let alone = own
+            .iter()
+            .filter(|other| other.log_name() == of.log_name())
+            .count()
+            == 1;
+        let name = if alone { of.log_name() } else { of.log.clone() };
+        let value = value_and_interval(of.value, of.ci95);
+        format!("{} = {{ {value} }}", toml_edit::Key::new(name))
+    };
+    let entries: Vec<String> = own.iter().map(entry).collect();
+    format!(", logs = {{ {} }}", entries.join(", "))
+}
