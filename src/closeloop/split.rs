@@ -1,5 +1,6 @@
 //! Stage 1: set apart the logs that models are scored on.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::settings::{Settings, SplitSettings};
@@ -14,7 +15,7 @@ pub struct Split {
 }
 
 /// How the test logs were set apart.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitMethod {
     /// The user named them.

@@ -3,9 +3,10 @@ use super::refine::Refined;
 use super::remainder::{UNKNOWN, Unexplained};
 use super::score::Errors;
 use super::study::Study;
+use schemars::JsonSchema;
 
 /// The answer in one word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Effects were found and nothing significant is left.

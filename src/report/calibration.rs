@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::wording::{listed, small, with_unit};
@@ -10,55 +11,61 @@ use crate::closeloop::{Calibration, DetectionLimit, Smallest};
 use crate::data::Joint;
 use crate::model::{EffectParameter, FittedEffect};
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct CalibrationEntry {
-    /// Simulations of the accepted model that were searched.
+    /// simulations of the accepted model that were searched like the logs
+    #[schemars(range(min = 1))]
     runs: usize,
-    /// Those in which something was named that is not there.
+    /// those in which an effect was named that is absent
     alarms: usize,
+    /// alarms / runs
+    #[schemars(range(min = 0, max = 1))]
     rate: f64,
     rate_ci95: [f64; 2],
+    /// the effects named by false alarm, and in how many runs
     named: Vec<AlarmEntry>,
-    /// Simulations in which something was left that nothing explains.
+    /// runs in which something was left that nothing explains
     unexplained: usize,
+    /// for each effect that the accepted model lacks, the smallest size that the search would name in four of five such
+    /// logs
     smallest: Vec<SmallestEntry>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct AlarmEntry {
     name: String,
     joint: Joint,
+    #[schemars(range(min = 1))]
     runs: usize,
 }
 
-/// The smallest size of an effect that the search would name.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct SmallestEntry {
     effect: String,
     joint: Joint,
     parameter: String,
-    /// `null` where there is none: `reason` says why.
+    /// null where there is none; reason says why
     value: Option<f64>,
     unit: String,
     reason: Option<&'static str>,
-    /// Where the parameter is a torque.
+    /// value / highest torque of the joint, where the parameter is a torque
     share_of_top_torque: Option<f64>,
-    /// The effect's inner parameters at that size; other switches are at zero.
+    /// the effect's inner parameters at that size; other levels and slopes are at zero
     with: Vec<ValueEntry>,
-    /// Whether it was named when hidden at 1.5 times that size; `null` where that was not tried.
+    /// whether it was named when hidden in a simulation at 1.5 times that size; null where that was not tried
     verified: Option<bool>,
-    /// What else was named then.
+    /// what else was named then
     named_besides: Vec<EffectEntry>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct ValueEntry {
     name: String,
     value: f64,
     unit: String,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct EffectEntry {
     name: String,
     joint: Joint,

@@ -2,8 +2,9 @@ use std::path::Path;
 
 use thiserror::Error;
 
-use super::json::{CHECKPOINT, MODEL, PLOTS, Report, TEXT};
+use super::json::{CHECKPOINT, MODEL, PLOTS, TEXT};
 use super::plot::PlotError;
+use super::schema::Report;
 use super::{model_file, picture, text};
 use crate::closeloop::{LearnError, Outcome};
 use crate::files::{OutputError, folder_of, move_to, write_whole};

@@ -1,220 +1,15 @@
-use serde::Serialize;
+//! `report.json`: the outcome with fixed names, for other programs.
 
 use super::calibration::CalibrationEntry;
-use crate::closeloop::{
-    Alternative, Contradicted, Curve, Finding, Outcome, Probed, ResidualForce, Separation,
-    SplitMethod, TakenBack, Verdict,
+use super::schema::{
+    AlternativeEntry, AuditEntry, ContenderEntry, ContradictedEntry, EffectEntry, EffectName,
+    ErrorEntry, FilesEntry, IdentifiabilityEntry, LogEntry, LogsEntry, ModelError, NormEntry,
+    OmnibusEntry, ParameterEntry, ProposalEntry, Report, TakenBackEntry, TriedEntry,
+    UnexplainedEntry,
 };
-use crate::data::{Finding as AuditFinding, Joint};
+use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, TakenBack};
 use crate::model::{FittedEffect, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
-
-/// `report.json`: the outcome with fixed names, for other programs.
-#[derive(Debug, Serialize)]
-pub struct Report {
-    /// Version of these names.
-    schema: u32,
-    /// Version of the program.
-    version: &'static str,
-    seed: u64,
-    system: String,
-    joints: usize,
-    verdict: Verdict,
-    reason: String,
-    effects: Vec<EffectEntry>,
-    alternatives: Vec<AlternativeEntry>,
-    taken_back: Vec<TakenBackEntry>,
-    /// Stretches of two seconds, not used to choose the effects, that confirm them.
-    confirmed_on: usize,
-    unexplained: UnexplainedEntry,
-    parameters: Vec<ParameterEntry>,
-    contradicted: Vec<ContradictedEntry>,
-    identifiability: IdentifiabilityEntry,
-    error: ErrorEntry,
-    residual_norm: NormEntry,
-    logs: LogsEntry,
-    audit: Vec<AuditEntry>,
-    tried: Vec<Vec<TriedEntry>>,
-    /// `null` where it was not asked for.
-    calibration: Option<CalibrationEntry>,
-    files: FilesEntry,
-}
-
-#[derive(Debug, Serialize)]
-struct EffectEntry {
-    name: String,
-    joint: Joint,
-    expression: String,
-    parameters: Vec<ParameterEntry>,
-    p_value: f64,
-    /// `null` where the refit without the effect failed.
-    error_reduction: Option<f64>,
-    /// Why it failed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error_reduction_failure: Option<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct ParameterEntry {
-    name: String,
-    /// Where the parameter has a value per log: in which one this is it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    log: Option<String>,
-    value: f64,
-    ci95: Option<[f64; 2]>,
-    unit: String,
-    identifiable: bool,
-}
-
-/// A value in the model file outside of the interval of the declared model's fit.
-#[derive(Debug, Serialize)]
-struct ContradictedEntry {
-    declared: f64,
-    #[serde(flatten)]
-    fitted: ParameterEntry,
-}
-
-#[derive(Debug, Serialize)]
-struct EffectName {
-    name: String,
-    joint: Joint,
-    /// Of a shift: the parameter that is shifted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameter: Option<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct AlternativeEntry {
-    effects: Vec<EffectName>,
-    reason: String,
-    experiment: String,
-    separation: Option<Separation>,
-}
-
-/// An effect that was chosen and did not stand.
-#[derive(Debug, Serialize)]
-struct TakenBackEntry {
-    #[serde(flatten)]
-    effect: EffectName,
-    reason: String,
-}
-
-#[derive(Debug, Serialize)]
-struct UnexplainedEntry {
-    fraction: f64,
-    p_value: f64,
-    #[serde(rename = "where")]
-    place: String,
-    omnibus: OmnibusEntry,
-    probes: Vec<Probed>,
-    curves: Vec<Curve>,
-    proposal: Option<ProposalEntry>,
-}
-
-/// Whether the residuals are more than noise, whatever they follow.
-#[derive(Debug, Serialize)]
-struct OmnibusEntry {
-    p_value: f64,
-    /// Share of the residual variance of each joint that is no white noise.
-    share: Vec<f64>,
-}
-
-/// A formula for what is left: no finding.
-#[derive(Debug, Serialize)]
-struct ProposalEntry {
-    joint: Joint,
-    formula: String,
-    explains: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct IdentifiabilityEntry {
-    free: usize,
-    determined: usize,
-    /// Combinations that the logs do not determine, as (parameter, weight).
-    undetermined: Vec<Vec<(String, f64)>>,
-    /// Parameters held for that reason.
-    held: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct ErrorEntry {
-    logs: &'static str,
-    horizons_s: Vec<f64>,
-    declared: ModelError,
-    before: ModelError,
-    after: ModelError,
-    hybrid: Option<ModelError>,
-    against: Vec<ContenderEntry>,
-    reduction_ci95: Option<[f64; 2]>,
-    integrator_step_s: f64,
-}
-
-/// A model that was scored as it is.
-#[derive(Debug, Serialize)]
-struct ContenderEntry {
-    name: String,
-    #[serde(flatten)]
-    error: ModelError,
-}
-
-#[derive(Debug, Serialize)]
-struct ModelError {
-    position_rmse: Vec<Vec<f64>>,
-    position_median: Vec<Vec<f64>>,
-    velocity_rmse: Vec<Vec<f64>>,
-    windows: Vec<usize>,
-    diverged: Vec<usize>,
-}
-
-/// `null` where the fit of the force failed.
-#[derive(Debug, Serialize)]
-struct NormEntry {
-    before: Option<f64>,
-    after: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct LogsEntry {
-    train: Vec<LogEntry>,
-    test: Vec<LogEntry>,
-    split: SplitMethod,
-}
-
-#[derive(Debug, Serialize)]
-struct LogEntry {
-    name: String,
-    rows: usize,
-    start_s: f64,
-    end_s: f64,
-    leave_out: Vec<[f64; 2]>,
-}
-
-#[derive(Debug, Serialize)]
-struct AuditEntry {
-    log: String,
-    findings: Vec<AuditFinding>,
-}
-
-#[derive(Debug, Serialize)]
-struct TriedEntry {
-    name: String,
-    joint: Joint,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parameter: Option<String>,
-    /// Fall of the loss on left-out stretches, as a share.
-    gain: f64,
-    p_value: f64,
-    chosen: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct FilesEntry {
-    model: &'static str,
-    report: &'static str,
-    checkpoint: Option<&'static str>,
-    plots: Vec<&'static str>,
-}
 
 /// Names of the files in the folder of a report.
 pub(super) const MODEL: &str = "model.toml";
@@ -456,9 +251,7 @@ fn logs(outcome: &Outcome) -> LogsEntry {
 fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
     let round = |round: &crate::closeloop::Round| {
         let entry = |(i, evidence): (usize, &crate::closeloop::Evidence)| TriedEntry {
-            name: evidence.effect.effect.name.clone(),
-            joint: evidence.effect.joint,
-            parameter: shifted(&evidence.effect),
+            effect: effect_name(&evidence.effect),
             gain: evidence.gain,
             p_value: evidence.p_value,
             chosen: round.chosen == Some(i),

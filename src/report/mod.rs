@@ -7,6 +7,7 @@ mod json;
 mod model_file;
 mod picture;
 pub mod plot;
+mod schema;
 mod summary;
 mod tensorboard;
 mod text;
@@ -14,8 +15,8 @@ mod wording;
 
 pub use film::film;
 pub use folder::{WriteError, write};
-pub use json::Report;
 pub use model_file::model_file;
+pub use schema::{Report, schema};
 pub use summary::summary;
 pub use tensorboard::EventFile;
 pub use text::text;

@@ -1,3 +1,4 @@
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::comparison::{Comparison, Hypothesis, Trial};
@@ -8,7 +9,7 @@ use crate::closeloop::study::Study;
 use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Separation {
     /// What to do; `None` where nothing that was simulated tells them apart.
     pub experiment: Option<String>,
@@ -16,10 +17,13 @@ pub struct Separation {
     pub joint: Joint,
     /// Difference of the positions, root mean square over half a second ahead, after one has been refitted to what
     /// the other does, in rad (or m).
+    #[schemars(range(min = 0))]
     pub difference_rad: f64,
     /// The same in the present logs.
+    #[schemars(range(min = 0))]
     pub present_difference_rad: f64,
     /// What the model of the present logs does not explain of a position, standard deviation in rad (or m).
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub noise_rad: f64,
     /// Length in s of logs of the experiment that suffice.
     pub seconds: Option<f64>,

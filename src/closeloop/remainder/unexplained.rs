@@ -1,5 +1,6 @@
 use rand::Rng;
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::omnibus::{Omnibus, omnibus};
@@ -30,7 +31,7 @@ pub struct Unexplained {
 }
 
 /// The result of one flexible probe.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Probed {
     /// The variables that it depends on.
     #[serde(rename = "where")]
@@ -38,8 +39,10 @@ pub struct Probed {
     #[serde(skip)]
     pub joint: Joint,
     /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
+    #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
     /// Fall of the loss on left-out stretches, as a share.
+    #[schemars(range(max = 1))]
     pub gain: f64,
 }
 

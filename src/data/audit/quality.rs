@@ -1,5 +1,6 @@
 //! The quality of one log, in numbers and in sentences.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::joint::JointAudit;
@@ -31,7 +32,7 @@ pub struct Audit {
 }
 
 /// How much a finding matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// Results will be wrong or cannot be had from this log unless something is done.
@@ -43,7 +44,7 @@ pub enum Severity {
 }
 
 /// One plain sentence about a log, with its evidence and, where there is one, its remedy.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// How much it matters.
     pub severity: Severity,

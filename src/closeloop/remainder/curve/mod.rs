@@ -2,6 +2,7 @@ mod additive;
 mod basis;
 
 use nalgebra::DVector;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use self::additive::Additive;
@@ -12,18 +13,22 @@ use crate::data::Joint;
 use crate::identify::{BLOCK_S, stretches};
 
 /// The residual force of a joint as a smooth curve over one variable, without the shares of the other variables.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Curve {
     pub joint: Joint,
     /// `q1`, `qd1`, `tau1` or `t`.
     pub variable: String,
     /// Of the variable.
     pub unit: &'static str,
+    #[schemars(length(min = 2))]
     pub x: Vec<f64>,
     /// In N m (or N).
+    #[schemars(length(min = 2))]
     pub force: Vec<f64>,
     /// Limits of the pointwise 95 % confidence band.
+    #[schemars(length(min = 2))]
     pub low: Vec<f64>,
+    #[schemars(length(min = 2))]
     pub high: Vec<f64>,
 }
 

@@ -1,0 +1,313 @@
+//! The shape of `report.json`: its types, from which `docs/report.schema.json` is derived.
+//!
+//! The comment of a field is its description in the schema.
+
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::Serialize;
+use serde_json::json;
+
+use super::calibration::CalibrationEntry;
+use crate::closeloop::{Curve, Probed, Separation, SplitMethod, Verdict};
+use crate::data::{Finding as AuditFinding, Joint};
+
+/// The JSON schema (draft 2020-12) of [`Report`].
+pub fn schema() -> serde_json::Value {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let mut schema = settings.into_generator().into_root_schema_for::<Report>();
+    schema.insert(
+        "title".into(),
+        "report.json of residyn closeloop, schema 1".into(),
+    );
+    schema.into()
+}
+
+/// Fields listed here keep their names and meaning; further fields may be added.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Report {
+    /// version of these names
+    #[schemars(range(min = 1, max = 1))]
+    pub(super) schema: u32,
+    /// version of the program
+    pub(super) version: &'static str,
+    pub(super) seed: u64,
+    /// name of the declared system
+    pub(super) system: String,
+    #[schemars(range(min = 1))]
+    pub(super) joints: usize,
+    pub(super) verdict: Verdict,
+    /// why, in a sentence
+    pub(super) reason: String,
+    /// what the model lacks, in the order in which it was found
+    pub(super) effects: Vec<EffectEntry>,
+    /// other explanations that these logs do not rule out
+    pub(super) alternatives: Vec<AlternativeEntry>,
+    /// effects that were selected and then withdrawn
+    pub(super) taken_back: Vec<TakenBackEntry>,
+    /// number of stretches of two seconds, not used to select the effects, that confirm them
+    pub(super) confirmed_on: usize,
+    pub(super) unexplained: UnexplainedEntry,
+    /// parameters of the declared equations, as refitted
+    pub(super) parameters: Vec<ParameterEntry>,
+    /// values in the model file that lie outside the 95 % interval of the final fit
+    pub(super) contradicted: Vec<ContradictedEntry>,
+    pub(super) identifiability: IdentifiabilityEntry,
+    pub(super) error: ErrorEntry,
+    /// residual generalised force, root mean square over stretches of 0.15 s, N m or N
+    pub(super) residual_norm: NormEntry,
+    pub(super) logs: LogsEntry,
+    /// what the audit found, log by log
+    pub(super) audit: Vec<AuditEntry>,
+    /// candidates that were fitted, one list a round of the search
+    pub(super) tried: Vec<Vec<TriedEntry>>,
+    /// what the training logs could show (--calibrate); null where it was not asked for
+    pub(super) calibration: Option<CalibrationEntry>,
+    /// paths in the folder of this report
+    pub(super) files: FilesEntry,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct EffectEntry {
+    pub name: String,
+    pub joint: Joint,
+    /// what is added, with the names of this model's parameters; of a shift, the new value
+    pub expression: String,
+    #[schemars(length(min = 1))]
+    pub parameters: Vec<ParameterEntry>,
+    #[schemars(range(min = 0, max = 1))]
+    pub p_value: f64,
+    /// share of the position error that this effect alone takes away; negative where it adds; null where the refit
+    /// without the effect failed
+    #[schemars(range(max = 1))]
+    pub error_reduction: Option<f64>,
+    /// why that refit failed
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_reduction_failure: Option<String>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct ParameterEntry {
+    pub name: String,
+    /// of a parameter with one value per log: the log in which this one holds
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub log: Option<String>,
+    pub value: f64,
+    /// 95 % interval, lower end first; null for a parameter that was held
+    pub ci95: Option<[f64; 2]>,
+    pub unit: String,
+    /// whether the interval is narrower than the parameter's magnitude
+    pub identifiable: bool,
+}
+
+/// value and ci95 are the fitted ones
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct ContradictedEntry {
+    /// the value in the model file
+    pub declared: f64,
+    #[serde(flatten)]
+    pub fitted: ParameterEntry,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct EffectName {
+    pub name: String,
+    pub joint: Joint,
+    /// of a parameter_shift: the parameter that has another value
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<String>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct AlternativeEntry {
+    #[schemars(length(min = 1))]
+    pub effects: Vec<EffectName>,
+    pub reason: String,
+    /// the experiment that would tell, in a sentence
+    pub experiment: String,
+    /// its figures, from simulation; null for alternatives that others come before
+    pub separation: Option<Separation>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct TakenBackEntry {
+    #[serde(flatten)]
+    pub effect: EffectName,
+    pub reason: String,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct UnexplainedEntry {
+    /// share of the residual variance above the sensor's noise that is left
+    #[schemars(range(min = 0))]
+    pub fraction: f64,
+    #[schemars(range(min = 0, max = 1))]
+    pub p_value: f64,
+    /// what the rest depends on: q1, qd1, tau1, t, products of them such as q1*qd1, unknown where it is none of them,
+    /// none where nothing that matters is left
+    #[serde(rename = "where")]
+    pub place: String,
+    pub omnibus: OmnibusEntry,
+    /// flexible shapes that name no effect
+    pub probes: Vec<Probed>,
+    /// residual generalised force as a function of each variable alone, with a pointwise 95 % band
+    pub curves: Vec<Curve>,
+    /// null where nothing is left or nothing fits it
+    pub proposal: Option<ProposalEntry>,
+}
+
+/// whether the residuals are more than the sensor's noise, whatever they depend on
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct OmnibusEntry {
+    #[schemars(range(min = 0, max = 1))]
+    pub p_value: f64,
+    /// share of the residual variance that is no white noise, one a joint
+    #[schemars(inner(range(min = 0, max = 1)))]
+    pub share: Vec<f64>,
+}
+
+/// a formula for what is left, no finding
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct ProposalEntry {
+    pub joint: Joint,
+    pub formula: String,
+    /// share of the remainder that it takes away on stretches held out of its fit
+    #[schemars(range(max = 1))]
+    pub explains: f64,
+}
+
+/// what the logs determine of the declared parameters
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct IdentifiabilityEntry {
+    /// number of parameters that are not fixed
+    pub free: usize,
+    /// number of their combinations that the logs determine
+    pub determined: usize,
+    /// combinations that the logs do not determine, as pairs of parameter and weight
+    pub undetermined: Vec<Vec<(String, f64)>>,
+    /// parameters held for that reason
+    pub held: Vec<String>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct ErrorEntry {
+    #[schemars(extend("const" = "test"))]
+    pub logs: &'static str,
+    #[schemars(length(min = 1), extend("items" = json!({"type": "number", "exclusiveMinimum": 0})))]
+    pub horizons_s: Vec<f64>,
+    /// the declared model with the values in its file, before any fit
+    pub declared: ModelError,
+    /// the declared model, its own parameters fitted
+    pub before: ModelError,
+    /// the same with the effects added, refitted
+    pub after: ModelError,
+    /// with a network trained on what is left; null where none was trained
+    pub hybrid: Option<ModelError>,
+    /// the models given with --against, as they are
+    pub against: Vec<ContenderEntry>,
+    /// 95 % interval of the relative reduction of the position error, before to after; null where the logs are too few
+    pub reduction_ci95: Option<[f64; 2]>,
+    /// integrator step of the declared model or of that with effects, the shorter one, s
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub integrator_step_s: f64,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct ContenderEntry {
+    /// as given on the command line
+    pub name: String,
+    #[serde(flatten)]
+    pub error: ModelError,
+}
+
+/// open-loop errors; one inner list a horizon, one number a joint
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct ModelError {
+    /// root mean square over all rows of all windows, rad or m
+    #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
+    pub position_rmse: Vec<Vec<f64>>,
+    /// median over the windows of a window's own root mean square, rad or m
+    #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
+    pub position_median: Vec<Vec<f64>>,
+    /// as position_rmse, rad/s or m/s
+    #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
+    pub velocity_rmse: Vec<Vec<f64>>,
+    /// windows scored, one number a horizon
+    #[schemars(length(min = 1))]
+    pub windows: Vec<usize>,
+    /// windows in which the model diverged, one number a horizon; they count
+    #[schemars(length(min = 1))]
+    pub diverged: Vec<usize>,
+}
+
+/// null where the fit of the force failed
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct NormEntry {
+    /// of the declared model, fitted
+    #[schemars(range(min = 0))]
+    pub before: Option<f64>,
+    /// of the model with the effects
+    #[schemars(range(min = 0))]
+    pub after: Option<f64>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct LogsEntry {
+    pub train: Vec<LogEntry>,
+    pub test: Vec<LogEntry>,
+    pub split: SplitMethod,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct LogEntry {
+    pub name: String,
+    pub rows: usize,
+    pub start_s: f64,
+    pub end_s: f64,
+    /// intervals left out, start and end in s
+    pub leave_out: Vec<[f64; 2]>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct AuditEntry {
+    pub log: String,
+    pub findings: Vec<AuditFinding>,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct TriedEntry {
+    #[serde(flatten)]
+    pub effect: EffectName,
+    /// relative fall of the loss on held-out stretches
+    #[schemars(range(max = 1))]
+    pub gain: f64,
+    #[schemars(range(min = 0, max = 1))]
+    pub p_value: f64,
+    pub chosen: bool,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct FilesEntry {
+    pub model: &'static str,
+    pub report: &'static str,
+    pub checkpoint: Option<&'static str>,
+    pub plots: Vec<&'static str>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::schema;
+
+    #[test]
+    fn the_published_schema_is_that_of_the_types() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/");
+        let derived = serde_json::to_string_pretty(&schema()).unwrap() + "\n";
+        let published = std::fs::read_to_string(format!("{root}docs/report.schema.json")).unwrap();
+        if derived != published {
+            let fresh = format!("{root}target/report.schema.json");
+            std::fs::write(&fresh, &derived).unwrap();
+            panic!(
+                "docs/report.schema.json is not the schema of the types; put {fresh} in its place"
+            );
+        }
+    }
+}
