@@ -31,6 +31,10 @@ instructions *arguments:
 ci:
     .ci/run
 
+# A stripped static binary in target/dist
+release:
+    scripts/release
+
 # Run the demo and refresh the pictures of the README
 demo:
     cargo run --release -- closeloop --out target/demo

@@ -11,14 +11,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::closeloop::{self, Request, Split, close_loop};
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
-use residyn::model::{
-    Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
-};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
 use residyn::sim::batch::{Rollouts, Rows};
-use residyn::train::{Backend, FitSettings, Segments, Training};
+use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 const STEP_S: f64 = 0.02;
 

@@ -10,14 +10,12 @@ use std::time::Instant;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::identify::{Shooting, cut, fit};
-use residyn::model::{
-    Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model,
-};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model};
 use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
 use residyn::sim::batch::Rollouts;
-use residyn::train::{Backend, FitSettings, Progress, Segments, Training};
+use residyn::train::{Backend, FitSettings, HybridModel, Progress, Segments, Training};
 
 const STEP_S: f64 = 0.02;
 /// Of each time the best of so many.

@@ -11,14 +11,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use residyn::data::Log;
 use residyn::identify::{Shooting, cut, predicted_cost};
-use residyn::model::{
-    Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model,
-};
+use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model};
 use residyn::plan::Objective;
 use residyn::plant::Plant;
 use residyn::sim::Integrator;
 use residyn::sim::batch::{Rollouts, Rows};
-use residyn::train::{Backend, FitSettings, Segments, Training};
+use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 const STEP_S: f64 = 0.02;
 /// Steps of a rollout.

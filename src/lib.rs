@@ -38,16 +38,19 @@
 //! ```
 
 pub mod bench;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod closeloop;
 pub mod control;
 pub mod data;
+#[cfg(feature = "train")]
 pub mod experiment;
 pub mod expr;
 pub mod files;
 pub mod formats;
 pub mod identify;
 pub mod lanes;
+#[cfg(feature = "train")]
 pub mod mbrl;
 pub mod model;
 pub mod plan;
@@ -55,4 +58,5 @@ pub mod plant;
 pub mod report;
 pub mod runs;
 pub mod sim;
+#[cfg(feature = "train")]
 pub mod train;

@@ -1,6 +1,7 @@
 //! Every function that a formula may call: value and slopes, for every reader of programs.
 
 use residyn::expr::{Graph, Program, Scope, SignForm, parse};
+use residyn::train::replay;
 
 use crate::common::{assert_near, column, devices, in_f32, numbers, rng, tensor};
 use rand::RngExt;
@@ -177,7 +178,7 @@ fn values_and_slopes_on_tensors() {
                 .map(|p| (case.truth)(p[0], p[1]).to_vec())
                 .collect();
             let inputs = [0, 1].map(|k| tensor(&column(&grid(), k), &device).require_grad());
-            let value = value_alone(case.formula).replay(&inputs).swap_remove(0);
+            let value = replay(&value_alone(case.formula), &inputs).swap_remove(0);
             let zeros = || vec![0.0; grid().len()];
             // What depends on no input has no gradients at all.
             let constant = truth.iter().all(|row| row[1..] == [0.0, 0.0]);
@@ -236,7 +237,7 @@ fn what_is_not_a_number_spreads() {
             );
             for device in devices() {
                 let inputs = [0, 1].map(|k| tensor(&point[0][k..=k], &device));
-                let value = numbers(program.replay(&inputs).swap_remove(0))[0];
+                let value = numbers(replay(&program, &inputs).swap_remove(0))[0];
                 assert!(
                     value.is_nan(),
                     "{formula} of {point:?} on {device:?}: {value}"

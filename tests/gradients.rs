@@ -4,6 +4,7 @@ use burn::tensor::{Device, Tensor};
 use rand_chacha::ChaCha8Rng;
 use residyn::expr::{Program, SignForm};
 use residyn::model::Dynamics;
+use residyn::train::replay;
 
 use crate::common::{
     Case, assert_near, catalog, column, devices, in_f32, jacobian, numbers, point, points, rng,
@@ -122,11 +123,7 @@ fn check_burn(case: &Case, points: &[Vec<f64>], joint: usize, device: &Device) {
             false => tensor(&points[0][k..=k], device).require_grad(),
         })
         .collect();
-    let accelerations = case
-        .dynamics
-        .program
-        .replay(&columns)
-        .swap_remove(n + joint);
+    let accelerations = replay(&case.dynamics.program, &columns).swap_remove(n + joint);
     let gradients = accelerations.sum().backward();
     let jacobian = jacobian(&case.dynamics);
     let rows: Vec<Vec<f64>> = points.iter().map(|point| jacobian.eval(point)).collect();

@@ -102,7 +102,10 @@ fn check_shared(
 
 /// `[row][output]`; outputs that all rows share are repeated.
 fn replay(program: &Program, inputs: &[Tensor<1>]) -> Vec<Vec<f64>> {
-    let outputs: Vec<Vec<f64>> = program.replay(inputs).into_iter().map(numbers).collect();
+    let outputs: Vec<Vec<f64>> = residyn::train::replay(program, inputs)
+        .into_iter()
+        .map(numbers)
+        .collect();
     let of_row = |values: &Vec<f64>, row: usize| match values.len() {
         1 => values[0],
         rows => {

@@ -11,11 +11,11 @@ use crate::closeloop::{
     Outcome, Reference, Request, Settings, Split, Stage, Verdict, calibrate, close_loop,
 };
 use crate::data::{LeaveOut, Log};
-use crate::model::{Library, Model};
+use crate::model::{Library, Model, Origin};
 use crate::plant::Plant;
 use crate::report;
 use crate::runs::RunFolder;
-use crate::train::Origin;
+use crate::train::ResidualTrainer;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
 ///
@@ -69,9 +69,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     let _folder = RunFolder::open(&arguments.out)?;
     let bar = progress::bar(Stage::ALL.len());
+    let learner = ResidualTrainer {
+        backend: arguments.common.device,
+    };
     let mut request = Request::new(&system, &library, split);
     request.against = against;
-    request.backend = Some(arguments.common.device);
+    request.learner = Some(&learner);
     let mut outcome = close_loop(request, &mut rng, &mut |now| {
         bar.set_position(now.stage.number() as u64);
         bar.set_message(now.text.to_owned());

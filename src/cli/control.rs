@@ -184,7 +184,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
             let device = arguments.common.device;
             let (checkpoint, _, model) = inputs::checkpoint(dir, library, device)?;
             let integrator = checkpoint.manifest.settings.integrator;
-            Ok(Predictor::of_model(&model, integrator))
+            Ok(model.predictor(integrator))
         }
         Source::File(file) => {
             let system = library.model(file)?;

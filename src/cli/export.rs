@@ -72,7 +72,7 @@ fn measure(
     arguments: &Arguments,
 ) -> Result<Difference, ClientError> {
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let refused = |error: crate::model::HybridError| ClientError::Failed(error.to_string());
+    let refused = |error: crate::model::NetworkError| ClientError::Failed(error.to_string());
     let samples = model.samples(&mut rng).map_err(refused)?;
     let own = model.predict(&samples).map_err(refused)?;
     Ok(own.difference(&format.predict(&arguments.out, &samples)?))

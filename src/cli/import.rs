@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs};
 use crate::formats::Imported;
+use crate::train::save_imported;
 
 /// Make a checkpoint from a model that was exported as JSON and safetensors
 #[derive(Debug, Args)]
@@ -31,7 +32,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         imported.system.name.clone(),
         imported.written_by().to_owned(),
     );
-    imported.save(&arguments.out, seed, device)?;
+    save_imported(&arguments.out, imported, seed, device)?;
     let out = arguments.out.display();
     inputs::print(&match arguments.common.json {
         true => {

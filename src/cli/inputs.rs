@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::data::{LeaveOut, Log, leave_out};
-use crate::model::{HybridModel, Library, Model};
-use crate::train::{Backend, Checkpoint};
+use crate::model::{Library, Model};
+use crate::train::{Backend, Checkpoint, HybridModel};
 
 /// The effects that model files may name: the built-in ones and the user's own.
 #[derive(Debug, Args)]

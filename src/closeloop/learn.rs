@@ -1,10 +1,11 @@
-//! Stage 8: train a small network on what the refined model leaves.
+//! Stage 8: train a small network on what the refined model leaves. Whoever carries out tensors trains it: see
+//! [`ResidualLearner`].
 
-use std::ops::ControlFlow;
+use std::error::Error;
+use std::fmt::Debug;
+use std::path::Path;
 
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use thiserror::Error;
+use rand::Rng;
 
 use super::fitted::Fitted;
 use super::refine::Refined;
@@ -12,130 +13,103 @@ use super::settings::LearnSettings;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
-use crate::model::{
-    Dynamics, HybridError, HybridModel, LastLayer, MlpSettings, MlpWeights, ResidualOn,
-};
-use crate::sim::{Integrator, as_modelled};
-use crate::train::{Backend, FitSettings, LearningRates, Penalty, Segments, TrainError, Training};
+use crate::model::{Dynamics, Origin};
+use crate::sim::as_modelled;
 
-/// A run that trained the residual network, for its checkpoint, and the hybrid that came of it.
-pub struct Learned {
-    pub training: Training,
-    pub hybrid: Dynamics,
+/// What a residual network is trained on.
+#[derive(Debug)]
+pub struct ResidualTask {
+    /// The refined model, which is held.
+    pub equations: Dynamics,
+    /// Neurons of each hidden layer.
+    pub hidden: Vec<usize>,
+    /// Motion as the model sees it.
+    pub training: Vec<Trajectory>,
+    /// The same, to choose the epoch by.
+    pub validation: Vec<Trajectory>,
+    pub settings: LearnSettings,
 }
 
-/// Why the residual network could not be trained.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum LearnError {
-    #[error(transparent)]
-    Train(#[from] TrainError),
-    #[error(transparent)]
-    Hybrid(#[from] HybridError),
+/// Trains residual networks.
+pub trait ResidualLearner: Debug + Sync {
+    /// Train a network on what the equations leave and keep the epoch that predicts the validation stretches best; the
+    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` is told the
+    /// epoch.
+    ///
+    /// # Errors
+    /// A loss that is no longer finite.
+    fn learn(
+        &self,
+        task: &ResidualTask,
+        rng: &mut dyn Rng,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Option<Box<dyn LearnedResidual>>, LearnError>;
 }
 
-/// Train the residual network on what the refined model leaves, with the physics held, and return the hybrid of the
-/// epoch that predicts best the stretches that it was not trained on; the untrained one is among them. `None` where
-/// no network is asked for or the logs are too few to train it.
-pub(super) fn learn(
-    refined: &Refined<'_>,
-    backend: Option<Backend>,
-    rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Progress<'_>),
-) -> Result<Option<Learned>, LearnError> {
-    let Refined { study, model, .. } = refined;
-    let Some(backend) = backend else {
-        return Ok(None);
-    };
-    let Some((training, validation)) = segments(study, model) else {
-        return Ok(None);
-    };
-    let hybrid = untrained(study, model, &training, backend, rng)?;
-    // Training takes numbers from a stream of its own, which its checkpoint carries on.
-    let mut run = Training::new(
-        hybrid,
-        fit_settings(&study.settings.learn),
-        ChaCha8Rng::from_rng(rng),
-    )?;
-    run.run(&training, Some(&validation), &mut |at| {
-        let text = format!(
-            "{}, epoch {} of {}",
-            Stage::Learn.text(),
-            at.epoch,
-            at.epochs
-        );
-        progress(Progress::within(Stage::Learn, &text));
-        ControlFlow::Continue(())
-    })?;
-    Ok(Some(Learned {
-        hybrid: run.result()?.to_dynamics()?,
-        training: run,
-    }))
+/// A residual network that was trained.
+pub trait LearnedResidual: Send {
+    /// The equations with the network, as one program.
+    fn hybrid(&self) -> &Dynamics;
+
+    /// Write the trained model as a checkpoint.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, or that holds something other than a checkpoint.
+    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), LearnError>;
 }
 
-/// The model with a network that adds nothing yet.
-fn untrained(
-    study: &Study<'_>,
-    model: &Fitted,
-    training: &Segments,
-    backend: Backend,
-    rng: &mut impl Rng,
-) -> Result<HybridModel, LearnError> {
-    // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
-    let dynamics = model.absorbed().dynamics();
-    let joints = study.system.joints;
-    let settings = MlpSettings {
-        hidden: study.system.hidden.clone(),
-        on: ResidualOn::Accelerations,
-        ..MlpSettings::for_joints(joints)
-    };
-    let scaling = training.scaling(settings.angles);
-    let weights = MlpWeights::new(joints, &settings, scaling, LastLayer::Zero, rng);
-    Ok(HybridModel::physics(&dynamics, &backend.device())?.with_residual(&weights)?)
-}
+/// Why a residual network could not be trained or saved.
+#[derive(Debug, thiserror::Error)]
+#[error(transparent)]
+pub struct LearnError(Box<dyn Error + Send + Sync>);
 
-fn fit_settings(settings: &LearnSettings) -> FitSettings {
-    FitSettings {
-        epochs: settings.epochs,
-        learning_rates: LearningRates {
-            physics: 0.0,
-            residual: settings.learning_rate,
-            ..LearningRates::default()
-        },
-        penalty: Penalty::Fixed {
-            alpha: settings.alpha,
-        },
-        integrator: Integrator::RK4,
-        record_every: settings.record_every,
-        ..FitSettings::default()
+impl LearnError {
+    pub fn new(error: impl Error + Send + Sync + 'static) -> Self {
+        Self(Box::new(error))
     }
 }
 
-/// Segments to train on and to choose the epoch by; `None` where the logs give too few. The network's inputs are the
-/// model's own angles and torques.
-fn segments(study: &Study<'_>, model: &Fitted) -> Option<(Segments, Segments)> {
-    let settings = &study.settings.learn;
+/// Train the residual network on what the refined model leaves. `None` where no network is asked for or the logs are
+/// too few to train it.
+pub(super) fn learn(
+    refined: &Refined<'_>,
+    learner: Option<&dyn ResidualLearner>,
+    rng: &mut impl Rng,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> {
+    let Some(learner) = learner else {
+        return Ok(None);
+    };
+    let task = task(&refined.study, &refined.model);
+    learner.learn(&task, rng, &mut |text| {
+        let text = format!("{}, {text}", Stage::Learn.text());
+        progress(Progress::within(Stage::Learn, &text));
+    })
+}
+
+fn task(study: &Study<'_>, model: &Fitted) -> ResidualTask {
+    let settings = study.settings.learn.clone();
+    // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
+    let equations = model.absorbed().dynamics();
     let thinning = Thinning {
         step_s: settings.step_s,
         length_s: settings.stretch_s,
     };
     let dynamics = model.dynamics();
-    let of_log = |log: &Log| {
-        let in_log = dynamics.in_log(log);
-        trajectories(&as_modelled(&*in_log, log), thinning)
-    };
-    let stretches: Vec<Trajectory> = study.logs.iter().flat_map(of_log).collect();
-    let rows: usize = stretches.iter().map(|s| s.time.len()).sum();
-    let stride = (rows / settings.segments).max(1);
-    let mut sets = [
-        Segments::new(study.system.joints, settings.steps),
-        Segments::new(study.system.joints, settings.steps),
-    ];
-    for (index, stretch) in stretches.iter().enumerate() {
-        let set = &mut sets[usize::from(index % settings.every == settings.every - 1)];
-        // A stretch too short for a segment is skipped.
-        let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
+    let of_log = |log: &Log| trajectories(&as_modelled(&*dynamics.in_log(log), log), thinning);
+    let stretches = study.logs.iter().flat_map(of_log);
+    let (mut training, mut validation) = (Vec::new(), Vec::new());
+    for (k, stretch) in stretches.enumerate() {
+        match (k + 1).is_multiple_of(settings.every) {
+            true => validation.push(stretch),
+            false => training.push(stretch),
+        }
     }
-    let [training, validation] = sets;
-    (!training.is_empty() && !validation.is_empty()).then_some((training, validation))
+    ResidualTask {
+        equations,
+        hidden: study.system.hidden.clone(),
+        training,
+        validation,
+        settings,
+    }
 }

@@ -33,7 +33,7 @@ pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;
 pub use find::{Found, find};
 pub use fitted::Fitted;
-pub use learn::{LearnError, Learned};
+pub use learn::{LearnError, LearnedResidual, ResidualLearner, ResidualTask};
 pub use outcome::{Effects, Given, Models, Outcome, Remainder};
 pub use remainder::{
     Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, proposal,

@@ -2,7 +2,7 @@ use super::calibrate::Calibration;
 use super::confirm::TakenBack;
 use super::discriminate::Alternative;
 use super::fitted::Fitted;
-use super::learn::Learned;
+use super::learn::LearnedResidual;
 use super::remainder::{Proposal, ResidualForce, Unexplained};
 use super::score::{Contradicted, Errors, Finding};
 use super::select::Round;
@@ -26,7 +26,7 @@ pub struct Outcome {
     pub remainder: Remainder,
     pub errors: Errors,
     /// The residual network, where the logs suffice to train it.
-    pub learned: Option<Learned>,
+    pub learned: Option<Box<dyn LearnedResidual>>,
     /// What the training logs could show, where that was asked for: see [`calibrate`](super::calibrate()).
     pub calibration: Option<Calibration>,
 }

@@ -1,9 +1,9 @@
 use super::error::StudyError;
+use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::split::Split;
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
-use crate::train::Backend;
 
 /// What closing the loop is asked for.
 #[derive(Debug, Clone)]
@@ -17,8 +17,8 @@ pub struct Request<'a> {
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
     pub settings: Settings,
-    /// Where the residual network is trained; without one there is none.
-    pub backend: Option<Backend>,
+    /// Trains the residual network; without it there is none.
+    pub learner: Option<&'a dyn ResidualLearner>,
 }
 
 /// A model that is scored as it is, beside those that are fitted.
@@ -39,7 +39,7 @@ impl<'a> Request<'a> {
             split,
             against: Vec::new(),
             settings: Settings::default(),
-            backend: None,
+            learner: None,
         }
     }
 

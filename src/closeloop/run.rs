@@ -32,7 +32,7 @@ pub fn close_loop(
         split,
         against,
         settings,
-        backend,
+        learner,
     } = request;
     progress(Stage::Audit.into());
     let mut study = Study::new(system, &split.train, &settings);
@@ -43,13 +43,13 @@ pub fn close_loop(
     progress(Stage::Refine.into());
     let refined = refine(&study, &found.after);
     let remainder = remainder(&study, &found, &refined);
-    let learned = learn(&refined, backend, rng, progress)?;
+    let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let hybrid = learned.as_ref().map(|learned| &learned.hybrid);
+    let hybrid = learned.as_ref().map(|learned| learned.hybrid());
     let models = [&found.before, &refined.model];
     let errors = scorer.errors(system, models, hybrid, &against, rng);
     let findings = findings(&study, &found.after, &refined, &scorer, &errors.after);

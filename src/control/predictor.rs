@@ -1,4 +1,4 @@
-use crate::model::{Dynamics, HybridModel, MlpWeights};
+use crate::model::{Dynamics, MlpWeights};
 use crate::plan::Objective;
 use crate::sim::Integrator;
 use crate::sim::batch::Rollouts;
@@ -15,16 +15,12 @@ pub struct Predictor {
 impl Predictor {
     /// A model of equations alone.
     pub fn of_equations(equations: Dynamics, integrator: Integrator) -> Self {
-        Self {
-            equations,
-            networks: Vec::new(),
-            integrator,
-        }
+        Self::new(equations, Vec::new(), integrator)
     }
 
-    /// A trained model; `integrator` is the one that it was trained through.
-    pub fn of_model(model: &HybridModel, integrator: Integrator) -> Self {
-        let (equations, networks) = model.parts();
+    /// Equations and the networks whose outputs are added to their derivative; `integrator` is the one that the model
+    /// was trained through.
+    pub fn new(equations: Dynamics, networks: Vec<MlpWeights>, integrator: Integrator) -> Self {
         Self {
             equations,
             networks,

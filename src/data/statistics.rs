@@ -30,6 +30,7 @@ pub(crate) fn deviation(values: &[f64]) -> f64 {
 }
 
 /// Standard deviation estimated from a sample (divided by n - 1); 0 of a single value.
+#[cfg(feature = "train")]
 pub(crate) fn sample_deviation(values: &[f64]) -> f64 {
     sample_variance(values).sqrt()
 }
@@ -95,6 +96,7 @@ pub(crate) fn rank_quantile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Lower quartile, median and upper quartile, linear between neighbours (type 7 of Hyndman and Fan 1996).
+#[cfg(feature = "train")]
 pub(crate) fn quartiles(values: &[f64]) -> [f64; 3] {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);

@@ -5,11 +5,11 @@ use thiserror::Error;
 use crate::closeloop::StudyError;
 use crate::control::TaskError;
 use crate::mbrl::RunError;
-use crate::model::{FileError, HybridError};
+use crate::model::FileError;
 use crate::plant::PlantError;
 use crate::report::plot::PlotError;
 use crate::runs::RunFolderError;
-use crate::train::CheckpointError;
+use crate::train::{CheckpointError, HybridError};
 
 /// Why an experiment cannot be carried out.
 #[derive(Debug, Error)]

@@ -7,10 +7,10 @@ use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::files::{beside, beside_or_named, content_id};
 use crate::mbrl::{Folder, Learner, Prior, Round, Run, RunError};
-use crate::model::{Dynamics, HybridModel, Library, Model};
+use crate::model::{Dynamics, Library, Model, Origin};
 use crate::runs::RunFolder;
 use crate::sim::Integrator;
-use crate::train::{Backend, Checkpoint, Origin};
+use crate::train::{Backend, Checkpoint, HybridModel};
 
 /// A method with everything it refers to read.
 pub(super) struct Method {
@@ -93,12 +93,12 @@ impl Method {
     /// The model it plans with before training; none without a prior.
     pub(super) fn prior(&self, integrator: Integrator) -> Result<Option<Predictor>, RunError> {
         let model = self.learner.untrained()?;
-        Ok(model.map(|model| Predictor::of_model(&model, integrator)))
+        Ok(model.map(|model| model.predictor(integrator)))
     }
 
     /// The model it plans with after training.
     pub(super) fn predictor(&self, model: &HybridModel) -> Predictor {
-        Predictor::of_model(model, self.config.fit.integrator)
+        model.predictor(self.config.fit.integrator)
     }
 
     /// Carries out the remaining rounds of a run in its folder.

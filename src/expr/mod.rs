@@ -1,7 +1,7 @@
 //! Equations as programs: a formula is text, is parsed once, and becomes a [`Program`],
 //! a flat list of about two dozen scalar operations. Everything else reads that list:
-//! the evaluator ([`Tape`]), the derivative ([`Graph::gradient`]), the replay on Burn tensors
-//! ([`Program::replay`]) and the printers ([`Program::text`], [`Program::latex`]).
+//! the evaluator ([`Tape`]), the derivative ([`Graph::gradient`]), the replay on tensors of training
+//! and the printers ([`Program::text`], [`Program::latex`]).
 //!
 //! This module knows no file, no optimiser and no command line.
 
@@ -15,7 +15,6 @@ mod parse;
 mod places;
 mod print;
 mod program;
-mod replay;
 mod scope;
 mod steps;
 

@@ -8,7 +8,7 @@ use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use crate::data::Joint;
 use crate::expr::Op;
 use crate::model::{
-    CommandFilter, Dynamics, HybridError, MlpWeights, Model, ModelWeights, Parameter, nothing_but,
+    CommandFilter, Dynamics, MlpWeights, Model, ModelWeights, NetworkError, Parameter, nothing_but,
 };
 use crate::sim::Integrator;
 
@@ -205,7 +205,7 @@ impl ExportModel {
     ///
     /// # Errors
     /// A network that does not fit the number of joints.
-    pub(super) fn reference(&self) -> Result<ReferenceModel, HybridError> {
+    pub(super) fn reference(&self) -> Result<ReferenceModel, NetworkError> {
         let networks = self.networks().map(|(_, network)| network);
         ReferenceModel::new(
             self.equations.clone(),
@@ -230,7 +230,7 @@ impl ExportModel {
     ///
     /// # Errors
     /// A network that does not fit the number of joints.
-    pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, HybridError> {
+    pub fn samples(&self, rng: &mut impl Rng) -> Result<Samples, NetworkError> {
         Ok(draw(&self.reference()?, &self.system.prismatic, rng))
     }
 
@@ -238,7 +238,7 @@ impl ExportModel {
     ///
     /// # Errors
     /// A network that does not fit the number of joints.
-    pub fn predict(&self, samples: &Samples) -> Result<Predictions, HybridError> {
+    pub fn predict(&self, samples: &Samples) -> Result<Predictions, NetworkError> {
         Ok(self.reference()?.predict(samples))
     }
 }

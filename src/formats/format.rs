@@ -8,7 +8,7 @@ use super::ExportModel;
 use super::verify::{Client, ClientError, Predictions, Samples};
 use crate::files::{OutputError, write_whole};
 use crate::model::chain::Chain;
-use crate::model::{FileError, HybridError};
+use crate::model::{FileError, NetworkError};
 
 /// A format of other programs.
 #[derive(Debug)]
@@ -61,7 +61,7 @@ pub enum ExportError {
     #[error("{0}")]
     Write(#[from] OutputError),
     #[error(transparent)]
-    Hybrid(#[from] HybridError),
+    Hybrid(#[from] NetworkError),
 }
 
 impl Format {

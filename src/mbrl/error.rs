@@ -1,10 +1,9 @@
 use thiserror::Error;
 
 use crate::data::LogError;
-use crate::model::HybridError;
 use crate::plant::PlantError;
 use crate::runs::RunFolderError;
-use crate::train::{CheckpointError, SegmentsError, TrainError};
+use crate::train::{CheckpointError, HybridError, SegmentsError, TrainError};
 
 /// Why a run of the loop cannot begin or be resumed.
 #[derive(Debug, Error)]

@@ -3,9 +3,9 @@ use std::path::PathBuf;
 
 use super::{Experience, Progress, Round, Run, RunError};
 use crate::data::{Columns, Log};
-use crate::model::Dynamics;
+use crate::model::{Dynamics, Origin};
 use crate::runs::{RunFolder, RunFolderError};
-use crate::train::{Checkpoint, Origin, Training, save};
+use crate::train::{Checkpoint, Training, save};
 
 const ROUNDS: &str = "rounds.jsonl";
 

@@ -1,9 +1,9 @@
 use std::ops::ControlFlow;
 
 use super::RunError;
-use crate::model::{Dynamics, HybridModel, InputScaling, LastLayer, MlpSettings, MlpWeights};
+use crate::model::{Dynamics, InputScaling, LastLayer, MlpSettings, MlpWeights};
 use crate::runs::{Purpose, stream};
-use crate::train::{Backend, FitSettings, Segments, Training};
+use crate::train::{Backend, FitSettings, HybridModel, Segments, Training};
 
 /// What a model starts from.
 #[derive(Debug, Clone)]

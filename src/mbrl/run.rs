@@ -3,10 +3,10 @@ use serde::{Deserialize, Serialize};
 use super::{Experience, Judge, Judged, Learner, RunError};
 use crate::control::{Predictor, RandomTorque, Task, drive, with_controller};
 use crate::data::Log;
-use crate::model::{Dynamics, HybridModel};
+use crate::model::Dynamics;
 use crate::plant::{Plant, Rig};
 use crate::runs::{Purpose, stream};
-use crate::train::Training;
+use crate::train::{HybridModel, Training};
 
 /// The amounts of data, in transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,7 +85,7 @@ impl Run<'_> {
         let previous = progress.model.as_ref();
         let training = self.learner.learn(&segments, previous, seed, round)?;
         let model = training.result()?;
-        let predictor = Predictor::of_model(&model, self.learner.fit.integrator);
+        let predictor = model.predictor(self.learner.fit.integrator);
         let judged = self.judge().judge(&predictor, self.task.replan)?;
         let last = training.history().last().expect("a run records its end");
         let record = Round {

@@ -7,10 +7,10 @@ use serde_json::json;
 use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
 use crate::control::Task;
 use crate::data::Joint;
-use crate::model::{Angles, Dynamics, Library, MlpSettings};
+use crate::model::{Angles, Dynamics, Library, MlpSettings, Origin};
 use crate::plant::{Noise, Plant};
 use crate::runs::RunFolder;
-use crate::train::{Backend, FitSettings, Origin, Penalty};
+use crate::train::{Backend, FitSettings, Penalty};
 
 fn folder(dir: &Path) -> Folder {
     Folder::open(RunFolder::open(dir).unwrap()).unwrap()

@@ -6,37 +6,28 @@ pub mod chain;
 mod dynamics;
 mod effect;
 mod effects_in_file;
-mod equations;
 mod file;
 mod filter;
-mod frame;
-mod hybrid;
-mod integrator;
 mod library;
-pub(crate) mod mlp;
 mod network;
 mod reader;
+mod saved;
 mod sections;
 mod shift;
-mod stack;
 mod system;
 mod typeset;
+pub(crate) mod weights;
 mod written;
 
 pub use dynamics::{Dynamics, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use filter::{CommandFilter, Filter};
-pub(crate) use frame::Frame;
-pub use hybrid::{Flow, HybridError, HybridModel, ModelWeights, Prepared};
-#[cfg(test)]
-pub(crate) use hybrid::{PRIOR_ID, RESIDUAL_ID};
-pub use integrator::Step;
 pub use library::Library;
-pub(crate) use network::nothing_but;
 pub use network::{
-    Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, ResidualOn,
-    with_residual,
+    Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,
+    ResidualOn, with_residual,
 };
+pub(crate) use network::{nothing_but, to_f32};
 pub use reader::FileError;
-pub(crate) use stack::Stack;
+pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
 pub use system::{FittedEffect, Model, OwnValue};

@@ -1,7 +1,7 @@
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::{Dynamics, HybridError};
+use super::Dynamics;
 use crate::expr::{Binary, Graph, Node, Unary};
 
 /// How the joint positions enter a network. Applies to every joint, so a model with a sliding joint
@@ -97,6 +97,20 @@ pub struct InputScaling {
     pub mean: Vec<f64>,
     /// Never zero.
     pub std: Vec<f64>,
+}
+
+/// A network that is not one for a model's joints.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "a network with layer widths {widths:?} does not fit {joints} joints: it must begin with \
+     {features} features, end with {outputs} outputs and have no empty layer; change `hidden`, \
+     or take the network that was trained for this system"
+)]
+pub struct NetworkError {
+    pub joints: usize,
+    pub features: usize,
+    pub outputs: usize,
+    pub widths: Vec<usize>,
 }
 
 impl InputScaling {
@@ -244,7 +258,7 @@ impl MlpWeights {
     ///
     /// # Errors
     /// When widths do not follow from each other, from the joints or from the scaling.
-    pub fn check(&self, joints: usize) -> Result<(), HybridError> {
+    pub fn check(&self, joints: usize) -> Result<(), NetworkError> {
         let (features, outputs) = (self.angles.features(joints), self.on.outputs(joints));
         let widths = self.widths();
         let chained = self
@@ -259,7 +273,7 @@ impl MlpWeights {
         if chained && full && ends && scaled && !widths.contains(&0) {
             Ok(())
         } else {
-            Err(HybridError::Network {
+            Err(NetworkError {
                 joints,
                 features,
                 outputs,
@@ -369,7 +383,7 @@ impl LayerWeights {
 ///
 /// # Errors
 /// When the network is not one for the joints of `dynamics`.
-pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, HybridError> {
+pub fn with_residual(dynamics: &Dynamics, mlp: &MlpWeights) -> Result<Dynamics, NetworkError> {
     let n = dynamics.joints;
     mlp.check(n)?;
     let mut graph = Graph::new();
@@ -416,6 +430,12 @@ pub(crate) fn nothing_but(name: &str, joints: usize, on: ResidualOn) -> Dynamics
         reading: None,
         own: Vec::new(),
     }
+}
+
+/// In the precision of training and of planners.
+#[allow(clippy::cast_possible_truncation)]
+pub(crate) fn to_f32(values: &[f64]) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
 }
 
 #[cfg(test)]

@@ -6,9 +6,9 @@ use super::json::{CHECKPOINT, MODEL, PLOTS, TEXT};
 use super::plot::PlotError;
 use super::schema::Report;
 use super::{model_file, picture, text};
-use crate::closeloop::Outcome;
+use crate::closeloop::{LearnError, Outcome};
 use crate::files::{OutputError, folder_of, move_to, write_whole};
-use crate::train::{CheckpointError, Origin};
+use crate::model::Origin;
 
 /// Why results could not be written.
 #[derive(Debug, Error)]
@@ -18,7 +18,7 @@ pub enum WriteError {
     #[error(transparent)]
     Plot(#[from] PlotError),
     #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
+    Checkpoint(#[from] LearnError),
 }
 
 /// Write report.json, report.md, model.toml, the plots and the checkpoint into `folder`, and return the report.
@@ -55,7 +55,7 @@ pub fn write(folder: &Path, outcome: &Outcome, origin: &Origin) -> Result<Report
             model_toml: model_file(outcome),
             ..origin.clone()
         };
-        crate::train::save(&staging.path().join(CHECKPOINT), &learned.training, &origin)?;
+        learned.save(&staging.path().join(CHECKPOINT), &origin)?;
     }
     std::fs::create_dir_all(folder).map_err(failed(folder))?;
     for entry in std::fs::read_dir(staging.path()).map_err(failed(folder))? {

@@ -5,9 +5,9 @@ use burn::tensor::Device;
 
 use super::manifest::{FORMAT, Manifest};
 use super::optimizer::Moments;
-use super::{Best, CheckpointError, Training, moments, weights};
+use super::{Best, CheckpointError, HybridModel, Training, moments};
 use crate::files::{content_id, end_of_links, folder_of, write_whole};
-use crate::model::{Dynamics, HybridModel, ModelWeights};
+use crate::model::{Dynamics, ModelWeights, Origin, SavedModelError, weights};
 
 const MANIFEST: &str = "checkpoint.json";
 const MODEL: &str = "model.toml";
@@ -16,16 +16,6 @@ const WEIGHTS: &str = "weights.safetensors";
 /// The model to go on from, which differs where an earlier one was the best.
 const LAST: &str = "last.safetensors";
 const OPTIMIZER: &str = "optimizer.safetensors";
-
-/// Where a run came from: kept in its checkpoints, so that they explain themselves.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Origin {
-    /// The whole configuration, as resolved.
-    pub config: serde_json::Value,
-    pub seed: u64,
-    /// Text of the model file.
-    pub model_toml: String,
-}
 
 /// A checkpoint as read from its directory.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,8 +145,10 @@ impl Checkpoint {
             dir.to_owned()
         };
         let manifest = read_manifest(&dir)?;
-        let numbers =
-            |file: &str| weights::from_bytes(&manifest.shape, &read(&dir, file)?, file, &dir);
+        let numbers = |file: &str| -> Result<ModelWeights, CheckpointError> {
+            let bytes = read(&dir, file)?;
+            Ok(weights::from_bytes(&manifest.shape, &bytes, file, &dir)?)
+        };
         let model_toml = String::from_utf8(read(&dir, MODEL)?)
             .map_err(|error| corrupt(MODEL, error.to_string(), &dir))?;
         let (weights, last) = (numbers(WEIGHTS)?, numbers(LAST)?);
@@ -232,7 +224,8 @@ impl Checkpoint {
         device: &Device,
     ) -> Result<HybridModel, CheckpointError> {
         self.check(dynamics)?;
-        Ok(self.manifest.shape.model(weights, dynamics, device)?)
+        let shape = &self.manifest.shape;
+        Ok(HybridModel::restored(shape, weights, dynamics, device)?)
     }
 
     fn check(&self, dynamics: &Dynamics) -> Result<(), CheckpointError> {
@@ -302,9 +295,6 @@ fn read_manifest(dir: &Path) -> Result<Manifest, CheckpointError> {
 }
 
 fn corrupt(file: &str, reason: String, dir: &Path) -> CheckpointError {
-    CheckpointError::Corrupt {
-        file: file.to_owned(),
-        reason,
-        dir: dir.to_owned(),
-    }
+    let (file, dir) = (file.to_owned(), dir.to_owned());
+    SavedModelError::Corrupt { file, reason, dir }.into()
 }

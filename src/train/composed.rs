@@ -2,9 +2,8 @@
 
 use burn::tensor::Tensor;
 
-use super::Columns;
 use super::loss::NORM_FLOOR;
-use crate::model::{HybridModel, Prepared};
+use super::{Columns, HybridModel, Prepared};
 use crate::sim::Integrator;
 
 /// E and ||F_r||, `[2]`.
@@ -33,7 +32,7 @@ pub(super) fn of_each(
     let mut state = batch.states[0].clone();
     let (mut errors, mut residuals) = (Vec::new(), Vec::new());
     for (k, input) in batch.inputs.iter().enumerate() {
-        let step = integrator.step(model, &state, input, &batch.time[k], &batch.dt[k]);
+        let step = model.step(integrator, &state, input, &batch.time[k], &batch.dt[k]);
         let error = squared_error(&step.state, &batch.states[k + 1], scale);
         errors.push(mean_of_each(error, models, rows));
         residuals.extend((step.residual).map(|r| mean_of_each(r.square(), models, rows)));

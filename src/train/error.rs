@@ -1,7 +1,8 @@
 use std::path::PathBuf;
 
+use super::hybrid::HybridError;
 use super::segments::SegmentsError;
-use crate::model::HybridError;
+use crate::model::SavedModelError;
 
 /// Why a training run cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -47,15 +48,6 @@ pub enum CheckpointError {
     #[error("not a checkpoint: there is no {missing:?} in {dir:?}")]
     Missing { missing: String, dir: PathBuf },
     #[error(
-        "the checkpoint's file {file:?} is damaged ({reason}); take another copy or train again, in \
-         {dir:?}"
-    )]
-    Corrupt {
-        file: String,
-        reason: String,
-        dir: PathBuf,
-    },
-    #[error(
         "the checkpoint has format {found}, this program reads format {expected}; use the residyn that \
          wrote it ({written_by}) or train again, in {dir:?}"
     )]
@@ -75,23 +67,14 @@ pub enum CheckpointError {
         given: String,
         dir: PathBuf,
     },
-    #[error(
-        "tensor `{tensor}` in {file:?} has shape {found:?}, but checkpoint.json describes {expected:?}; \
-         the files belong to different checkpoints, in {dir:?}"
-    )]
-    Shape {
-        tensor: String,
-        file: String,
-        expected: Vec<usize>,
-        found: Vec<usize>,
-        dir: PathBuf,
-    },
     #[error("cannot {action}: {source}, at {path:?}")]
     Io {
         action: &'static str,
         source: std::io::Error,
         path: PathBuf,
     },
+    #[error(transparent)]
+    Files(#[from] SavedModelError),
     #[error(transparent)]
     Model(#[from] HybridError),
     #[error(transparent)]

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::optimizer::Stepper;
 use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
-use crate::model::HybridModel;
+use crate::train::HybridModel;
 
 /// A training run: a value that can be held, saved ([`save`](super::save)), loaded and continued. Where
 /// it was interrupted does not change its result by a bit on the same backend and machine.

@@ -2,8 +2,7 @@ use std::sync::Arc;
 
 use burn::tensor::{Tensor, TensorData};
 
-use super::{Batch, Columns, TrainError, composed, fused};
-use crate::model::{HybridModel, Prepared};
+use super::{Batch, Columns, HybridModel, Prepared, TrainError, composed, fused};
 use crate::sim::Integrator;
 
 /// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,

@@ -1,12 +1,8 @@
-use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
 use super::history::null_if_infinite;
 use super::{FitSettings, Record, Training};
-use crate::model::{
-    Angles, Dynamics, HybridError, HybridModel, InputScaling, MlpWeights, ModelWeights, Parameter,
-    ResidualOn,
-};
+use crate::model::ModelShape;
 
 /// The number of the checkpoint format that this program writes and reads.
 pub const FORMAT: u64 = 2;
@@ -18,7 +14,7 @@ pub struct Manifest {
     /// The program that wrote it.
     pub residyn: String,
     #[serde(flatten)]
-    pub shape: Shape,
+    pub shape: ModelShape,
     /// The whole configuration of the run, as its caller resolved it.
     pub config: serde_json::Value,
     pub seed: u64,
@@ -32,40 +28,6 @@ pub struct Manifest {
     pub optimizer_steps: [usize; 2],
     pub best: Option<SavedBest>,
     pub history: Vec<Record>,
-}
-
-/// A model without its learnable numbers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Shape {
-    /// Name of the system.
-    pub system: String,
-    pub joints: usize,
-    /// Empty where the prior is a network.
-    pub parameters: Vec<SavedParameter>,
-    /// The prior, where it is a network.
-    pub prior: Option<SavedNetwork>,
-    pub residual: Option<SavedNetwork>,
-}
-
-/// What training needs to know of a physical parameter, besides its value.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SavedParameter {
-    pub name: String,
-    pub unit: String,
-    pub scale: f64,
-    /// None where there is no bound: JSON has no infinity.
-    pub bounds: [Option<f64>; 2],
-    pub fixed: bool,
-}
-
-/// The shape of a network.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SavedNetwork {
-    /// From the features to the outputs.
-    pub widths: Vec<usize>,
-    pub angles: Angles,
-    pub on: ResidualOn,
-    pub scaling: InputScaling,
 }
 
 /// When the model in `weights.safetensors` was the present one.
@@ -87,7 +49,7 @@ impl Manifest {
         Self {
             format: FORMAT,
             residyn: env!("CARGO_PKG_VERSION").to_owned(),
-            shape: Shape::of(
+            shape: ModelShape::of(
                 training.model.system(),
                 training.model.joints(),
                 &training.model.declared(),
@@ -105,92 +67,6 @@ impl Manifest {
                 validation: Some(best.validation),
             }),
             history: training.history.clone(),
-        }
-    }
-}
-
-impl Shape {
-    /// The shape of a model with these physical parameters and networks.
-    pub fn of(
-        system: &str,
-        joints: usize,
-        parameters: &[Parameter],
-        weights: &ModelWeights,
-    ) -> Self {
-        Self {
-            system: system.to_owned(),
-            joints,
-            parameters: parameters.iter().map(SavedParameter::of).collect(),
-            prior: weights.prior.as_ref().map(SavedNetwork::of),
-            residual: weights.residual.as_ref().map(SavedNetwork::of),
-        }
-    }
-
-    /// A model of this shape with these numbers, on `device`. `dynamics` is what its model file says.
-    ///
-    /// # Errors
-    /// Numbers or networks that do not make a model.
-    pub fn model(
-        &self,
-        weights: &ModelWeights,
-        dynamics: &Dynamics,
-        device: &Device,
-    ) -> Result<HybridModel, HybridError> {
-        let model = match &weights.prior {
-            Some(prior) => HybridModel::network(&self.system, self.joints, prior, device)?,
-            None => {
-                let saved = self.parameters.iter().zip(&weights.parameters);
-                let trained = Dynamics {
-                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
-                    ..dynamics.clone()
-                };
-                HybridModel::physics(&trained, device)?
-            }
-        };
-        match &weights.residual {
-            Some(residual) => model.with_residual(residual),
-            None => Ok(model),
-        }
-    }
-}
-
-impl SavedParameter {
-    fn of(parameter: &Parameter) -> Self {
-        let finite = |bound: f64| bound.is_finite().then_some(bound);
-        Self {
-            name: parameter.name.clone(),
-            unit: parameter.unit.clone(),
-            scale: parameter.scale,
-            bounds: parameter.bounds.map(finite),
-            fixed: parameter.fixed,
-        }
-    }
-
-    /// The parameter as it was trained, with this value.
-    pub(crate) fn restore(&self, value: f64) -> Parameter {
-        Parameter {
-            name: self.name.clone(),
-            value,
-            unit: self.unit.clone(),
-            bounds: [
-                self.bounds[0].unwrap_or(f64::NEG_INFINITY),
-                self.bounds[1].unwrap_or(f64::INFINITY),
-            ],
-            fixed: self.fixed,
-            per_log: false,
-            ci95: None,
-            scale: self.scale,
-        }
-    }
-}
-
-impl SavedNetwork {
-    fn of(weights: &MlpWeights) -> Self {
-        Self {
-            widths: weights.widths(),
-            angles: weights.angles,
-            on: weights.on,
-            scaling: weights.scaling.clone(),
         }
     }
 }

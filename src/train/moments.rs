@@ -5,11 +5,10 @@ use std::path::Path;
 
 use safetensors::Dtype;
 
-use super::CheckpointError;
 use super::manifest::Manifest;
 use super::optimizer::Moments;
-use super::weights::{Entry, Reader, serialize};
-use crate::model::ModelWeights;
+use crate::model::weights::{Entry, Reader, serialize};
+use crate::model::{ModelWeights, SavedModelError};
 
 const PARTS: [&str; 2] = ["prior", "residual"];
 
@@ -18,10 +17,10 @@ pub(super) fn to_bytes(manifest: &Manifest, moments: &[Option<Moments>; 2]) -> V
     let known = PARTS.iter().zip(moments);
     let entries = known.filter_map(|(part, moments)| {
         let moments = moments.as_ref()?;
-        Some([
-            Entry::of_f32(format!("{part}.first"), &moments.first),
-            Entry::of_f32(format!("{part}.second"), &moments.second),
-        ])
+        let each = [("first", &moments.first), ("second", &moments.second)];
+        Some(each.map(|(which, values)| {
+            Entry::of_f32(format!("{part}.{which}"), vec![values.len()], values)
+        }))
     });
     serialize(&manifest.shape, &entries.flatten().collect::<Vec<_>>())
 }
@@ -33,17 +32,17 @@ pub(super) fn from_bytes(
     bytes: &[u8],
     file: &str,
     dir: &Path,
-) -> Result<[Option<Moments>; 2], CheckpointError> {
+) -> Result<[Option<Moments>; 2], SavedModelError> {
     let reader = Reader::new(bytes, file, dir)?;
     let of_prior = weights.prior.as_ref();
     let lengths = [
         of_prior.map_or(weights.parameters.len(), |prior| prior.flat().len()),
         weights.residual.as_ref().map_or(0, |r| r.flat().len()),
     ];
-    let read = |k: usize| -> Result<Option<Moments>, CheckpointError> {
+    let read = |k: usize| -> Result<Option<Moments>, SavedModelError> {
         let steps = manifest.optimizer_steps[k];
         #[allow(clippy::cast_possible_truncation)] // f32 in the file, widened by the reader
-        let moment = |which: &str| -> Result<Vec<f32>, CheckpointError> {
+        let moment = |which: &str| -> Result<Vec<f32>, SavedModelError> {
             let name = format!("{}.{which}", PARTS[k]);
             let values = reader.read(&name, Dtype::F32, &[lengths[k]])?;
             Ok(values.into_iter().map(|value| value as f32).collect())

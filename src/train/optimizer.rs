@@ -1,8 +1,7 @@
 use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-use super::FitSettings;
-use crate::model::Frame;
+use super::{FitSettings, Frame};
 
 // PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
 // and would stop them short of it.

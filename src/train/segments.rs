@@ -2,9 +2,9 @@ use std::sync::Arc;
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::{Backend, Blocks, TrainError};
+use super::{Backend, Blocks, Frame, TrainError};
 use crate::files::content_id;
-use crate::model::{Angles, Frame, InputScaling};
+use crate::model::{Angles, InputScaling};
 
 /// Why rows of numbers are no segments.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

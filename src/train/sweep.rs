@@ -7,10 +7,10 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
 use super::optimizer::Stepper;
-
-use super::{Batching, Columns, FitSettings, Objective, Penalty, Segments, TrainError};
-use crate::model::mlp::to_f32;
-use crate::model::{HybridModel, MlpWeights, Stack};
+use super::{
+    Batching, Columns, FitSettings, HybridModel, Objective, Penalty, Segments, Stack, TrainError,
+};
+use crate::model::{MlpWeights, to_f32};
 
 /// A run of many models. The sum of their losses is minimised, in which each model has numbers of its own: every gradient
 /// and every step of Adam, which goes entry by entry, is that of a model alone. One whose loss is no longer finite

@@ -200,7 +200,7 @@ impl Lab {
         let segments = experience.segments(learner.joints)?;
         let training = learner.learn(&segments, None, seed, logs.len())?;
         let model = training.result()?;
-        Ok(Predictor::of_model(&model, learner.fit.integrator))
+        Ok(model.predictor(learner.fit.integrator))
     }
 }
 

@@ -10,16 +10,15 @@ use super::description::SavedFilter;
 use crate::expr::{Graph, Node, Program};
 use crate::formats::verify::ReferenceModel;
 use crate::formats::{ClientError, Predictions, Samples};
-use crate::model::{Dynamics, Filter, ModelWeights};
+use crate::model::weights::from_bytes;
+use crate::model::{Dynamics, Filter, ModelShape, ModelWeights};
 use crate::sim::Integrator;
-use crate::train::Shape;
-use crate::train::weights::from_bytes;
 
 /// The part of a description that such a client reads.
 #[derive(Deserialize)]
 struct SavedModel {
     #[serde(flatten)]
-    shape: Shape,
+    shape: ModelShape,
     integrator: Integrator,
     step_s: f64,
     weights: PathBuf,
@@ -52,7 +51,7 @@ pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, Cli
 
 impl SavedModel {
     fn reference(self, numbers: &ModelWeights) -> Result<ReferenceModel, String> {
-        let Shape {
+        let ModelShape {
             system,
             joints,
             parameters,

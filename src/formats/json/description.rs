@@ -9,23 +9,22 @@ use crate::data::Joint;
 use crate::expr::{Op, Program};
 use crate::formats::discrete_filter::DiscreteFilter;
 use crate::formats::{ExportModel, ExportedEffect};
-use crate::model::{CommandFilter, Parameter};
+use crate::model::{CommandFilter, ModelShape, Parameter};
 use crate::sim::Integrator;
-use crate::train::Shape;
 
 /// Version of the description's own format.
 pub(super) const VERSION: u64 = 1;
 
 /// The JSON file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Description {
+pub(crate) struct Description {
     /// [`VERSION`] of the program that wrote it.
     pub residyn_model: u64,
     /// Version of the program that wrote it.
     pub residyn: String,
     pub about: String,
     #[serde(flatten)]
-    pub shape: Shape,
+    pub shape: ModelShape,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
     pub integrator: Integrator,
@@ -82,7 +81,7 @@ pub(super) struct SavedFilter {
 
 impl Description {
     /// The description of a model whose learnable numbers, of this shape, are in the file `weights`.
-    pub fn of(model: &ExportModel, shape: Shape, weights: PathBuf) -> Self {
+    pub fn of(model: &ExportModel, shape: ModelShape, weights: PathBuf) -> Self {
         Self {
             residyn_model: VERSION,
             residyn: env!("CARGO_PKG_VERSION").to_owned(),

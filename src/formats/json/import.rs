@@ -2,25 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use serde_json::{Value, json};
+use serde_json::Value;
 use thiserror::Error;
 
 use super::description::{Description, VERSION};
-use crate::model::{Effect, FileError, HybridError, Model, ModelWeights, Parameter};
-use crate::train::weights::from_bytes;
-use crate::train::{
-    Backend, CheckpointError, FitSettings, Origin, Shape, TrainError, Training, save,
+use crate::model::weights::from_bytes;
+use crate::model::{
+    Effect, FileError, Model, ModelShape, ModelWeights, Parameter, SavedModelError,
 };
 
 /// A model read back from its two files.
 #[derive(Debug)]
 pub struct Imported {
-    description: Description,
+    pub(crate) description: Description,
     /// What its model file says.
     pub system: Model,
-    numbers: ModelWeights,
+    /// Values of the parameters, and the networks.
+    pub numbers: ModelWeights,
 }
 
 /// Why a description cannot be read.
@@ -52,11 +50,7 @@ pub enum ImportError {
     #[error(transparent)]
     Model(#[from] FileError),
     #[error(transparent)]
-    Weights(#[from] CheckpointError),
-    #[error(transparent)]
-    Hybrid(#[from] HybridError),
-    #[error(transparent)]
-    Train(#[from] TrainError),
+    Weights(#[from] SavedModelError),
 }
 
 impl Imported {
@@ -89,34 +83,6 @@ impl Imported {
             numbers,
         })
     }
-
-    /// Write the model as a checkpoint without further training. `seed` orders the minibatches of later training.
-    ///
-    /// # Errors
-    /// A folder that cannot be written, or that holds anything but a checkpoint.
-    pub fn save(self, dir: &Path, seed: u64, backend: Backend) -> Result<(), ImportError> {
-        let dynamics = self.system.dynamics();
-        let shape = &self.description.shape;
-        let model = shape.model(&self.numbers, &dynamics, &backend.device())?;
-        let Description {
-            integrator,
-            step_s,
-            origin,
-            model_toml,
-            ..
-        } = self.description;
-        let settings = FitSettings {
-            integrator,
-            ..FitSettings::default()
-        };
-        let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(seed))?;
-        let origin = Origin {
-            config: json!({"command": "import", "step_s": step_s, "origin": origin}),
-            seed,
-            model_toml,
-        };
-        Ok(save(dir, &training, &origin)?)
-    }
 }
 
 /// The description in `path`. Its version is checked first, since another one may describe anything else differently.
@@ -142,7 +108,7 @@ fn description(path: &Path) -> Result<Description, ImportError> {
 }
 
 /// Refuse weights of other parameters. A network as prior needs no equations, so those of its model file may be any.
-fn check(path: &Path, shape: &Shape, declared: &[Parameter]) -> Result<(), ImportError> {
+fn check(path: &Path, shape: &ModelShape, declared: &[Parameter]) -> Result<(), ImportError> {
     let file: Vec<&str> = declared.iter().map(|p| p.name.as_str()).collect();
     let weights: Vec<&str> = shape.parameters.iter().map(|p| p.name.as_str()).collect();
     if shape.prior.is_some() || file == weights {

@@ -11,8 +11,8 @@ pub use import::{ImportError, Imported};
 
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
-use crate::train::Shape;
-use crate::train::weights::to_bytes;
+use crate::model::ModelShape;
+use crate::model::weights::to_bytes;
 use description::Description;
 
 pub(super) const JSON: Format = Format {
@@ -52,7 +52,7 @@ fn pair(model: &ExportModel, description: &Path, weights: &Path) -> Result<Vec<F
         });
     }
     let numbers = model.weights();
-    let shape = Shape::of(
+    let shape = ModelShape::of(
         model.name(),
         model.joints(),
         &model.equations.parameters,

@@ -1,5 +1,5 @@
 use super::{Predictions, Samples};
-use crate::model::{Dynamics, HybridError, MlpWeights, with_residual};
+use crate::model::{Dynamics, MlpWeights, NetworkError, with_residual};
 use crate::sim::{Environment, Integrator};
 
 /// A whole model, networks included, and how it is stepped: the program's own predictions, in f64.
@@ -21,7 +21,7 @@ impl ReferenceModel {
         mut networks: impl Iterator<Item = &'n MlpWeights>,
         integrator: Integrator,
         step_s: f64,
-    ) -> Result<Self, HybridError> {
+    ) -> Result<Self, NetworkError> {
         let whole = networks.try_fold(equations, |dynamics, network| {
             with_residual(&dynamics, network)
         })?;

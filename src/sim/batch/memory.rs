@@ -2,7 +2,7 @@ use super::Rows;
 use crate::data::Log;
 use crate::lanes::{Arch, Simd, Vector, WithSimd};
 use crate::model::Dynamics;
-use crate::model::mlp::to_f32;
+use crate::model::to_f32;
 use crate::sim::Commands;
 
 /// Discrete impulse response of a model's torque filters for torques that are held over equal steps. The filters are

@@ -2,7 +2,7 @@ use super::memory::Memory;
 use super::{Network, Rows, W};
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
-use crate::model::mlp::to_f32;
+use crate::model::to_f32;
 use crate::model::{Dynamics, MlpWeights};
 use crate::sim::Integrator;
 

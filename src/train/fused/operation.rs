@@ -16,8 +16,8 @@ use burn::tensor::{Tensor, TensorData};
 use super::plan::{KEPT, Plan};
 use super::work::Work;
 use super::{Blocks, Crew};
-use crate::model::HybridModel;
 use crate::sim::Integrator;
+use crate::train::HybridModel;
 
 /// E and ||F_r||, `[2]`.
 pub(in crate::train) fn loss(

@@ -7,8 +7,8 @@ use super::record::Layout;
 use super::tapes::Tapes;
 use super::worker::{Desk, Worker, total};
 use crate::lanes::{Element, Vector};
-use crate::model::Frame;
 use crate::sim::batch::Rows;
+use crate::train::Frame;
 
 /// One thread's share of a loss, with memory that serves again for the next.
 #[derive(Debug)]

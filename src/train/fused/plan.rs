@@ -2,9 +2,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Blocks;
-use crate::model::Frame;
 use crate::sim::Integrator;
 use crate::sim::batch::{Network, Rows};
+use crate::train::Frame;
 
 /// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
 /// enough that all that is made of them stays near the processor.

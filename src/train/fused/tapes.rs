@@ -1,6 +1,6 @@
 use crate::expr::{Program, Tape};
-use crate::model::Frame;
 use crate::sim::batch::W;
+use crate::train::Frame;
 
 /// The programs of a frame, ready to run.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use pulp::Arch;
 use super::part::{Backward, Forward, Part};
 use super::plan::{Numbers, Plan};
 use crate::lanes::WorkerPool;
-use crate::model::Frame;
+use crate::train::Frame;
 use crate::train::loss::NORM_FLOOR;
 
 /// The threads that losses are taken on, and memory that serves again for the next.

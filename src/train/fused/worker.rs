@@ -7,9 +7,9 @@ use super::record::{Layout, Stage as Recorded};
 use super::tapes::Tapes;
 use crate::expr::Tape;
 use crate::lanes::{Element, Vector};
-use crate::model::Frame;
 use crate::sim::Stage;
 use crate::sim::batch::{Network, Rows, W};
+use crate::train::Frame;
 
 /// One thread at work on a chunk of blocks.
 pub(super) struct Worker<'a, S> {

@@ -1,10 +1,10 @@
 use std::path::PathBuf;
 
 use crate::data::LogError;
-use crate::model::{FileError, HybridError};
+use crate::model::FileError;
 use crate::plant::PlantError;
 use crate::runs::RunFolderError;
-use crate::train::{CheckpointError, SegmentsError, TrainError};
+use crate::train::{CheckpointError, HybridError, SegmentsError, TrainError};
 
 /// Why a recipe cannot be carried out.
 #[derive(Debug, thiserror::Error)]

@@ -2,9 +2,9 @@ use serde_json::{Value, json};
 
 use super::{Kind, Material, Recipe, RecipeError};
 use crate::files::{beside_or_named, content_id, text_or_embedded};
-use crate::model::{Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, Model};
+use crate::model::{Dynamics, LastLayer, Library, MlpSettings, MlpWeights, Model, Origin};
 use crate::runs::{Identity, Purpose, RunFolder, stream};
-use crate::train::{Backend, Checkpoint, Origin, Training};
+use crate::train::{Backend, Checkpoint, HybridModel, Training};
 
 /// A recipe with everything it refers to, read or sampled: ready to train or to resume.
 pub struct Job {

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::{Job, Kind};
-use crate::model::HybridModel;
-use crate::train::{Objective, Segments, TrainError, Training};
+use crate::train::{HybridModel, Objective, Segments, TrainError, Training};
 
 /// The results of a training.
 #[derive(Debug, Clone, PartialEq, Serialize)]

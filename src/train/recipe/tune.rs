@@ -4,8 +4,8 @@ use serde_json::json;
 
 use super::job::{declared, new_network};
 use super::{Job, Kind, Material, Recipe, RecipeError};
-use crate::model::{LastLayer, Library, Model};
-use crate::train::{Backend, Checkpoint, Origin};
+use crate::model::{LastLayer, Library, Model, Origin};
+use crate::train::{Backend, Checkpoint};
 
 impl Job {
     /// Fine-tunes the model of a checkpoint on the recipe's data.

@@ -3,8 +3,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::{hybrid, parameter, pendulum, rng, transitions};
-use crate::model::{HybridModel, LastLayer, MlpSettings, MlpWeights};
-use crate::train::{Backend, Checkpoint, FitSettings, Origin, Training, save};
+use crate::model::{LastLayer, MlpSettings, MlpWeights, Origin};
+use crate::train::{Backend, Checkpoint, FitSettings, HybridModel, Training, save};
 
 fn origin() -> Origin {
     Origin {

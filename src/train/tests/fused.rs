@@ -8,12 +8,12 @@ use burn::tensor::{Device, Gradients};
 use rand::RngExt;
 
 use super::{hybrid, one_joint, parameter, rng, transitions};
-use crate::model::{
-    Angles, Dynamics, HybridModel, LastLayer, Library, MlpSettings, MlpWeights, PRIOR_ID,
-    RESIDUAL_ID, ResidualOn,
-};
+use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
-use crate::train::{Backend, Batch, FitSettings, Objective, Segments, Start, Sweep, Training};
+use crate::train::hybrid::{PRIOR_ID, RESIDUAL_ID};
+use crate::train::{
+    Backend, Batch, FitSettings, HybridModel, Objective, Segments, Start, Sweep, Training,
+};
 
 /// Segments of `steps` irregular steps that lead through random states.
 pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {

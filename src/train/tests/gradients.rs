@@ -1,9 +1,9 @@
 use burn::module::Module;
 
 use super::{hybrid, rng, transitions};
-use crate::model::{HybridModel, LastLayer, MlpWeights, ModelWeights};
+use crate::model::{LastLayer, MlpWeights, ModelWeights};
 use crate::sim::Integrator;
-use crate::train::{Backend, Objective, Segments};
+use crate::train::{Backend, HybridModel, Objective, Segments};
 
 /// A trajectory with irregular steps, cut into segments of three.
 fn segments() -> Segments {

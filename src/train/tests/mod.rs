@@ -1,6 +1,7 @@
 //! Tests of training on a simulated pendulum, whose parts they share.
 
 mod checkpoints;
+mod environment;
 mod fused;
 mod gradients;
 mod parity;
@@ -12,9 +13,9 @@ mod sweep;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Backend, Segments};
+use super::{Backend, HybridModel, Segments};
 use crate::expr::{Graph, Scope, SignForm, parse};
-use crate::model::{Dynamics, HybridModel, LastLayer, MlpSettings, MlpWeights, Parameter};
+use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
 
 pub(super) const DT: f64 = 0.02;
 

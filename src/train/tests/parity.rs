@@ -8,10 +8,10 @@ use super::{pendulum, rng, transitions};
 use crate::expr::Program;
 use crate::lanes::Row;
 use crate::model::{
-    Angles, Dynamics, HybridModel, InputScaling, LastLayer, Library, MlpSettings, MlpWeights,
-    ResidualOn, with_residual,
+    Angles, Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn,
+    with_residual,
 };
-use crate::train::Backend;
+use crate::train::{Backend, HybridModel};
 
 const ROWS: usize = 37;
 

@@ -1,8 +1,10 @@
 use std::ops::ControlFlow;
 
 use super::{hybrid, rng, transitions};
-use crate::model::{HybridModel, LastLayer, MlpSettings, MlpWeights};
-use crate::train::{Backend, Ended, FitSettings, LearningRates, Penalty, Segments, Training};
+use crate::model::{LastLayer, MlpSettings, MlpWeights};
+use crate::train::{
+    Backend, Ended, FitSettings, HybridModel, LearningRates, Penalty, Segments, Training,
+};
 
 fn fit(model: HybridModel, segments: &Segments, settings: FitSettings) -> Training {
     let mut training = Training::new(model, settings, rng(3)).unwrap();

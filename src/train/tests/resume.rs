@@ -2,10 +2,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::{hybrid, pendulum, rng, transitions};
-use crate::model::LastLayer;
-use crate::train::{
-    Backend, Batching, Checkpoint, Ended, FitSettings, Origin, Penalty, Training, save,
-};
+use crate::model::{LastLayer, Origin};
+use crate::train::{Backend, Batching, Checkpoint, Ended, FitSettings, Penalty, Training, save};
 
 fn origin() -> Origin {
     Origin {

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use super::{hybrid, rng, transitions};
-use crate::model::{HybridModel, LastLayer, MlpWeights};
-use crate::train::{Backend, FitSettings, LearningRates, Training};
+use crate::model::{LastLayer, MlpWeights};
+use crate::train::{Backend, FitSettings, HybridModel, LearningRates, Training};
 
 fn after(model: &HybridModel, settings: FitSettings) -> HybridModel {
     let segments = transitions(20, -0.5, 1);

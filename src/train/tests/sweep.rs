@@ -5,12 +5,12 @@ use std::ops::ControlFlow;
 
 use super::fused::{equations, network, segments};
 use super::{one_joint, parameter, rng, transitions};
-use crate::model::{Angles, HybridModel, LastLayer, ResidualOn};
+use crate::model::{Angles, LastLayer, ResidualOn};
 use crate::sim::Integrator;
 use crate::train::optimizer::Stepper;
 use crate::train::{
-    Backend, Batch, Batching, FitSettings, Objective, Penalty, Segments, Start, Sweep, Trained,
-    Training,
+    Backend, Batch, Batching, FitSettings, HybridModel, Objective, Penalty, Segments, Start, Sweep,
+    Trained, Training,
 };
 
 const BACKENDS: &[Backend] = Backend::ALL;

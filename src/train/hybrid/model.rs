@@ -3,50 +3,18 @@ use std::sync::Arc;
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor};
 
-use super::equations;
-use super::frame::Frame;
-use super::mlp::{Mlp, flat, to_f64};
-use super::network::{MlpWeights, ResidualOn, nothing_but, with_residual};
-use super::{Dynamics, Parameter};
-
-/// Why a model cannot be put together.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum HybridError {
-    #[error(
-        "a network with layer widths {widths:?} does not fit {joints} joints: it must begin with \
-         {features} features, end with {outputs} outputs and have no empty layer; change `hidden`, \
-         or take the network that was trained for this system"
-    )]
-    Network {
-        joints: usize,
-        features: usize,
-        outputs: usize,
-        widths: Vec<usize>,
-    },
-    #[error(
-        "parameter `{name}` has value {value}, scale {scale}, bounds {bounds:?}: training needs a \
-         finite value, a finite scale above zero and the value within the bounds"
-    )]
-    Parameter {
-        name: String,
-        value: f64,
-        scale: f64,
-        bounds: [f64; 2],
-    },
-    #[error(
-        "{found} parameters or networks of another shape were given to a model of `{system}`, which \
-         has {expected} parameters"
-    )]
-    Weights {
-        system: String,
-        expected: usize,
-        found: usize,
-    },
-}
+use super::mlp::{flat, to_f64};
+use super::prepared::{columns, rows_of};
+use super::{Frame, HybridError, Prepared, equations};
+use crate::control::Predictor;
+use crate::model::{
+    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
+};
+use crate::sim::Integrator;
 
 // The names by which Burn knows the tensors.
-pub(crate) const PRIOR_ID: u64 = 1;
-pub(crate) const RESIDUAL_ID: u64 = 2;
+pub(in crate::train) const PRIOR_ID: u64 = 1;
+pub(in crate::train) const RESIDUAL_ID: u64 = 2;
 
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
@@ -61,33 +29,6 @@ pub struct HybridModel {
     residual: Option<Param<Tensor<1>>>,
     #[module(skip)]
     frame: Arc<Frame>,
-}
-
-/// All learnable numbers of a model, in plain form.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ModelWeights {
-    /// Values of the physical parameters in their units, in the order of the model's parameters.
-    pub parameters: Vec<f64>,
-    pub prior: Option<MlpWeights>,
-    pub residual: Option<MlpWeights>,
-}
-
-/// ds/dt at a batch of points.
-#[derive(Debug, Clone)]
-pub struct Flow {
-    /// dq/dt then dqd/dt: `2n` columns of shape `[batch]`, or `[1]` where all rows agree.
-    pub rates: Vec<Tensor<1>>,
-    /// F_r, `[batch, n or 2n]`; none in a model without a residual.
-    pub residual: Option<Tensor<2>>,
-}
-
-/// A model, or several of one frame, with the parameters unpacked for the evaluations of one loss.
-#[derive(Debug)]
-pub struct Prepared<'m> {
-    frame: &'m Frame,
-    parameters: Vec<Tensor<1>>,
-    prior: Option<Mlp<'m>>,
-    residual: Option<Mlp<'m>>,
 }
 
 impl HybridModel {
@@ -136,6 +77,33 @@ impl HybridModel {
             frame: Arc::new(self.frame.with_residual(weights)),
             ..self
         })
+    }
+
+    /// A saved model, on `device`. `dynamics` is what its model file says.
+    ///
+    /// # Errors
+    /// Numbers or networks that do not make a model.
+    pub fn restored(
+        shape: &ModelShape,
+        weights: &ModelWeights,
+        dynamics: &Dynamics,
+        device: &Device,
+    ) -> Result<Self, HybridError> {
+        let model = match &weights.prior {
+            Some(prior) => Self::network(&shape.system, shape.joints, prior, device)?,
+            None => {
+                let saved = shape.parameters.iter().zip(&weights.parameters);
+                let trained = Dynamics {
+                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
+                    ..dynamics.clone()
+                };
+                Self::physics(&trained, device)?
+            }
+        };
+        match &weights.residual {
+            Some(residual) => model.with_residual(residual),
+            None => Ok(model),
+        }
     }
 
     /// Name of the system.
@@ -218,9 +186,10 @@ impl HybridModel {
     /// None for a model made by this module's constructors.
     pub fn to_dynamics(&self) -> Result<Dynamics, HybridError> {
         let (around, networks) = self.parts();
-        networks.iter().try_fold(around, |dynamics, network| {
+        let whole = networks.iter().try_fold(around, |dynamics, network| {
             with_residual(&dynamics, network)
-        })
+        });
+        Ok(whole?)
     }
 
     /// The equations with the current values, or what stands in their place where the prior is a network; and the
@@ -237,6 +206,12 @@ impl HybridModel {
             }
         };
         (around, prior.into_iter().chain(residual).collect())
+    }
+
+    /// The model as planners take it; `integrator` is the one that it was trained through.
+    pub fn predictor(&self, integrator: Integrator) -> Predictor {
+        let (equations, networks) = self.parts();
+        Predictor::new(equations, networks, integrator)
     }
 
     /// The declared equations with the current values.
@@ -292,7 +267,7 @@ impl HybridModel {
     }
 
     /// The learnable numbers of the prior and of the residual.
-    pub(crate) fn tensors(&self) -> [Option<Tensor<1>>; 2] {
+    pub(in crate::train) fn tensors(&self) -> [Option<Tensor<1>>; 2] {
         [
             Some(self.prior.val()),
             self.residual.as_ref().map(Param::val),
@@ -300,7 +275,7 @@ impl HybridModel {
     }
 
     /// The same model with other learnable numbers where some are given.
-    pub(crate) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
+    pub(in crate::train) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
         let [prior, residual] = tensors;
         let prior = prior.map(|tensor| learnable(PRIOR_ID, tensor));
         let residual = residual.map(|tensor| learnable(RESIDUAL_ID, tensor));
@@ -312,74 +287,6 @@ impl HybridModel {
     }
 }
 
-impl<'m> Prepared<'m> {
-    /// Models of `frame` with the learnable numbers `[models, numbers]` of prior and residual, where they have any. Each evaluates `rows` rows,
-    /// one model's after the other's; a single model takes any number where `rows` is 1.
-    pub(super) fn new(
-        frame: &'m Frame,
-        rows: usize,
-        [prior, residual]: [Option<Tensor<2>>; 2],
-    ) -> Self {
-        let network = |(made, numbers)| Mlp::new(made, &numbers);
-        let parameters = |prior| equations::columns(frame.parameters(), prior, rows);
-        Self {
-            frame,
-            prior: frame.prior().zip(prior.clone()).map(network),
-            residual: frame.residual().zip(residual).map(network),
-            parameters: prior.map_or_else(Vec::new, parameters),
-        }
-    }
-
-    /// ds/dt for columns of shape `[batch]`: `2n` states, `n` inputs held, time in seconds.
-    pub fn flow(&self, state: &[Tensor<1>], input: &[Tensor<1>], time: &Tensor<1>) -> Flow {
-        let (q, qd) = state.split_at(self.frame.joints);
-        let mut rates = match (&self.frame.equations, &self.prior) {
-            (Some(equations), _) => {
-                let mut inputs = state.to_vec();
-                inputs.extend_from_slice(input);
-                inputs.push(time.clone());
-                inputs.extend_from_slice(&self.parameters);
-                equations.program.replay(&inputs)
-            }
-            (None, prior) => {
-                let mlp = prior.as_ref().expect("a prior is equations or a network");
-                let outputs = columns(mlp.forward(q, qd, input));
-                match mlp.on() {
-                    ResidualOn::Accelerations => qd.iter().cloned().chain(outputs).collect(),
-                    ResidualOn::Derivative => outputs,
-                }
-            }
-        };
-        let mlp = self.residual.as_ref();
-        let residual = mlp.map(|mlp| mlp.forward(q, qd, input));
-        if let Some(residual) = residual.clone() {
-            let parts = columns(residual);
-            let first = rates.len() - parts.len();
-            for (rate, part) in rates[first..].iter_mut().zip(parts) {
-                *rate = rate.clone() + part;
-            }
-        }
-        Flow { rates, residual }
-    }
-}
-
-/// A vector as so many equal rows of a matrix; none of an empty vector, since Burn has no empty matrices.
-pub(super) fn rows_of(vector: Tensor<1>, rows: usize) -> Option<Tensor<2>> {
-    let width = vector.dims()[0];
-    (width > 0).then(|| vector.expand([rows, width]))
-}
-
 fn learnable(id: u64, tensor: Tensor<1>) -> Param<Tensor<1>> {
     Param::initialized(ParamId::from(id), tensor.require_grad())
-}
-
-/// The columns of a matrix `[batch, width]`.
-fn columns(matrix: Tensor<2>) -> Vec<Tensor<1>> {
-    let [batch, width] = matrix.dims();
-    if width == 1 {
-        return vec![matrix.reshape([batch])];
-    }
-    (0..width)
-        .map(|k| matrix.clone().slice([0..batch, k..k + 1]).reshape([batch]))
-        .collect()
 }

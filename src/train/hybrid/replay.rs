@@ -1,7 +1,6 @@
-use burn::tensor::Tensor;
+use burn::tensor::{Bool, Device, Tensor};
 
-use super::op::{Binary, Op, Unary};
-use super::{Node, Program};
+use crate::expr::{Binary, Node, Op, Program, Unary};
 
 /// A value on the way through a replay: constants stay numbers until they meet a tensor.
 #[derive(Clone)]
@@ -10,44 +9,41 @@ enum Value {
     Column(Tensor<1>),
 }
 
-impl Program {
-    /// Carry out the program on Burn tensors, one row of the batch in each entry, so that Burn
-    /// differentiates and places it. `inputs` are of shape `[batch]`, or `[1]` for what all rows
-    /// share; so are the outputs.
-    ///
-    /// # Panics
-    /// When `inputs` is empty or not as long as [`Program::inputs`].
-    pub fn replay(&self, inputs: &[Tensor<1>]) -> Vec<Tensor<1>> {
-        assert_eq!(inputs.len(), self.inputs.len(), "one tensor for each input");
-        let device = inputs[0].device();
-        let mut values: Vec<Value> = Vec::with_capacity(self.ops.len());
-        for op in &self.ops {
-            let at = |node: Node| values[node.index()].clone();
-            let value = match *op {
-                Op::Const(value) => Value::Number(value),
-                Op::Input(k) => Value::Column(inputs[k as usize].clone()),
-                Op::Unary(op, a) => Value::Column(unary(op, at(a).column(&device))),
-                Op::Binary(op, a, b) => Value::Column(binary(op, at(a), at(b), &device)),
-                Op::Where(c, a, b) => {
-                    let (c, a, b) = (
-                        at(c).column(&device),
-                        at(a).column(&device),
-                        at(b).column(&device),
-                    );
-                    Value::Column(select(c.greater_elem(0.0), a, b))
-                }
-            };
-            values.push(value);
-        }
-        self.outputs
-            .iter()
-            .map(|o| values[o.index()].clone().column(&device))
-            .collect()
+/// Carry out a program on Burn tensors, one row of the batch in each entry, so that Burn differentiates and places it.
+/// `inputs` are of shape `[batch]`, or `[1]` for what all rows share; so are the outputs.
+///
+/// # Panics
+/// When `inputs` is empty or not as long as [`Program::inputs`].
+pub fn replay(program: &Program, inputs: &[Tensor<1>]) -> Vec<Tensor<1>> {
+    assert_eq!(
+        inputs.len(),
+        program.inputs().len(),
+        "one tensor for each input"
+    );
+    let device = inputs[0].device();
+    let mut values: Vec<Value> = Vec::with_capacity(program.ops().len());
+    for op in program.ops() {
+        let at = |node: Node| values[node.index()].clone();
+        let column = |node: Node| at(node).column(&device);
+        let value = match *op {
+            Op::Const(value) => Value::Number(value),
+            Op::Input(k) => Value::Column(inputs[k as usize].clone()),
+            Op::Unary(op, a) => Value::Column(unary(op, column(a))),
+            Op::Binary(op, a, b) => Value::Column(binary(op, at(a), at(b), &device)),
+            Op::Where(c, a, b) => {
+                Value::Column(select(column(c).greater_elem(0.0), column(a), column(b)))
+            }
+        };
+        values.push(value);
     }
+    let outputs = program.outputs().iter();
+    outputs
+        .map(|output| values[output.index()].clone().column(&device))
+        .collect()
 }
 
 impl Value {
-    fn column(self, device: &burn::tensor::Device) -> Tensor<1> {
+    fn column(self, device: &Device) -> Tensor<1> {
         match self {
             Self::Column(tensor) => tensor,
             #[allow(clippy::cast_possible_truncation)] // training runs in f32
@@ -71,7 +67,7 @@ fn unary(op: Unary, a: Tensor<1>) -> Tensor<1> {
     }
 }
 
-fn binary(op: Binary, a: Value, b: Value, device: &burn::tensor::Device) -> Tensor<1> {
+fn binary(op: Binary, a: Value, b: Value, device: &Device) -> Tensor<1> {
     match (op, a, b) {
         (Binary::Add, Value::Column(a), Value::Number(b)) => a + b,
         (Binary::Add, Value::Number(a), Value::Column(b)) => b + a,
@@ -111,7 +107,7 @@ fn columns(op: Binary, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
 }
 
 /// `a` where `condition` holds, else `b`.
-fn select(condition: Tensor<1, burn::tensor::Bool>, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
+fn select(condition: Tensor<1, Bool>, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
     let rows = condition.dims()[0].max(a.dims()[0]).max(b.dims()[0]);
     let [a, b] = [a, b].map(|t| t.expand([rows]));
     b.mask_where(condition.expand([rows]), a)

@@ -1,6 +1,6 @@
 use burn::tensor::{Device, Tensor, TensorData, activation::relu};
 
-use super::network::{Angles, MlpWeights, ResidualOn};
+use crate::model::{Angles, MlpWeights, ResidualOn, to_f32};
 
 /// Multilayer perceptrons of one shape with ReLU on every layer but the last, unpacked for Burn's operations. Each sees
 /// rows of its own, one network's after the other's.
@@ -82,11 +82,6 @@ pub(super) fn flat(weights: &MlpWeights, device: &Device) -> Tensor<1> {
 
 fn vector(values: &[f64], device: &Device) -> Tensor<1> {
     Tensor::from_data(TensorData::new(to_f32(values), [values.len()]), device)
-}
-
-#[allow(clippy::cast_possible_truncation)] // training runs in f32
-pub(crate) fn to_f32(values: &[f64]) -> Vec<f32> {
-    values.iter().map(|value| *value as f32).collect()
 }
 
 /// The entries of a tensor, row after row.

@@ -1,8 +1,6 @@
-//! A step of a batch on tensors.
-
 use burn::tensor::Tensor;
 
-use super::hybrid::{Flow, Prepared};
+use super::{Flow, Prepared};
 use crate::sim::{Integrator, Scheme};
 
 /// One step of a batch.
@@ -15,27 +13,27 @@ pub struct Step {
     pub residual: Option<Tensor<2>>,
 }
 
-impl Integrator {
+impl Prepared<'_> {
     /// Advance columns `[batch]` of states by `dt` seconds (`[batch]`) from `time`, under `input`.
     pub fn step(
-        self,
-        model: &Prepared,
+        &self,
+        integrator: Integrator,
         state: &[Tensor<1>],
         input: &[Tensor<1>],
         time: &Tensor<1>,
         dt: &Tensor<1>,
     ) -> Step {
-        let first = model.flow(state, input, time);
+        let first = self.flow(state, input, time);
         let residual = first.residual.clone();
-        let h = match self.substeps() {
+        let h = match integrator.substeps() {
             1 => dt.clone(),
             substeps => dt.clone() / substeps as f64,
         };
-        let mut state = substep(self.scheme(), model, state, input, time, &h, first);
-        for k in 1..self.substeps() {
+        let mut state = substep(integrator.scheme(), self, state, input, time, &h, first);
+        for k in 1..integrator.substeps() {
             let time = time.clone() + h.clone() * k as f64;
-            let start = model.flow(&state, input, &time);
-            state = substep(self.scheme(), model, &state, input, &time, &h, start);
+            let start = self.flow(&state, input, &time);
+            state = substep(integrator.scheme(), self, &state, input, &time, &h, start);
         }
         Step { state, residual }
     }

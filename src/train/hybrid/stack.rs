@@ -2,16 +2,14 @@ use std::sync::Arc;
 
 use burn::tensor::{Bool, Device, Tensor, TensorData};
 
-use super::equations;
-use super::frame::Frame;
-use super::hybrid::{Prepared, rows_of};
-use super::mlp::{to_f32, to_f64};
-use super::network::MlpWeights;
-use super::{HybridModel, Parameter};
+use super::mlp::to_f64;
+use super::prepared::rows_of;
+use super::{Frame, HybridModel, Prepared, equations};
+use crate::model::{MlpWeights, Parameter, to_f32};
 
 /// Independent models of one frame side by side, so that one operation on a device serves them all.
 #[derive(Debug, Clone)]
-pub(crate) struct Stack {
+pub(in crate::train) struct Stack {
     frame: Arc<Frame>,
     models: usize,
     /// The learnable numbers of the prior and of the residual, `[models, numbers]` each; none where there are no numbers.
@@ -26,7 +24,7 @@ impl Stack {
     ///
     /// # Panics
     /// When there are no networks, or not of the shape of the model's own.
-    pub(crate) fn new(model: &HybridModel, networks: &[MlpWeights]) -> Self {
+    pub(in crate::train) fn new(model: &HybridModel, networks: &[MlpWeights]) -> Self {
         let (frame, device) = (model.frame().clone(), model.device());
         let made = frame.networks.last().map(MlpWeights::widths);
         let fits = |network: &MlpWeights| Some(network.widths()) == made;
@@ -55,33 +53,37 @@ impl Stack {
     }
 
     /// Number of models.
-    pub(crate) fn models(&self) -> usize {
+    pub(in crate::train) fn models(&self) -> usize {
         self.models
     }
 
     /// What the models are without their learnable numbers.
-    pub(crate) fn frame(&self) -> &Frame {
+    pub(in crate::train) fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    pub(crate) fn device(&self) -> Device {
+    pub(in crate::train) fn device(&self) -> Device {
         let mut tensors = self.tensors.iter().flatten();
         tensors.next().expect("a network has numbers").device()
     }
 
     /// The learnable numbers of the prior and of the residual, `[models, numbers]` each.
-    pub(crate) fn tensors(&self) -> [Option<Tensor<2>>; 2] {
+    pub(in crate::train) fn tensors(&self) -> [Option<Tensor<2>>; 2] {
         self.tensors.clone()
     }
 
     /// Unpack the parameters for evaluations at so many rows for each model, one model's after the other's.
-    pub(crate) fn prepare(&self, rows: usize) -> Prepared<'_> {
+    pub(in crate::train) fn prepare(&self, rows: usize) -> Prepared<'_> {
         Prepared::new(&self.frame, rows, self.tensors())
     }
 
     /// The models that are `alive` (`[models]`) with other learnable numbers, physical parameters brought back within
     /// their bounds; the others as they are.
-    pub(crate) fn stepped(&self, tensors: [Option<Tensor<2>>; 2], alive: &Tensor<1, Bool>) -> Self {
+    pub(in crate::train) fn stepped(
+        &self,
+        tensors: [Option<Tensor<2>>; 2],
+        alive: &Tensor<1, Bool>,
+    ) -> Self {
         let alive: Tensor<2, Bool> = alive.clone().unsqueeze_dim(1);
         let [prior, residual] = tensors.map(|tensor| tensor.map(Tensor::inner));
         let mut stepped = [prior.map(|prior| self.project(prior)), residual];
@@ -109,7 +111,7 @@ impl Stack {
     }
 
     /// Values of the physical parameters of each model, in their units.
-    pub(crate) fn parameters(&self) -> Vec<Vec<f64>> {
+    pub(in crate::train) fn parameters(&self) -> Vec<Vec<f64>> {
         let declared = self.frame.parameters();
         if declared.is_empty() {
             return vec![Vec::new(); self.models];

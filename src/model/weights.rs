@@ -8,12 +8,11 @@ use std::path::Path;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
-use super::CheckpointError;
-use super::manifest::{SavedNetwork, Shape};
-use crate::model::{LayerWeights, MlpWeights, ModelWeights};
+use super::saved::{SavedModelError, SavedNetwork};
+use super::{LayerWeights, MlpWeights, ModelShape, ModelWeights, to_f32};
 
 /// A tensor on its way into a file.
-pub(super) struct Entry {
+pub(crate) struct Entry {
     name: String,
     dtype: Dtype,
     shape: Vec<usize>,
@@ -21,19 +20,19 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// A vector of f32.
-    pub(super) fn of_f32(name: String, values: &[f32]) -> Self {
+    /// Of f32.
+    pub(crate) fn of_f32(name: String, shape: Vec<usize>, values: &[f32]) -> Self {
         Self {
             name,
             dtype: Dtype::F32,
-            shape: vec![values.len()],
+            shape,
             bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
         }
     }
 }
 
 /// The bytes of the file.
-pub(crate) fn to_bytes(shape: &Shape, weights: &ModelWeights) -> Vec<u8> {
+pub(crate) fn to_bytes(shape: &ModelShape, weights: &ModelWeights) -> Vec<u8> {
     let mut entries: Vec<Entry> = (shape.parameters.iter().zip(&weights.parameters))
         .map(|(parameter, value)| Entry {
             name: format!("parameters.{}", parameter.name),
@@ -51,7 +50,7 @@ pub(crate) fn to_bytes(shape: &Shape, weights: &ModelWeights) -> Vec<u8> {
 }
 
 /// The bytes of a file with these tensors.
-pub(super) fn serialize(shape: &Shape, entries: &[Entry]) -> Vec<u8> {
+pub(crate) fn serialize(shape: &ModelShape, entries: &[Entry]) -> Vec<u8> {
     let views = entries.iter().map(|entry| {
         let view = TensorView::new(entry.dtype, entry.shape.clone(), &entry.bytes)
             .expect("bytes are written for the shape");
@@ -61,42 +60,27 @@ pub(super) fn serialize(shape: &Shape, entries: &[Entry]) -> Vec<u8> {
     safetensors::serialize(views, Some(about)).expect("names and shapes are plain")
 }
 
+/// In the precision of training.
 fn layer_entries(prefix: &str, k: usize, layer: &LayerWeights) -> [Entry; 2] {
-    #[allow(clippy::cast_possible_truncation)]
-    // they are f32 in training, widened for other readers
-    let bytes = |values: &[f64]| {
-        values
-            .iter()
-            .flat_map(|v| (*v as f32).to_le_bytes())
-            .collect()
-    };
+    let name = |part| format!("{prefix}layers.{k}.{part}");
+    let weights = vec![layer.outputs, layer.inputs];
     [
-        Entry {
-            name: format!("{prefix}layers.{k}.weight"),
-            dtype: Dtype::F32,
-            shape: vec![layer.outputs, layer.inputs],
-            bytes: bytes(&layer.weight),
-        },
-        Entry {
-            name: format!("{prefix}layers.{k}.bias"),
-            dtype: Dtype::F32,
-            shape: vec![layer.outputs],
-            bytes: bytes(&layer.bias),
-        },
+        Entry::of_f32(name("weight"), weights, &to_f32(&layer.weight)),
+        Entry::of_f32(name("bias"), vec![layer.outputs], &to_f32(&layer.bias)),
     ]
 }
 
 /// Read the file back; `shape` says what must be in it.
 pub(crate) fn from_bytes(
-    shape: &Shape,
+    shape: &ModelShape,
     bytes: &[u8],
     file: &str,
     dir: &Path,
-) -> Result<ModelWeights, CheckpointError> {
+) -> Result<ModelWeights, SavedModelError> {
     let reader = Reader::new(bytes, file, dir)?;
     let parameters = (shape.parameters.iter())
         .map(|p| Ok(reader.read(&format!("parameters.{}", p.name), Dtype::F64, &[1])?[0]))
-        .collect::<Result<_, CheckpointError>>()?;
+        .collect::<Result<_, SavedModelError>>()?;
     let network = |prefix: &str, saved: &Option<SavedNetwork>| {
         let saved = saved.as_ref();
         saved.map(|saved| reader.network(prefix, saved)).transpose()
@@ -109,20 +93,20 @@ pub(crate) fn from_bytes(
 }
 
 /// A file of tensors, and its name for messages.
-pub(super) struct Reader<'a> {
+pub(crate) struct Reader<'a> {
     tensors: SafeTensors<'a>,
     file: &'a str,
     dir: &'a Path,
 }
 
 impl<'a> Reader<'a> {
-    pub(super) fn new(
+    pub(crate) fn new(
         bytes: &'a [u8],
         file: &'a str,
         dir: &'a Path,
-    ) -> Result<Self, CheckpointError> {
+    ) -> Result<Self, SavedModelError> {
         let tensors =
-            SafeTensors::deserialize(bytes).map_err(|error| CheckpointError::Corrupt {
+            SafeTensors::deserialize(bytes).map_err(|error| SavedModelError::Corrupt {
                 file: file.to_owned(),
                 reason: error.to_string(),
                 dir: dir.to_owned(),
@@ -130,7 +114,7 @@ impl<'a> Reader<'a> {
         Ok(Self { tensors, file, dir })
     }
 
-    fn network(&self, prefix: &str, saved: &SavedNetwork) -> Result<MlpWeights, CheckpointError> {
+    fn network(&self, prefix: &str, saved: &SavedNetwork) -> Result<MlpWeights, SavedModelError> {
         let pairs = saved.widths.windows(2).enumerate();
         let layers = pairs.map(|(k, pair)| {
             let (inputs, outputs) = (pair[0], pair[1]);
@@ -146,17 +130,17 @@ impl<'a> Reader<'a> {
             angles: saved.angles,
             on: saved.on,
             scaling: saved.scaling.clone(),
-            layers: layers.collect::<Result<_, CheckpointError>>()?,
+            layers: layers.collect::<Result<_, SavedModelError>>()?,
         })
     }
 
-    pub(super) fn read(
+    pub(crate) fn read(
         &self,
         name: &str,
         dtype: Dtype,
         shape: &[usize],
-    ) -> Result<Vec<f64>, CheckpointError> {
-        let corrupt = |reason| CheckpointError::Corrupt {
+    ) -> Result<Vec<f64>, SavedModelError> {
+        let corrupt = |reason| SavedModelError::Corrupt {
             file: self.file.to_owned(),
             reason,
             dir: self.dir.to_owned(),
@@ -170,7 +154,7 @@ impl<'a> Reader<'a> {
             )));
         }
         if tensor.shape() != shape {
-            return Err(CheckpointError::Shape {
+            return Err(SavedModelError::Shape {
                 tensor: name.to_owned(),
                 file: self.file.to_owned(),
                 expected: shape.to_vec(),

@@ -1,6 +1,5 @@
-use super::network::{MlpWeights, nothing_but};
-use super::{Dynamics, Parameter};
 use crate::expr::{Graph, Node, Program};
+use crate::model::{Dynamics, MlpWeights, Parameter, nothing_but};
 
 /// A hybrid model without its learnable numbers, for those who carry out its networks themselves: one program for
 /// everything around them, and its derivative.
@@ -46,7 +45,7 @@ impl Frame {
     }
 
     /// The physical parameters as declared; none where the prior is a network.
-    pub(crate) fn parameters(&self) -> &[Parameter] {
+    pub(in crate::train) fn parameters(&self) -> &[Parameter] {
         let equations = self.equations.as_ref();
         equations.map_or(&[], |dynamics| &dynamics.parameters)
     }

@@ -3,8 +3,9 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use super::mlp::{to_f32, to_f64};
-use super::{Dynamics, HybridError, Parameter};
+use super::HybridError;
+use super::mlp::to_f64;
+use crate::model::{Dynamics, Parameter, to_f32};
 
 /// value / scale of every parameter, `[parameters]`.
 ///

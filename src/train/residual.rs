@@ -1,0 +1,113 @@
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{
+    Backend, FitSettings, HybridModel, LearningRates, Penalty, Segments, TrainError, Training, save,
+};
+use crate::closeloop::{LearnError, LearnSettings, LearnedResidual, ResidualLearner, ResidualTask};
+use crate::data::Trajectory;
+use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Origin, ResidualOn};
+use crate::sim::Integrator;
+
+/// Trains the residual network of closing the loop.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ResidualTrainer {
+    pub backend: Backend,
+}
+
+/// The run that trained a residual network, and the hybrid model that came of it.
+struct TrainedResidual {
+    run: Training,
+    hybrid: Dynamics,
+}
+
+impl ResidualLearner for ResidualTrainer {
+    fn learn(
+        &self,
+        task: &ResidualTask,
+        rng: &mut dyn Rng,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> {
+        let trained = self.train(task, rng, progress).map_err(LearnError::new)?;
+        Ok(trained.map(|trained| Box::new(trained) as Box<dyn LearnedResidual>))
+    }
+}
+
+impl LearnedResidual for TrainedResidual {
+    fn hybrid(&self) -> &Dynamics {
+        &self.hybrid
+    }
+
+    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), LearnError> {
+        save(folder, &self.run, origin).map_err(LearnError::new)
+    }
+}
+
+impl ResidualTrainer {
+    fn train(
+        self,
+        task: &ResidualTask,
+        mut rng: &mut dyn Rng,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<Option<TrainedResidual>, TrainError> {
+        let [training, validation] = segments(task);
+        if training.is_empty() || validation.is_empty() {
+            return Ok(None);
+        }
+        let joints = task.equations.joints;
+        let settings = MlpSettings {
+            hidden: task.hidden.clone(),
+            on: ResidualOn::Accelerations,
+            ..MlpSettings::for_joints(joints)
+        };
+        let scaling = training.scaling(settings.angles);
+        let network = MlpWeights::new(joints, &settings, scaling, LastLayer::Zero, &mut rng);
+        let model = HybridModel::physics(&task.equations, &self.backend.device())?;
+        // Batches are full: there is no order to draw.
+        let order = ChaCha8Rng::seed_from_u64(0);
+        let settings = fit_settings(&task.settings);
+        let mut run = Training::new(model.with_residual(&network)?, settings, order)?;
+        run.run(&training, Some(&validation), &mut |at| {
+            progress(&format!("epoch {} of {}", at.epoch, at.epochs));
+            ControlFlow::Continue(())
+        })?;
+        let hybrid = run.result()?.to_dynamics()?;
+        Ok(Some(TrainedResidual { run, hybrid }))
+    }
+}
+
+fn fit_settings(settings: &LearnSettings) -> FitSettings {
+    FitSettings {
+        epochs: settings.epochs,
+        learning_rates: LearningRates {
+            physics: 0.0,
+            residual: settings.learning_rate,
+            ..LearningRates::default()
+        },
+        penalty: Penalty::Fixed {
+            alpha: settings.alpha,
+        },
+        integrator: Integrator::RK4,
+        record_every: settings.record_every,
+        ..FitSettings::default()
+    }
+}
+
+/// Segments to train on, and to choose the epoch by.
+fn segments(task: &ResidualTask) -> [Segments; 2] {
+    let (joints, steps) = (task.equations.joints, task.settings.steps);
+    let sets = [&task.training, &task.validation];
+    let rows: usize = sets.iter().copied().flatten().map(|s| s.time.len()).sum();
+    let stride = (rows / task.settings.segments).max(1);
+    sets.map(|stretches: &Vec<Trajectory>| {
+        let mut set = Segments::new(joints, steps);
+        for stretch in stretches {
+            // A stretch that is too short holds no segment; that is no error here.
+            let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
+        }
+        set
+    })
+}
