@@ -192,7 +192,7 @@ fn lock_of(path: &Path) -> io::Result<PathBuf> {
     Ok(real.with_file_name(name))
 }
 
-fn failed<'a>(action: &'static str, path: &'a Path) -> impl Fn(io::Error) -> RunFolderError {
+fn failed(action: &'static str, path: &Path) -> impl Fn(io::Error) -> RunFolderError {
     move |source| RunFolderError::Io {
         action,
         path: path.to_owned(),
