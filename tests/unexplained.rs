@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use residyn::closeloop::{Proposal, Settings, Study, Unexplained, proposal, unexplained};
-use residyn::data::Log;
+use residyn::data::{Joint, Log};
 use residyn::model::{FittedEffect, Library, Model};
 use residyn::plant::Plant;
 
