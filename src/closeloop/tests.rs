@@ -16,7 +16,7 @@ use super::split::Split;
 use super::study::Study;
 use super::verdict::{Verdict, verdict};
 use crate::data::{Joint, Log};
-use crate::identify::FitError;
+use crate::identify::{FitError, Termination};
 use crate::model::{FittedEffect, Library, Model};
 use crate::plant::Plant;
 
@@ -97,6 +97,12 @@ fn a_fit_that_fails_allows_no_verdict() {
     let (answer, reason) = of(&found, &failed);
     assert_eq!(answer, Verdict::Inconclusive);
     assert!(reason.contains("the final fit in fine steps failed"));
+
+    let mut unfinished = refine(&study, &found.after);
+    unfinished.model.fit.termination = Termination::StepLimit;
+    let (answer, reason) = of(&found, &unfinished);
+    assert_eq!(answer, Verdict::Inconclusive);
+    assert!(reason.contains("not converged"), "{reason}");
 
     found.failure = failed.failure.clone();
     assert_eq!(of(&found, &refined).0, Verdict::Inconclusive);

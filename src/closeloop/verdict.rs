@@ -39,17 +39,20 @@ fn added(study: &Study<'_>, found: &Found) -> usize {
     found.after.effects.len() - study.system.effects.len()
 }
 
-/// Which fit failed, if one did that the verdict rests on.
+/// Which fit failed or did not converge, if one did that the verdict rests on.
 fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
     if let Some(error) = &found.failure {
         return Some(format!(
             "the effects selected on a part of the training logs could not be fitted to all of them: {error}"
         ));
     }
-    let error = refined.failure.as_ref()?;
-    Some(format!(
-        "the final fit in fine steps failed, the values are those of the coarser one: {error}"
-    ))
+    if let Some(error) = &refined.failure {
+        return Some(format!(
+            "the final fit in fine steps failed, the values are those of the coarser one: {error}"
+        ));
+    }
+    let fit = &refined.model.fit;
+    (!fit.termination.has_converged()).then(|| format!("the final fit has {}", fit.termination))
 }
 
 /// Why the logs allow no conclusion, if they do not.

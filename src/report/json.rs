@@ -3,11 +3,12 @@
 use super::calibration::CalibrationEntry;
 use super::schema::{
     AlternativeEntry, AuditEntry, ContenderEntry, ContradictedEntry, EffectEntry, EffectName,
-    ErrorEntry, FilesEntry, IdentifiabilityEntry, LogEntry, LogsEntry, ModelError, NormEntry,
-    OmnibusEntry, ParameterEntry, ProposalEntry, Report, TakenBackEntry, TriedEntry,
-    UnexplainedEntry,
+    ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry, LogsEntry,
+    ModelError, NormEntry, OmnibusEntry, ParameterEntry, ProposalEntry, Report, TakenBackEntry,
+    TriedEntry, UnexplainedEntry,
 };
 use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, TakenBack};
+use crate::identify::Fit;
 use crate::model::{FittedEffect, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
 
@@ -47,6 +48,10 @@ impl Report {
                 .map(contradicted)
                 .collect(),
             identifiability: identifiability(outcome),
+            fits: FitsEntry {
+                before: ended(&outcome.models.before.fit),
+                after: ended(&outcome.models.after.fit),
+            },
             error: errors(outcome),
             residual_norm: NormEntry {
                 before: outcome
@@ -176,6 +181,14 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
                 formula: proposal.formula.clone(),
                 explains: proposal.explains,
             }),
+    }
+}
+
+fn ended(fit: &Fit) -> FitEntry {
+    FitEntry {
+        converged: fit.termination.has_converged(),
+        termination: fit.termination.to_string(),
+        steps: fit.steps,
     }
 }
 

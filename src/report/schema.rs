@@ -52,6 +52,8 @@ pub struct Report {
     /// values in the model file that lie outside the 95 % interval of the final fit
     pub(super) contradicted: Vec<ContradictedEntry>,
     pub(super) identifiability: IdentifiabilityEntry,
+    /// how the fits ended that the errors and the verdict rest on
+    pub(super) fits: FitsEntry,
     pub(super) error: ErrorEntry,
     /// residual generalised force, root mean square over stretches of 0.15 s, N m or N
     pub(super) residual_norm: NormEntry,
@@ -163,6 +165,22 @@ pub(super) struct OmnibusEntry {
     /// share of the residual variance that is no white noise, one a joint
     #[schemars(inner(range(min = 0, max = 1)))]
     pub share: Vec<f64>,
+}
+
+/// the fit of the declared model, and the final one with the effects
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct FitsEntry {
+    pub before: FitEntry,
+    pub after: FitEntry,
+}
+
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct FitEntry {
+    pub converged: bool,
+    /// why the fit ended
+    pub termination: String,
+    /// steps that were taken
+    pub steps: usize,
 }
 
 /// a formula for what is left, no finding

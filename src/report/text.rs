@@ -197,6 +197,13 @@ fn parameters(outcome: &Outcome) -> String {
         "\nThe logs determine {} of {} free parameters.",
         verdict.determined, verdict.free
     );
+    for (name, model) in [
+        (FITTED, &outcome.models.before),
+        (WITH_EFFECTS, &outcome.models.after),
+    ] {
+        let (steps, termination) = (model.fit.steps, model.fit.termination);
+        let _ = writeln!(out, "- Fit, {name}: {termination} ({steps} steps).");
+    }
     for &k in &verdict.hold {
         let name = &outcome.models.before.parameters[k].name;
         let _ = writeln!(
