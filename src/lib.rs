@@ -11,28 +11,33 @@
 //!
 //! # Example
 //!
-//! Record a simulated pendulum that has friction, and measure how far the declared model, which has none, runs
-//! from that log:
+//! Find what a model lacks, predict a log with it, and write the report:
 //!
 //! ```
-//! use std::path::Path;
-//!
-//! use rand::SeedableRng;
-//! use residyn::sim::metric::{assess, summarise};
-//! use residyn::data::Joint;
-//! use residyn::model::Library;
-//! use residyn::plant::Plant;
+//! use residyn::{Library, Origin, Request, close_loop, report, rng};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # std::env::set_current_dir(&folder)?;
+//! # let mut rig = residyn::plant::Plant::read("pendulum".as_ref(), &Library::built_in())?;
+//! # let (joint, friction) = (residyn::data::Joint::at(0), [("F_c".to_owned(), 0.2)]);
+//! # rig.add_effect(&Library::built_in(), "coulomb_friction", joint, &friction)?;
+//! # for k in 1..=4 {
+//! #     rig.record(&mut rng(k))?.write(format!("run{k}.csv"))?;
+//! # }
 //! let library = Library::built_in();
-//! let mut rig = Plant::read(Path::new("pendulum"), &library)?;
-//! rig.add_effect(&library, "coulomb_friction", Joint::at(0), &[("F_c".to_owned(), 0.2)])?;
-//! let log = rig.record(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
-//!
-//! let declared = library.model(Path::new("pendulum"))?.dynamics();
-//! let errors = assess(&declared, &[log], &[0.5]);
-//! let summary = summarise(&errors.horizons, declared.joints);
-//! assert!(summary.position_rmse[0][0] > 0.01, "friction shows within half a second");
+//! let model = library.model("pendulum")?; // or the path of a model file
+//! let logs = model.read_logs(["run1.csv", "run2.csv", "run3.csv"])?;
+//! let outcome = close_loop(Request::of(&model, &library, logs), &mut rng(0), &mut |_| ())?;
+//! for effect in &outcome.effects.findings {
+//!     println!("{effect}"); // coulomb_friction on joint 1: F_c1 = 0.2001 N m (0.1993 to 0.2008)
+//! }
+//! let predicted = outcome.models.after.predict(&model.read_log("run4.csv")?, 0.5);
+//! report::write("report", &outcome, &Origin::of_seed(0))?;
+//! # println!("{} predictions", predicted.len());
+//! # assert_eq!(outcome.effects.findings.len(), 1);
+//! # assert!(outcome.effects.findings[0].to_string().starts_with("coulomb_friction on joint 1: F_c1 = 0."));
+//! # assert!(predicted.len() > 10 && std::path::Path::new("report/report.md").is_file());
 //! # Ok(())
 //! # }
 //! ```
@@ -60,3 +65,13 @@ pub mod runs;
 pub mod sim;
 #[cfg(feature = "train")]
 pub mod train;
+
+pub use closeloop::{Finding, Outcome, Reference, Request, Settings, Verdict, close_loop};
+pub use data::Log;
+pub use model::{Library, Model, Origin, Parameter};
+pub use sim::metric::Trace;
+
+/// Random numbers for whatever takes them as an argument: the same seed gives the same results.
+pub fn rng(seed: u64) -> rand_chacha::ChaCha8Rng {
+    rand::SeedableRng::seed_from_u64(seed)
+}

@@ -15,6 +15,7 @@ mod experiments;
 mod export;
 mod export_c;
 mod export_fmu;
+mod front_door;
 mod functions;
 mod gradients;
 mod identify;

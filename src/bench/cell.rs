@@ -51,7 +51,7 @@ impl Cell {
     pub fn record(&self, system: &Model) -> Result<(Vec<Log>, Truth), LogError> {
         match &self.source {
             Source::Files { logs, declared } => {
-                let read = |path| Log::read(path, system.joints, &system.columns);
+                let read = |path| system.read_log(path);
                 let logs = logs.iter().map(read).collect::<Result<_, _>>()?;
                 Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
             }

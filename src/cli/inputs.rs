@@ -72,8 +72,7 @@ pub(super) fn checkpoint(
 
 /// Read logs for a system and leave out the given intervals; notes go to standard error.
 pub(super) fn logs(paths: &[PathBuf], system: &Model) -> Result<Vec<Log>> {
-    let read = |path: &PathBuf| Ok(Log::read(path, system.joints, &system.columns)?);
-    paths.iter().map(read).collect()
+    Ok(system.read_logs(paths)?)
 }
 
 /// Apply `--leave-out` to two sets of logs at once: an entry may name a log of either.

@@ -2,6 +2,7 @@ use super::error::StudyError;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::split::Split;
+use crate::data::Log;
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
@@ -41,6 +42,12 @@ impl<'a> Request<'a> {
             settings: Settings::default(),
             learner: None,
         }
+    }
+
+    /// The same on logs of which some are set apart for the test.
+    pub fn of(system: &'a Model, library: &'a Library, logs: Vec<Log>) -> Self {
+        let split = Split::of(logs, &Settings::default().split);
+        Self::new(system, library, split)
     }
 
     /// # Errors

@@ -98,7 +98,8 @@ impl Library {
     ///
     /// # Errors
     /// As [`Model::read`]; for a path that is neither, the names that exist.
-    pub fn model(&self, path: &Path) -> Result<Model, FileError> {
+    pub fn model(&self, path: impl AsRef<Path>) -> Result<Model, FileError> {
+        let path = path.as_ref();
         let embedded = path
             .to_str()
             .filter(|_| !path.is_file())

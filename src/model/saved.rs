@@ -59,6 +59,17 @@ pub struct Origin {
     pub model_toml: String,
 }
 
+impl Origin {
+    /// A program that calls the library, and the seed of its random numbers.
+    pub fn of_seed(seed: u64) -> Self {
+        Self {
+            config: serde_json::json!({"command": null}),
+            seed,
+            model_toml: String::new(),
+        }
+    }
+}
+
 /// Why a file of a saved model cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SavedModelError {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::effect::{Effect, Entry, Measure};
 use super::reader::Located;
 use super::{Dynamics, Parameter};
-use crate::data::{Columns, Joint, Log};
+use crate::data::{Columns, Joint, Log, LogError};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
 /// Speed over which dry friction reverses (rad/s or m/s), unless the file or a fit to logs sets another one.
@@ -100,6 +100,25 @@ pub struct Model {
 }
 
 impl Model {
+    /// Read a log of the rig that the model describes.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or that lacks a column or a number.
+    pub fn read_log(&self, path: impl AsRef<Path>) -> Result<Log, LogError> {
+        Log::read(path, self.joints, &self.columns)
+    }
+
+    /// Read several logs.
+    ///
+    /// # Errors
+    /// As [`Model::read_log`].
+    pub fn read_logs<P: AsRef<Path>>(
+        &self,
+        paths: impl IntoIterator<Item = P>,
+    ) -> Result<Vec<Log>, LogError> {
+        paths.into_iter().map(|path| self.read_log(path)).collect()
+    }
+
     /// Names that effects must not take: of parameters and of intermediates.
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
         let lets = self.equations.lets.iter().map(|(name, _)| name.as_str());

@@ -26,7 +26,12 @@ pub enum WriteError {
 ///
 /// # Errors
 /// An unwritable folder or a full disk.
-pub fn write(folder: &Path, outcome: &Outcome, origin: &Origin) -> Result<Report, WriteError> {
+pub fn write(
+    folder: impl AsRef<Path>,
+    outcome: &Outcome,
+    origin: &Origin,
+) -> Result<Report, WriteError> {
+    let folder = folder.as_ref();
     let failed = |path: &Path| {
         let path = path.to_owned();
         move |source| OutputError { path, source }

@@ -1,5 +1,7 @@
 //! Numbers, lists and names as reports write them.
 
+use std::fmt::{self, Display, Formatter};
+
 use crate::closeloop::Finding;
 use crate::model::{OwnValue, Parameter};
 
@@ -45,6 +47,14 @@ pub(super) fn values(finding: &Finding) -> Vec<String> {
         None => value(parameter),
     };
     finding.rows().iter().map(row).collect()
+}
+
+/// `coulomb_friction on joint 1: F_c1 = 0.1598 N m (0.1593 to 0.1603)`
+impl Display for Finding {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (name, joint) = (self.effect.title(), self.effect.joint);
+        write!(f, "{name} on joint {joint}: {}", values(self).join(", "))
+    }
 }
 
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`

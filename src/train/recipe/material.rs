@@ -40,8 +40,7 @@ impl Material {
 }
 
 fn from_logs(recipe: &Recipe, logged: &Logged, system: &Model) -> Result<Material, RecipeError> {
-    let read =
-        |path: &PathBuf| Log::read(beside(&recipe.path, path), system.joints, &system.columns);
+    let read = |path: &PathBuf| system.read_log(beside(&recipe.path, path));
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
         step_s: logged.step_s,
