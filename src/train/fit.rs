@@ -115,8 +115,8 @@ impl Training {
             judged: segments.all(&plain),
             validation: validation.map(|segments| segments.all(&plain)),
         };
-        let crew = self.objective.crew();
-        crew.helped(|| self.run_epochs(&material, observer))
+        let workers = self.objective.workers();
+        workers.helped(|| self.run_epochs(&material, observer))
     }
 
     fn run_epochs(

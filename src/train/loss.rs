@@ -17,7 +17,7 @@ pub struct Objective {
     scale: Vec<f64>,
     /// 1 / scale.
     precision: Arc<[f32]>,
-    crew: Arc<fused::Crew>,
+    workers: Arc<fused::Workers>,
 }
 
 /// The two parts of the loss, `[2]`.
@@ -55,22 +55,26 @@ impl Objective {
             integrator,
             precision: precision.collect(),
             scale,
-            crew: Arc::default(),
+            workers: Arc::default(),
         })
     }
 
     /// The threads for its losses.
-    pub(super) fn crew(&self) -> Arc<fused::Crew> {
-        self.crew.clone()
+    pub(super) fn workers(&self) -> Arc<fused::Workers> {
+        self.workers.clone()
     }
 
     /// The loss of a model on a batch, through the unrolled integrator.
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
         Loss(match batch {
             Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
-            Batch::Blocks(blocks) => {
-                fused::loss(model, blocks, self.integrator, &self.precision, &self.crew)
-            }
+            Batch::Blocks(blocks) => fused::loss(
+                model,
+                blocks,
+                self.integrator,
+                &self.precision,
+                &self.workers,
+            ),
         })
     }
 
@@ -93,7 +97,7 @@ impl Clone for Objective {
             integrator: self.integrator,
             scale: self.scale.clone(),
             precision: self.precision.clone(),
-            crew: Arc::default(),
+            workers: Arc::default(),
         }
     }
 }

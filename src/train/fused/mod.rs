@@ -12,4 +12,4 @@ mod worker;
 
 pub use blocks::Blocks;
 pub(super) use operation::loss;
-pub(super) use work::Crew;
+pub(super) use work::Workers;

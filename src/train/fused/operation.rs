@@ -15,7 +15,7 @@ use burn::tensor::{Tensor, TensorData};
 
 use super::plan::{KEPT, Plan};
 use super::work::Work;
-use super::{Blocks, Crew};
+use super::{Blocks, Workers};
 use crate::sim::Integrator;
 use crate::train::HybridModel;
 
@@ -25,7 +25,7 @@ pub(in crate::train) fn loss(
     blocks: &Arc<Blocks>,
     integrator: Integrator,
     precision: &Arc<[f32]>,
-    crew: &Arc<Crew>,
+    workers: &Arc<Workers>,
 ) -> Tensor<1> {
     let none = || Tensor::zeros([0], &model.device());
     let [prior, residual] = model.tensors().map(|numbers| numbers.unwrap_or_else(none));
@@ -40,7 +40,7 @@ pub(in crate::train) fn loss(
         prior.into_dispatch(),
         residual.into_dispatch(),
         Arc::new(plan),
-        crew.clone(),
+        workers.clone(),
     ))
 }
 
@@ -51,7 +51,7 @@ pub(super) trait LossOperation: Backend {
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
         plan: Arc<Plan>,
-        crew: Arc<Crew>,
+        workers: Arc<Workers>,
     ) -> FloatTensor<Self>;
 }
 
@@ -60,9 +60,9 @@ impl LossOperation for NdArray {
         prior: NdArrayTensor,
         residual: NdArrayTensor,
         plan: Arc<Plan>,
-        crew: Arc<Crew>,
+        workers: Arc<Workers>,
     ) -> NdArrayTensor {
-        vector(taken(&prior, &residual, plan, crew).loss.to_vec())
+        vector(taken(&prior, &residual, plan, workers).loss.to_vec())
     }
 }
 
@@ -71,9 +71,9 @@ impl<C: CheckpointStrategy> LossOperation for Autodiff<NdArray, C> {
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
         plan: Arc<Plan>,
-        crew: Arc<Crew>,
+        workers: Arc<Workers>,
     ) -> FloatTensor<Self> {
-        let work = taken(prior.primitive(), residual.primitive(), plan, crew);
+        let work = taken(prior.primitive(), residual.primitive(), plan, workers);
         let loss = vector(work.loss.to_vec());
         let preparation = LossBackward.prepare::<C>([prior.node(), residual.node()]);
         match preparation.compute_bound().stateful() {
@@ -113,9 +113,9 @@ fn taken(
     prior: &NdArrayTensor,
     residual: &NdArrayTensor,
     plan: Arc<Plan>,
-    crew: Arc<Crew>,
+    workers: Arc<Workers>,
 ) -> Work {
-    Work::new(plan, crew, &numbers(prior), &numbers(residual))
+    Work::new(plan, workers, &numbers(prior), &numbers(residual))
 }
 
 /// The numbers of a tensor of any layout, in order.

@@ -8,58 +8,58 @@ use crate::lanes::WorkerPool;
 use crate::train::Frame;
 use crate::train::loss::NORM_FLOOR;
 
-/// The threads that losses are taken on, and memory that serves again for the next.
+/// The threads that evaluate losses, and the idle buffers of earlier evaluations.
 #[derive(Debug, Default)]
-pub struct Crew {
+pub struct Workers {
     pool: WorkerPool,
-    /// What the present round is about; held by the one who leads it.
+    /// Held by the thread that submits the current task.
     leading: Mutex<()>,
     task: Mutex<Option<Task>>,
-    desks: Mutex<Vec<Arc<Desks>>>,
+    idle: Mutex<Vec<Arc<Buffers>>>,
 }
 
-/// Work on every part of a loss.
+/// One pass over every part of a batch.
 #[derive(Debug, Clone)]
 struct Task {
     plan: Arc<Plan>,
-    desks: Arc<Desks>,
-    way: Way,
+    buffers: Arc<Buffers>,
+    pass: Pass,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Way {
+enum Pass {
     Forward,
-    /// From the derivatives by the sums that the way forward made.
+    /// From the derivatives of the loss by the sums of the forward pass.
     Backward([f32; 2]),
 }
 
-/// All that a loss of one model is worked out with.
+/// Buffers for evaluating the loss of one model.
 #[derive(Debug)]
-struct Desks {
+struct Buffers {
     frame: Arc<Frame>,
     numbers: RwLock<Numbers>,
     parts: Vec<Mutex<Part>>,
 }
 
-/// A loss that was taken, and all that its derivative needs.
+/// An evaluated loss, with everything its derivative needs.
 #[derive(Debug)]
 pub(super) struct Work {
-    crew: Arc<Crew>,
+    workers: Arc<Workers>,
     plan: Arc<Plan>,
-    desks: Arc<Desks>,
+    buffers: Arc<Buffers>,
     /// E and the norm of F_r.
     pub loss: [f32; 2],
 }
 
-impl Crew {
-    /// Call `lead` while other threads stand by for the losses in it. Without them it takes them alone.
+impl Workers {
+    /// Call `lead` while the worker threads wait for the losses in it. Outside of this call losses run on one thread.
     pub(in crate::train) fn helped<R>(&self, lead: impl FnOnce() -> R) -> R {
         self.pool.with_workers(&|part| self.carry_out(part), lead)
     }
 
     fn run(&self, task: Task) {
         let _leading = lock(&self.leading);
-        let parts = task.desks.parts.len();
+        let parts = task.buffers.parts.len();
         *lock(&self.task) = Some(task);
         self.pool.run(parts, &|part| self.carry_out(part));
         *lock(&self.task) = None;
@@ -70,14 +70,14 @@ impl Crew {
         task.expect("a round has a task").carry_out(part);
     }
 
-    /// Desks that nobody sits at.
-    fn take(&self, frame: &Arc<Frame>, parts: usize) -> Arc<Desks> {
-        let mut desks = lock(&self.desks);
-        desks.retain(|desks| Arc::ptr_eq(&desks.frame, frame));
-        let fitting = desks.iter().position(|desks| desks.parts.len() == parts);
+    /// Idle buffers of this shape, or new ones.
+    fn take(&self, frame: &Arc<Frame>, parts: usize) -> Arc<Buffers> {
+        let mut idle = lock(&self.idle);
+        idle.retain(|buffers| Arc::ptr_eq(&buffers.frame, frame));
+        let fitting = idle.iter().position(|buffers| buffers.parts.len() == parts);
         match fitting {
-            Some(index) => desks.swap_remove(index),
-            None => Arc::new(Desks {
+            Some(index) => idle.swap_remove(index),
+            None => Arc::new(Buffers {
                 frame: frame.clone(),
                 numbers: RwLock::new(Numbers::new(frame)),
                 parts: (0..parts).map(|_| Mutex::new(Part::new(frame))).collect(),
@@ -89,19 +89,19 @@ impl Crew {
 impl Task {
     fn carry_out(&self, part: usize) {
         let numbers = &*self
-            .desks
+            .buffers
             .numbers
             .read()
             .unwrap_or_else(PoisonError::into_inner);
-        let (plan, part) = (&*self.plan, &mut *lock(&self.desks.parts[part]));
+        let (plan, part) = (&*self.plan, &mut *lock(&self.buffers.parts[part]));
         let arch = Arch::new();
-        match self.way {
-            Way::Forward => arch.dispatch(Forward {
+        match self.pass {
+            Pass::Forward => arch.dispatch(Forward {
                 plan,
                 numbers,
                 part,
             }),
-            Way::Backward(seeds) => arch.dispatch(Backward {
+            Pass::Backward(seeds) => arch.dispatch(Backward {
                 plan,
                 numbers,
                 part,
@@ -114,27 +114,32 @@ impl Task {
 impl Work {
     /// Take the loss with these numbers.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn new(plan: Arc<Plan>, crew: Arc<Crew>, prior: &[f32], residual: &[f32]) -> Self {
-        let desks = crew.take(&plan.frame, plan.parts().count());
-        let mut numbers = desks
+    pub(super) fn new(
+        plan: Arc<Plan>,
+        workers: Arc<Workers>,
+        prior: &[f32],
+        residual: &[f32],
+    ) -> Self {
+        let buffers = workers.take(&plan.frame, plan.parts().count());
+        let mut numbers = buffers
             .numbers
             .write()
             .unwrap_or_else(PoisonError::into_inner);
         numbers.set(&plan.frame, prior, residual);
-        for (part, blocks) in desks.parts.iter().zip(plan.parts()) {
+        for (part, blocks) in buffers.parts.iter().zip(plan.parts()) {
             lock(part).begin(blocks, &plan, &numbers);
         }
         drop(numbers);
         let mut work = Self {
             loss: [0.0; 2],
-            crew,
+            workers,
             plan,
-            desks,
+            buffers,
         };
-        work.run(Way::Forward);
+        work.run(Pass::Forward);
         let count = work.plan.count();
         // In the order of the parts, so that the result does not hang on which was done first.
-        let sums = work.desks.parts.iter().map(|part| lock(part).sums);
+        let sums = work.buffers.parts.iter().map(|part| lock(part).sums);
         let [error, square] = sums.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
         let norm = match work.plan.frame.has_residual {
             true => (square / count + NORM_FLOOR * NORM_FLOOR).sqrt(),
@@ -154,22 +159,22 @@ impl Work {
             false => 0.0,
         };
         let seeds = [f64::from(by_loss[0]), by_mean].map(|by| (by / plan.count()) as f32);
-        self.run(Way::Backward(seeds));
-        gathered(&plan.frame, &self.desks.parts)
+        self.run(Pass::Backward(seeds));
+        gathered(&plan.frame, &self.buffers.parts)
     }
 
-    fn run(&self, way: Way) {
-        self.crew.run(Task {
+    fn run(&self, pass: Pass) {
+        self.workers.run(Task {
             plan: self.plan.clone(),
-            desks: self.desks.clone(),
-            way,
+            buffers: self.buffers.clone(),
+            pass,
         });
     }
 }
 
 impl Drop for Work {
     fn drop(&mut self) {
-        lock(&self.crew.desks).push(self.desks.clone());
+        lock(&self.workers.idle).push(self.buffers.clone());
     }
 }
 
@@ -210,7 +215,7 @@ fn gathered(frame: &Frame, parts: &[Mutex<Part>]) -> [Vec<f32>; 2] {
 mod tests {
     use std::sync::Arc;
 
-    use super::{Crew, Work};
+    use super::{Work, Workers};
     use crate::model::LastLayer;
     use crate::sim::Integrator;
     use crate::train::fused::plan::{KEPT, Plan};
@@ -238,7 +243,7 @@ mod tests {
             };
             let work = Work::new(
                 Arc::new(plan),
-                Arc::new(Crew::default()),
+                Arc::new(Workers::default()),
                 &numbers[0],
                 &numbers[1],
             );
