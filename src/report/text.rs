@@ -202,7 +202,7 @@ fn parameters(outcome: &Outcome) -> String {
         (WITH_EFFECTS, &outcome.models.after),
     ] {
         let (steps, termination) = (model.fit.steps, model.fit.termination);
-        let _ = writeln!(out, "- Fit, {name}: {termination} ({steps} steps).");
+        let _ = writeln!(out, "- Fit ({name}): {termination} ({steps} steps).");
     }
     for &k in &verdict.hold {
         let name = &outcome.models.before.parameters[k].name;
