@@ -293,7 +293,7 @@ fn what_cannot_be_exported_is_refused_before_anything_is_written() {
     assert_eq!(nowhere.status.code(), Some(2));
     let said = String::from_utf8(nowhere.stderr).unwrap();
     assert!(
-        said.contains("m.json cannot be written: its folder does not exist"),
+        said.contains("m.json: cannot be written: its folder does not exist"),
         "{said}"
     );
 }
