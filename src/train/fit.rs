@@ -92,6 +92,15 @@ impl Training {
         })
     }
 
+    /// The same run with its losses composed of Burn's operations, see [`Objective::composed`].
+    #[must_use]
+    pub fn composed(self) -> Self {
+        Self {
+            objective: self.objective.composed(),
+            ..self
+        }
+    }
+
     /// Train until all epochs are done or `observer`, called after each, breaks off. Call it again to
     /// go on. With `validation` the best model by its error is kept, the one before training included.
     ///
@@ -111,9 +120,9 @@ impl Training {
         }
         let material = Material {
             segments,
-            trained: segments.all(&device),
-            judged: segments.all(&plain),
-            validation: validation.map(|segments| segments.all(&plain)),
+            trained: self.objective.all(segments, &device),
+            judged: self.objective.all(segments, &plain),
+            validation: validation.map(|segments| self.objective.all(segments, &plain)),
         };
         let workers = self.objective.workers();
         workers.helped(|| self.run_epochs(&material, observer))
@@ -196,7 +205,7 @@ impl Training {
         let device = self.model.device();
         let mut mean = Epoch::default();
         for chosen in order.chunks(size.get()) {
-            let part = self.step(&segments.batch(chosen, &device))?;
+            let part = self.step(&self.objective.batch(segments, chosen, &device))?;
             let share = chosen.len() as f64 / order.len() as f64;
             mean.loss += share * part.loss;
             mean.error += share * part.error;

@@ -1,8 +1,8 @@
 use std::sync::Arc;
 
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
 
-use super::{Batch, Columns, HybridModel, Prepared, TrainError, composed, fused};
+use super::{Batch, Columns, HybridModel, Prepared, Segments, TrainError, composed, fused};
 use crate::sim::Integrator;
 
 /// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
@@ -18,6 +18,8 @@ pub struct Objective {
     /// 1 / scale.
     precision: Arc<[f32]>,
     workers: Arc<fused::Workers>,
+    /// Whether losses are composed of Burn's operations on the processor, too.
+    is_composed: bool,
 }
 
 /// The two parts of the loss, `[2]`.
@@ -56,7 +58,32 @@ impl Objective {
             precision: precision.collect(),
             scale,
             workers: Arc::default(),
+            is_composed: false,
         })
+    }
+
+    /// The same with losses composed of Burn's operations wherever they are evaluated: the reference of the fused loss,
+    /// and many times slower.
+    #[must_use]
+    pub fn composed(self) -> Self {
+        Self {
+            is_composed: true,
+            ..self
+        }
+    }
+
+    /// The chosen segments, as [`Objective::loss`] takes them on a device.
+    pub(super) fn batch(&self, segments: &Segments, chosen: &[usize], device: &Device) -> Batch {
+        if self.is_composed {
+            Batch::Columns(segments.columns(chosen, device))
+        } else {
+            segments.batch(chosen, device)
+        }
+    }
+
+    /// All segments, as [`Objective::loss`] takes them on a device.
+    pub(super) fn all(&self, segments: &Segments, device: &Device) -> Batch {
+        self.batch(segments, &(0..segments.len()).collect::<Vec<_>>(), device)
     }
 
     /// The threads for its losses.
@@ -98,6 +125,7 @@ impl Clone for Objective {
             scale: self.scale.clone(),
             precision: self.precision.clone(),
             workers: Arc::default(),
+            is_composed: self.is_composed,
         }
     }
 }
