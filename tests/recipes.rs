@@ -118,7 +118,7 @@ fn a_model_is_trained_and_tuned_with_its_own_smoothing_of_friction() {
                   step_s = 0.02\nposition = [[-1, 1]]\nvelocity = [[-1, 1]]\ntorque = [[-1, 1]]\n[fit]\nepochs = 1\n";
     std::fs::write(dir.join("recipe.toml"), recipe).unwrap();
     let library = Library::built_in();
-    let model = library.model(&dir.join("model.toml")).unwrap();
+    let model = library.model(dir.join("model.toml")).unwrap();
     assert_eq!(model.sign_widths(), [0.3]);
     let wanted = model.dynamics().program;
     let has_program = |job: Job| job.model.to_dynamics().unwrap().program == wanted;

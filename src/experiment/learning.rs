@@ -54,7 +54,7 @@ impl Method {
         let mut inputs = Vec::new();
         let mut dynamics = equations(plant);
         let prior = if let Some(file) = &method.model {
-            let system = library.model(&beside_or_named(&config.path, file))?;
+            let system = library.model(beside_or_named(&config.path, file))?;
             dynamics = equations(&system);
             model_toml.clone_from(&system.declaration);
             inputs.push((file.clone(), content_id(model_toml.as_bytes())));
