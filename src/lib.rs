@@ -30,7 +30,7 @@
 //! let logs = model.read_logs(["run1.csv", "run2.csv", "run3.csv"])?;
 //! let outcome = close_loop(Request::of(&model, &library, logs), &mut rng(0), &mut |_| ())?;
 //! for effect in &outcome.effects.findings {
-//!     println!("{effect}"); // coulomb_friction on joint 1: F_c1 = 0.2001 N m (0.1993 to 0.2008)
+//!     println!("{effect}"); // name, joint, parameters with 95 % intervals
 //! }
 //! let predicted = outcome.models.after.predict(&model.read_log("run4.csv")?, 0.5);
 //! report::write("report", &outcome, &Origin::of_seed(0))?;

@@ -48,7 +48,8 @@ impl HybridModel {
     }
 
     /// A data-driven model of `system`: dq/dt = qd and dqd/dt = network
-    /// ([`ResidualOn::Accelerations`]), or both from the network ([`ResidualOn::Derivative`]).
+    /// ([`ResidualOn::Accelerations`](crate::model::ResidualOn::Accelerations)), or both from the network
+    /// ([`ResidualOn::Derivative`](crate::model::ResidualOn::Derivative)).
     ///
     /// # Errors
     /// A network that is not one for `joints` joints.
