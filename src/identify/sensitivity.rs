@@ -1,7 +1,7 @@
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::Dynamics;
-use crate::sim::{Hold, Scheme, Stage, StepTorque};
+use crate::sim::{Hold, Scheme, StepTorque};
 
 /// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
 pub(super) const LANES: usize = 16;

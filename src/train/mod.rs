@@ -19,6 +19,7 @@ pub mod recipe;
 mod residual;
 mod segments;
 mod settings;
+mod stacked;
 mod sweep;
 
 #[cfg(test)]
@@ -33,7 +34,7 @@ pub use history::{Best, Record};
 pub use hybrid::{Derivative, HybridError, HybridModel, Prepared, StepResult, replay};
 use hybrid::{Stack, Structure};
 pub use import::save_imported;
-pub use loss::{Batch, Loss, Objective};
+pub use loss::{Batch, Objective};
 pub use manifest::{FORMAT, Manifest};
 pub use penalty::Penalty;
 pub use residual::ResidualTrainer;

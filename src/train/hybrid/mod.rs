@@ -13,11 +13,10 @@ mod tensor;
 
 pub use error::HybridError;
 pub use model::HybridModel;
-#[cfg(test)]
-pub(super) use model::{PRIOR_ID, RESIDUAL_ID};
+pub(super) use model::Numbers;
 pub use prepared::{Derivative, Prepared};
 pub use replay::replay;
 pub(super) use stack::Stack;
 pub use step::StepResult;
 pub(crate) use structure::Structure;
-pub(super) use tensor::{to_f64, vector};
+pub(super) use tensor::{to_f32, to_f64, vector};

@@ -1,9 +1,9 @@
 use std::sync::Arc;
 
 use burn::module::{Module, Param, ParamId};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
 
-use super::tensor::{rows_of, to_f64, vector};
+use super::tensor::{rows_of, to_f32, to_f64, vector};
 use super::{HybridError, Prepared, Structure, equations};
 use crate::control::Predictor;
 use crate::model::{
@@ -12,8 +12,11 @@ use crate::model::{
 use crate::sim::Integrator;
 
 // Burn's identifiers of the tensors.
-pub(in crate::train) const PRIOR_ID: u64 = 1;
-pub(in crate::train) const RESIDUAL_ID: u64 = 2;
+const PRIOR_ID: u64 = 1;
+const RESIDUAL_ID: u64 = 2;
+
+/// Learnable numbers of the prior and of the residual.
+pub(in crate::train) type Numbers = [Vec<f32>; 2];
 
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
@@ -229,20 +232,6 @@ impl HybridModel {
         Prepared::new(&self.structure, 1, self.tensors().map(each))
     }
 
-    /// Brings every physical parameter back within its bounds, after each optimiser step (projected gradient descent): a
-    /// parameter may rest on a bound and leave it again.
-    #[must_use]
-    pub fn project(self) -> Self {
-        let prior = self.prior.val().inner();
-        match equations::projected(self.structure.parameters(), &prior) {
-            Some(inside) => Self {
-                prior: learnable(PRIOR_ID, Tensor::from_inner(inside)),
-                ..self
-            },
-            None => self,
-        }
-    }
-
     /// The device that the model was made on.
     pub fn device(&self) -> Device {
         self.prior.val().device()
@@ -261,14 +250,24 @@ impl HybridModel {
         ]
     }
 
-    /// The same model with these learnable numbers, where some are given.
-    pub(in crate::train) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
-        let [prior, residual] = tensors;
-        let prior = prior.map(|tensor| learnable(PRIOR_ID, tensor));
-        let residual = residual.map(|tensor| learnable(RESIDUAL_ID, tensor));
+    /// The learnable numbers of the prior and of the residual; none where there is no residual.
+    pub(in crate::train) fn numbers(&self) -> Numbers {
+        self.tensors()
+            .map(|tensor| tensor.map_or_else(Vec::new, to_f32))
+    }
+
+    /// The same model with these learnable numbers, physical parameters brought back within their bounds (projected
+    /// gradient descent): a parameter may rest on a bound and leave it again.
+    pub(in crate::train) fn with_numbers(&self, [mut prior, residual]: Numbers) -> Self {
+        equations::project(self.structure.parameters(), &mut prior);
+        let device = self.device();
+        let tensor = |numbers: Vec<f32>| {
+            let shape = [numbers.len()];
+            Tensor::from_data(TensorData::new(numbers, shape), &device)
+        };
         Self {
-            prior: prior.unwrap_or_else(|| self.prior.clone()),
-            residual: residual.or_else(|| self.residual.clone()),
+            prior: learnable(PRIOR_ID, tensor(prior)),
+            residual: (self.residual.is_some()).then(|| learnable(RESIDUAL_ID, tensor(residual))),
             structure: self.structure.clone(),
         }
     }
