@@ -1,6 +1,5 @@
 use std::ops::ControlFlow;
 
-use burn::module::Module;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
@@ -8,7 +7,7 @@ use super::optimizer::Optimizer;
 use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
 use crate::train::HybridModel;
 
-/// A training run, which can be saved ([`save`](super::save)), loaded and continued. Interruptions do not change its
+/// A training run, which can be saved, loaded and continued. Interruptions do not change its
 /// result by a bit on the same backend and machine.
 #[derive(Clone)]
 pub struct Training {
@@ -181,11 +180,6 @@ impl Training {
         &self.history
     }
 
-    /// The best model by validation error, where there is validation.
-    pub fn best(&self) -> Option<&Best> {
-        self.best.as_ref()
-    }
-
     fn run_epoch(&mut self, batches: &Batches) -> Result<Epoch, TrainError> {
         let Batching::Mini { size } = self.settings.batching else {
             return self.step(&batches.training);
@@ -217,7 +211,7 @@ impl Training {
 
     /// Evaluates the current model on all training segments and on validation.
     fn record(&mut self, batches: &Batches) -> Result<(), TrainError> {
-        let model = self.model.clone().valid();
+        let model = self.model.without_gradients();
         let evaluate = |batch| self.objective.loss(&model, batch);
         let (loss, [error, residual_norm]) =
             self.total(&evaluate(&batches.evaluation), self.weights())?;

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use burn::tensor::{Device, Tensor};
 
 use super::hybrid::vector;
-use super::{Backend, Blocks, Columns, HybridModel, Prepared, Segments, TrainError};
+use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, Unpacked};
 use super::{composed, fused};
 use crate::model::to_f32;
 use crate::sim::Integrator;
@@ -111,7 +111,7 @@ impl Objective {
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
         Loss(match batch {
             Batch::Columns(columns) => {
-                Tensor::cat(self.of_each(1, &model.prepare(), columns).to_vec(), 0)
+                Tensor::cat(self.of_each(1, &model.unpack(), columns).to_vec(), 0)
             }
             Batch::Blocks(blocks) => fused::loss(
                 model,
@@ -128,10 +128,10 @@ impl Objective {
     pub(super) fn of_each(
         &self,
         models: usize,
-        prepared: &Prepared,
+        unpacked: &Unpacked,
         batch: &Columns,
     ) -> [Tensor<1>; 2] {
-        composed::of_each(prepared, models, batch, self.integrator, &self.scale)
+        composed::of_each(unpacked, models, batch, self.integrator, &self.scale)
     }
 }
 

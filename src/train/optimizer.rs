@@ -73,7 +73,7 @@ impl<const D: usize> Optimizer<D> {
                 let plain = decayed(numbers.inner(), rate * decay);
                 let (stepped, after) = self.adam.step(rate, plain, gradient, moments.take());
                 *moments = after.map(without_subnormals);
-                *tensor = Some(Tensor::from_inner(stepped));
+                *tensor = Some(Tensor::from_inner(stepped).require_grad());
             }
         }
         tensors

@@ -1,32 +1,26 @@
 use std::sync::Arc;
 
-use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor};
 
 use super::tensor::{rows_of, to_f64, vector};
-use super::{HybridError, Prepared, Structure, equations};
+use super::{HybridError, Structure, Unpacked, equations};
 use crate::control::Predictor;
 use crate::model::{
     Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
 };
 use crate::sim::Integrator;
 
-// Burn's identifiers of the tensors.
-pub(in crate::train) const PRIOR_ID: u64 = 1;
-pub(in crate::train) const RESIDUAL_ID: u64 = 2;
-
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
 /// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
-#[derive(Module, Debug)]
+#[derive(Debug, Clone)]
 pub struct HybridModel {
     // One tensor for each part: the cost of an optimiser's step grows with the number of tensors.
     /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`].
-    prior: Param<Tensor<1>>,
+    prior: Tensor<1>,
     /// The residual network's numbers.
-    residual: Option<Param<Tensor<1>>>,
-    #[module(skip)]
+    residual: Option<Tensor<1>>,
     structure: Arc<Structure>,
 }
 
@@ -40,7 +34,7 @@ impl HybridModel {
     /// A parameter that is not finite, outside of its bounds, or without a scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
         Ok(Self {
-            prior: learnable(PRIOR_ID, equations::scaled(dynamics, device)?),
+            prior: equations::scaled(dynamics, device)?.require_grad(),
             residual: None,
             structure: Arc::new(Structure::of_equations(dynamics)),
         })
@@ -60,7 +54,7 @@ impl HybridModel {
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
         Ok(Self {
-            prior: learnable(PRIOR_ID, vector(&weights.flat(), device)),
+            prior: vector(&weights.flat(), device).require_grad(),
             residual: None,
             structure: Arc::new(Structure::of_network(system, joints, weights)),
         })
@@ -73,10 +67,7 @@ impl HybridModel {
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
         Ok(Self {
-            residual: Some(learnable(
-                RESIDUAL_ID,
-                vector(&weights.flat(), &self.device()),
-            )),
+            residual: Some(vector(&weights.flat(), &self.device()).require_grad()),
             structure: Arc::new(self.structure.with_residual(weights)),
             ..self
         })
@@ -144,19 +135,14 @@ impl HybridModel {
 
     /// Every learnable number.
     pub fn weights(&self) -> ModelWeights {
+        let network = |made: Option<&MlpWeights>, numbers: Option<&Tensor<1>>| {
+            Some(made?.with_flat(&to_f64(numbers?.clone())))
+        };
         ModelWeights {
             parameters: self.parameters().into_iter().map(|(_, v)| v).collect(),
-            prior: self.network_of(self.structure.prior(), Some(&self.prior)),
-            residual: self.network_of(self.structure.residual(), self.residual.as_ref()),
+            prior: network(self.structure.prior(), Some(&self.prior)),
+            residual: network(self.structure.residual(), self.residual.as_ref()),
         }
-    }
-
-    fn network_of(
-        &self,
-        made: Option<&MlpWeights>,
-        numbers: Option<&Param<Tensor<1>>>,
-    ) -> Option<MlpWeights> {
-        Some(made?.with_flat(&to_f64(numbers?.val())))
     }
 
     /// The same model with other numbers.
@@ -220,23 +206,23 @@ impl HybridModel {
     /// The declared equations with the current values.
     fn equations(&self) -> Option<Dynamics> {
         let declared = self.structure.equations.as_ref()?;
-        Some(equations::current(declared, self.prior.val()))
+        Some(equations::current(declared, self.prior.clone()))
     }
 
     /// Unpacks the learnable numbers, once for all evaluations that one gradient runs through.
-    pub fn prepare(&self) -> Prepared<'_> {
+    pub fn unpack(&self) -> Unpacked<'_> {
         let each = |tensor: Option<Tensor<1>>| tensor.and_then(|numbers| rows_of(numbers, 1));
-        Prepared::new(&self.structure, 1, self.tensors().map(each))
+        Unpacked::new(&self.structure, 1, self.tensors().map(each))
     }
 
     /// Brings every physical parameter back within its bounds, after each optimiser step (projected gradient descent): a
     /// parameter may rest on a bound and leave it again.
     #[must_use]
     pub fn project(self) -> Self {
-        let prior = self.prior.val().inner();
+        let prior = self.prior.clone().inner();
         match equations::projected(self.structure.parameters(), &prior) {
             Some(inside) => Self {
-                prior: learnable(PRIOR_ID, Tensor::from_inner(inside)),
+                prior: Tensor::from_inner(inside).require_grad(),
                 ..self
             },
             None => self,
@@ -245,7 +231,7 @@ impl HybridModel {
 
     /// The device that the model was made on.
     pub fn device(&self) -> Device {
-        self.prior.val().device()
+        self.prior.device()
     }
 
     /// The model without its learnable numbers.
@@ -253,27 +239,28 @@ impl HybridModel {
         &self.structure
     }
 
+    /// The same model on the device without gradients.
+    #[must_use]
+    pub(in crate::train) fn without_gradients(&self) -> Self {
+        Self {
+            prior: self.prior.clone().inner(),
+            residual: self.residual.clone().map(Tensor::inner),
+            structure: self.structure.clone(),
+        }
+    }
+
     /// The learnable numbers of the prior and of the residual.
     pub(in crate::train) fn tensors(&self) -> [Option<Tensor<1>>; 2] {
-        [
-            Some(self.prior.val()),
-            self.residual.as_ref().map(Param::val),
-        ]
+        [Some(self.prior.clone()), self.residual.clone()]
     }
 
     /// The same model with these learnable numbers, where some are given.
     pub(in crate::train) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
         let [prior, residual] = tensors;
-        let prior = prior.map(|tensor| learnable(PRIOR_ID, tensor));
-        let residual = residual.map(|tensor| learnable(RESIDUAL_ID, tensor));
         Self {
             prior: prior.unwrap_or_else(|| self.prior.clone()),
             residual: residual.or_else(|| self.residual.clone()),
             structure: self.structure.clone(),
         }
     }
-}
-
-fn learnable(id: u64, tensor: Tensor<1>) -> Param<Tensor<1>> {
-    Param::initialized(ParamId::from(id), tensor.require_grad())
 }

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use burn::tensor::{Bool, Device, Tensor};
 
 use super::tensor::{rows_of, tensor, to_f64};
-use super::{HybridModel, Prepared, Structure, equations};
+use super::{HybridModel, Structure, Unpacked, equations};
 use crate::model::{MlpWeights, Parameter};
 
 /// Independent models of one structure, evaluated together by one operation on a device.
@@ -72,8 +72,8 @@ impl Stack {
     }
 
     /// Unpack the parameters for evaluations at so many rows for each model, one model's after the other's.
-    pub(in crate::train) fn prepare(&self, rows: usize) -> Prepared<'_> {
-        Prepared::new(&self.structure, rows, self.tensors())
+    pub(in crate::train) fn unpack(&self, rows: usize) -> Unpacked<'_> {
+        Unpacked::new(&self.structure, rows, self.tensors())
     }
 
     /// The models that are `alive` (`[models]`) with other learnable numbers, physical parameters brought back within

@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use burn::module::{Module, ParamGroup, ParamId};
 use burn::tensor::{Device, Gradients};
 use rand::RngExt;
 
-use super::{fit, hybrid, one_joint, parameter, rng, transitions};
+use super::{fit, hybrid, hybrid_of, one_joint, parameter, rng, transitions};
 use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
-use crate::train::hybrid::{PRIOR_ID, RESIDUAL_ID};
 use crate::train::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Sweep, Variant};
 
 /// Segments of `steps` irregular steps that lead through random states.
@@ -164,9 +162,7 @@ fn equations_without_parameters_can_have_a_residual() {
     let segments = segments(1, 40, 2);
     let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
-    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device())
-        .and_then(|model| model.with_residual(&residual))
-        .unwrap();
+    let model = hybrid_of(&dynamics, &residual, &Backend::NdArray.device());
     assert_agrees(&model, &segments, Integrator::RK4);
 }
 
@@ -185,14 +181,17 @@ fn freezing_one_part_does_not_change_the_gradient_of_the_other() {
         let both = gradients(&model);
         assert!(both.iter().all(Option::is_some));
         for frozen in 0..2 {
-            let id = if frozen == 0 { PRIOR_ID } else { RESIDUAL_ID };
-            let part = ParamGroup::from_ids(vec![ParamId::from(id)]);
-            let some = gradients(&model.clone().set_require_grad_group(part, false));
+            let mut tensors = model.tensors();
+            tensors[frozen] = tensors[frozen].take().map(|t| t.set_require_grad(false));
+            let some = gradients(&model.with_tensors(tensors));
             assert_eq!(some[frozen], None);
             assert_eq!(some[1 - frozen], both[1 - frozen]);
         }
         let value = objective.loss(&model, &batch).numbers();
-        assert_eq!(objective.loss(&model.valid(), &batch).numbers(), value);
+        assert_eq!(
+            objective.loss(&model.without_gradients(), &batch).numbers(),
+            value
+        );
     }
 }
 
