@@ -1,4 +1,4 @@
-// `train::Backend` says why this backend.
+// Why a deprecated backend: see `train::Backend`.
 #![allow(deprecated)]
 
 use std::borrow::Cow;
