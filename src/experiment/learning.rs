@@ -122,9 +122,9 @@ impl Method {
         for round in folder.rounds() {
             report(round, true);
         }
-        let mut progress = folder.progress(run, &self.dynamics)?;
-        while progress.rounds < self.config.rounds {
-            let (round, training) = run.round(&mut progress)?;
+        let mut state = folder.state(run, &self.dynamics)?;
+        while state.rounds < self.config.rounds {
+            let (round, training) = run.round(&mut state)?;
             let origin = Origin {
                 config: json!({
                     "command": "mbrl",
@@ -136,13 +136,13 @@ impl Method {
                 seed: run.seed,
                 model_toml: self.model_toml.clone(),
             };
-            folder.keep(round.clone(), &progress, &training, &origin)?;
+            folder.keep(round.clone(), &state, &training, &origin)?;
             report(&round, false);
         }
         Ok(TrainedMethod {
             rounds: folder.rounds().to_vec(),
             checkpoint: folder.checkpoint(),
-            model: progress.model.expect("there is a round"),
+            model: state.model.expect("there is a round"),
         })
     }
 }

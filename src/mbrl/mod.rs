@@ -15,5 +15,5 @@ pub use error::RunError;
 pub use evaluator::{EpisodeScore, Evaluator};
 pub use folder::Folder;
 pub use learner::{Learner, Prior};
-pub use run::{Progress, Round, Run, Schedule};
+pub use run::{Round, Run, RunState, Schedule};
 pub use transitions::transitions;

@@ -31,7 +31,7 @@ pub struct Run<'a> {
 
 /// The state of a run between two rounds.
 #[derive(Debug, Clone, Default)]
-pub struct Progress {
+pub struct RunState {
     /// The recorded motion: one log for each stretch, the first one under random torques.
     pub logs: Vec<Log>,
     /// The model after the last round; none before the first.
@@ -62,15 +62,15 @@ impl Run<'_> {
     ///
     /// # Errors
     /// A plant that diverges.
-    pub fn begin(&self) -> Result<Progress, RunError> {
+    pub fn begin(&self) -> Result<RunState, RunError> {
         let dynamics = self.plant.dynamics();
         let mut rig = self.rig(&dynamics, 0);
         let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
         let mut noise = stream(self.seed, Purpose::Gather(0));
         let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
-        Ok(Progress {
+        Ok(RunState {
             logs: vec![stretch.log],
-            ..Progress::default()
+            ..RunState::default()
         })
     }
 
@@ -78,10 +78,10 @@ impl Run<'_> {
     ///
     /// # Errors
     /// A loss that is not finite, or a plant that diverges.
-    pub fn round(&self, progress: &mut Progress) -> Result<(Round, Training), RunError> {
-        let (round, seed) = (progress.rounds, self.seed);
-        let segments = transitions(&progress.logs, self.task.joints())?;
-        let previous = progress.model.as_ref();
+    pub fn round(&self, state: &mut RunState) -> Result<(Round, Training), RunError> {
+        let (round, seed) = (state.rounds, self.seed);
+        let segments = transitions(&state.logs, self.task.joints())?;
+        let previous = state.model.as_ref();
         let training = self.learner.learn(&segments, previous, seed, round)?;
         let model = training.result()?;
         let predictor = model.predictor(self.learner.fit.integrator);
@@ -95,10 +95,10 @@ impl Run<'_> {
             residual_norm: last.residual_norm,
             parameters: model.parameters(),
         };
-        let gathered = self.gather(&predictor, progress)?;
-        progress.logs.push(gathered);
-        progress.model = Some(model);
-        progress.rounds += 1;
+        let gathered = self.gather(&predictor, state)?;
+        state.logs.push(gathered);
+        state.model = Some(model);
+        state.rounds += 1;
         Ok((record, training))
     }
 
@@ -110,11 +110,10 @@ impl Run<'_> {
         }
     }
 
-    fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
+    fn gather(&self, predictor: &Predictor, state: &RunState) -> Result<Log, RunError> {
         let dynamics = self.plant.dynamics();
-        let mut rig = self.rig_now(&dynamics, progress)?;
-        let of_round =
-            |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(progress.rounds + 1));
+        let mut rig = self.rig_now(&dynamics, state)?;
+        let of_round = |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(state.rounds + 1));
         let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
         let steps = self.schedule.gather;
         let stretch = with_controller(predictor, self.task, self.task.replan, &draws, |policy| {
@@ -125,15 +124,11 @@ impl Run<'_> {
 
     /// The plant in the state at the end of the last stretch under control, restored by replaying the torques of the
     /// episode so far. After the end of an episode, the plant in a new initial state.
-    fn rig_now<'d>(
-        &self,
-        dynamics: &'d Dynamics,
-        progress: &Progress,
-    ) -> Result<Rig<'d>, RunError> {
+    fn rig_now<'d>(&self, dynamics: &'d Dynamics, state: &RunState) -> Result<Rig<'d>, RunError> {
         let of_episode = self.task.steps / self.schedule.gather;
-        let (episode, begun) = (progress.rounds / of_episode, progress.rounds % of_episode);
+        let (episode, begun) = (state.rounds / of_episode, state.rounds % of_episode);
         let mut rig = self.rig(dynamics, 1 + episode);
-        let controlled = &progress.logs[1..];
+        let controlled = &state.logs[1..];
         for log in &controlled[controlled.len() - begun..] {
             for row in 0..log.rows() - 1 {
                 let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();

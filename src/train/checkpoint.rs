@@ -229,38 +229,33 @@ impl Checkpoint {
     }
 
     fn check(&self, dynamics: &Dynamics) -> Result<(), CheckpointError> {
-        let foreign = |what, saved: String, given: String| CheckpointError::Foreign {
-            what,
-            saved,
-            given,
-            dir: self.dir.clone(),
+        let same = |what, saved: String, given: String| match saved == given {
+            true => Ok(()),
+            false => Err(CheckpointError::Foreign {
+                what,
+                saved,
+                given,
+                dir: self.dir.clone(),
+            }),
         };
         let saved = &self.manifest.shape;
-        if saved.system != dynamics.name {
-            let (saved, given) = (saved.system.clone(), dynamics.name.clone());
-            return Err(foreign("system", saved, given));
+        same("system", saved.system.clone(), dynamics.name.clone())?;
+        let (joints, given) = (saved.joints.to_string(), dynamics.joints.to_string());
+        same("number of joints", joints, given)?;
+        if saved.prior.is_some() {
+            // A network needs no equations, so that those of the model file may be any.
+            return Ok(());
         }
-        if saved.joints != dynamics.joints {
-            let (saved, given) = (saved.joints.to_string(), dynamics.joints.to_string());
-            return Err(foreign("number of joints", saved, given));
-        }
-        let list = |names: Vec<&str>| match names.len() {
-            0 => "none".to_owned(),
-            _ => names.join(", "),
-        };
-        let known = list(saved.parameters.iter().map(|p| p.name.as_str()).collect());
-        let given = list(
-            dynamics
-                .parameters
-                .iter()
-                .map(|p| p.name.as_str())
-                .collect(),
-        );
-        // A network needs no equations, so those of the model file may be any.
-        if saved.prior.is_none() && known != given {
-            return Err(foreign("list of parameters", known, given));
-        }
-        Ok(())
+        let known = listed(saved.parameters.iter().map(|p| &p.name));
+        let given = listed(dynamics.parameters.iter().map(|p| &p.name));
+        same("list of parameters", known, given)
+    }
+}
+
+fn listed<'n>(names: impl Iterator<Item = &'n String>) -> String {
+    match names.map(String::as_str).collect::<Vec<_>>() {
+        names if names.is_empty() => "none".to_owned(),
+        names => names.join(", "),
     }
 }
 

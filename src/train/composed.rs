@@ -2,7 +2,7 @@
 
 use burn::tensor::Tensor;
 
-use super::{Columns, Prepared};
+use super::{Columns, Unpacked};
 use crate::sim::Integrator;
 
 /// Below this size a residual counts as absent: it keeps the slope of the norm finite at zero, where every residual
@@ -12,7 +12,7 @@ pub(super) const NORM_FLOOR: f64 = 1e-6;
 /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
 /// after the other's.
 pub(super) fn of_each(
-    model: &Prepared,
+    model: &Unpacked,
     models: usize,
     batch: &Columns,
     integrator: Integrator,

@@ -1,6 +1,5 @@
 use std::ops::ControlFlow;
 
-use burn::module::Module;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
@@ -9,7 +8,7 @@ use super::optimizer::Optimizer;
 use super::{Batch, Batching, Best, FitSettings, Objective, Record, Segments, TrainError};
 use crate::train::HybridModel;
 
-/// A training run, which can be saved ([`save`](super::save)), loaded and continued. Interruptions do not change its
+/// A training run, which can be saved, loaded and continued. Interruptions do not change its
 /// result by a bit on the same backend and machine.
 #[derive(Clone)]
 pub struct Training {
@@ -184,11 +183,6 @@ impl Training {
         &self.history
     }
 
-    /// The best model by validation error, where there is validation.
-    pub fn best(&self) -> Option<&Best> {
-        self.best.as_ref()
-    }
-
     fn run_epoch(&mut self, batches: &Batches) -> Result<Epoch, TrainError> {
         let Batching::Mini { size } = self.settings.batching else {
             return self.step(&batches.training);
@@ -212,9 +206,8 @@ impl Training {
         let Gradient { loss, by_numbers } =
             self.objective.gradient(&self.model, batch, self.weights());
         let total = self.total(loss)?;
-        let mut numbers = self.model.numbers();
-        self.optimizer.step(&mut numbers, &by_numbers);
-        self.model = self.model.with_numbers(numbers);
+        let step = |numbers: &mut _| self.optimizer.step(numbers, &by_numbers);
+        self.model.update(step);
         Ok(Epoch {
             loss: total,
             error: loss[0],
@@ -223,7 +216,7 @@ impl Training {
 
     /// Evaluates the current model on all training segments and on validation.
     fn record(&mut self, batches: &Batches) -> Result<(), TrainError> {
-        let model = self.model.clone().valid();
+        let model = self.model.without_gradients();
         let evaluate = |batch| self.objective.loss(&model, batch);
         let parts = evaluate(&batches.evaluation);
         let (loss, [error, residual_norm]) = (self.total(parts)?, parts);

@@ -29,7 +29,7 @@ pub struct Record {
 
 /// The model with the lowest validation error so far.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Best {
+pub(super) struct Best {
     pub epoch: usize,
     pub validation: f64,
     pub weights: ModelWeights,

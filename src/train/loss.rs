@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor};
 use super::composed;
 use super::fused::{Evaluation, Problem, Workers};
 use super::hybrid::{Numbers, to_f32, to_f64, vector};
-use super::{Backend, Blocks, Columns, HybridModel, Prepared, Segments, TrainError};
+use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, Unpacked};
 use crate::model;
 use crate::sim::Integrator;
 
@@ -116,7 +116,7 @@ impl Objective {
     /// in few rows would vanish first.
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> [f64; 2] {
         match batch {
-            Batch::Columns(columns) => numbers(self.composed_loss(model, columns)),
+            Batch::Columns(columns) => numbers(self.composed_loss(&model.unpack(), columns)),
             Batch::Blocks(blocks) => self.evaluation(model, blocks).loss.map(f64::from),
         }
     }
@@ -130,11 +130,12 @@ impl Objective {
     ) -> Gradient {
         match batch {
             Batch::Columns(columns) => {
-                let loss = self.composed_loss(model, columns);
+                let tensors = model.tensors();
+                let loss = self.composed_loss(&model.unpack_tensors(&tensors), columns);
                 let weights = vector(&weights, &loss.device());
                 let mut gradients = (loss.clone() * weights).backward();
-                let by_numbers = model.tensors().map(|tensor| {
-                    let gradient = tensor.and_then(|tensor| tensor.grad_remove(&mut gradients));
+                let by_numbers = tensors.map(|tensor| {
+                    let gradient = tensor.grad_remove(&mut gradients);
                     gradient.map_or_else(Vec::new, to_f32)
                 });
                 Gradient {
@@ -155,12 +156,12 @@ impl Objective {
     fn evaluation(&self, model: &HybridModel, blocks: &Arc<Blocks>) -> Evaluation {
         let structure = model.structure();
         let problem = Problem::new(structure, blocks, self.integrator, &self.precision);
-        Evaluation::new(problem, &self.workers, &model.numbers())
+        Evaluation::new(problem, &self.workers, model.numbers())
     }
 
     /// E and ||F_r||, `[2]`.
-    fn composed_loss(&self, model: &HybridModel, columns: &Columns) -> Tensor<1> {
-        Tensor::cat(self.of_each(1, &model.prepare(), columns).to_vec(), 0)
+    fn composed_loss(&self, unpacked: &Unpacked, columns: &Columns) -> Tensor<1> {
+        Tensor::cat(self.of_each(1, unpacked, columns).to_vec(), 0)
     }
 
     /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
@@ -168,10 +169,10 @@ impl Objective {
     pub(super) fn of_each(
         &self,
         models: usize,
-        prepared: &Prepared,
+        unpacked: &Unpacked,
         batch: &Columns,
     ) -> [Tensor<1>; 2] {
-        composed::of_each(prepared, models, batch, self.integrator, &self.scale)
+        composed::of_each(unpacked, models, batch, self.integrator, &self.scale)
     }
 }
 

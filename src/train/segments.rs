@@ -223,15 +223,10 @@ impl Segments {
             let values: Vec<f32> = chosen.iter().map(|i| from[i * width + offset]).collect();
             Tensor::<1>::from_data(TensorData::new(values, [chosen.len()]), device)
         };
-        let group = |from: &[f32], rows: usize, width: usize| -> Vec<Vec<Tensor<1>>> {
-            let row = |row: usize| (0..width).map(move |c| row * width + c);
-            (0..rows)
-                .map(|r| {
-                    row(r)
-                        .map(|offset| column(from, rows * width, offset))
-                        .collect()
-                })
-                .collect()
+        let group = |from: &[f32], rows: usize, width: usize| {
+            let at = |offset| column(from, rows * width, offset);
+            let row = |row| (row * width..(row + 1) * width).map(at).collect();
+            (0..rows).map(row).collect()
         };
         let dt: Vec<Tensor<1>> = (0..k).map(|step| column(&self.dt, k, step)).collect();
         let mut time = vec![column(&self.start, 1, 0)];

@@ -135,10 +135,10 @@ impl StackedSweep {
     /// One step of the optimiser on one batch, which is so large a `share` of all segments.
     fn step(&mut self, batch: &Columns, share: f64) -> BatchError {
         let rows = batch.size / self.stack.models();
-        let prepared = self.stack.prepare(rows);
+        let unpacked = self.stack.unpack(rows);
         let [error, norm] = self
             .objective
-            .of_each(self.stack.models(), &prepared, batch);
+            .of_each(self.stack.models(), &unpacked, batch);
         let before = error.clone().inner();
         let [of_error, of_norm] = self.weights.clone();
         let losses = error * of_error + norm * of_norm;
@@ -200,8 +200,8 @@ impl StackedSweep {
 
     fn evaluate(&self, whole: &Columns) -> Vec<Trained> {
         let models = self.stack.models();
-        let prepared = self.stack.prepare(whole.size / models);
-        let parts = self.objective.of_each(models, &prepared, whole);
+        let unpacked = self.stack.unpack(whole.size / models);
+        let parts = self.objective.of_each(models, &unpacked, whole);
         let [error, norm] = parts.map(to_f64);
         let found = error.into_iter().zip(norm).zip(self.stack.parameters());
         found

@@ -217,7 +217,7 @@ mod tests {
                 record_limit,
                 ..problem
             };
-            let evaluation = Evaluation::new(problem, &Arc::default(), &model.numbers());
+            let evaluation = Evaluation::new(problem, &Arc::default(), model.numbers());
             (evaluation.loss, evaluation.derivative([1.0, 0.3]))
         };
         assert_eq!(derivative(0), derivative(RECORD_LIMIT));

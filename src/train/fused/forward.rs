@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::programs::Programs;
-use super::record::Stage as Recorded;
+use super::record::StageRecord;
 use super::rollout::{Rollout, StageIndex};
 use super::rows::{total, update};
 use super::workspace::Scratch;
@@ -142,7 +142,7 @@ impl<S: Simd> Rollout<'_, S> {
         &self,
         program: &mut Tape<f32, W>,
         at: StageIndex,
-        record: &mut Recorded,
+        record: &mut StageRecord,
         rates: &mut [Rows],
     ) {
         let states = self.states();
@@ -174,7 +174,7 @@ impl<S: Simd> Rollout<'_, S> {
 
     /// Adds the squares of the residual's outputs.
     #[inline(always)]
-    fn add_residual(&self, record: &Recorded, sum: &mut Rows) {
+    fn add_residual(&self, record: &StageRecord, sum: &mut Rows) {
         let last = self.weights.networks.len() - 1;
         let network = &self.weights.networks[last];
         let values = record.networks[last]

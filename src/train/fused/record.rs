@@ -12,13 +12,13 @@ pub(super) struct Layout {
 }
 
 /// One stage, each part `[block][value]`.
-pub(super) struct Stage<'a> {
+pub(super) struct StageRecord<'a> {
     pub states: &'a mut [Rows],
     /// Of each network, in the order of the structure's.
     pub networks: [Activations<'a>; 2],
 }
 
-/// A network at evaluation.
+/// The features of a network and the outputs of its layers.
 #[derive(Default)]
 pub(super) struct Activations<'a> {
     pub features: &'a mut [Rows],
@@ -41,7 +41,7 @@ impl Layout {
         record: &'a mut [Rows],
         stage: usize,
         networks: &[Network],
-    ) -> Stage<'a> {
+    ) -> StageRecord<'a> {
         let rows = self.blocks * self.stage;
         let (states, mut rest) =
             record[stage * rows..][..rows].split_at_mut(self.blocks * self.states);
@@ -52,7 +52,7 @@ impl Layout {
             *part = Activations { features, values };
             rest = after;
         }
-        Stage {
+        StageRecord {
             states,
             networks: parts,
         }

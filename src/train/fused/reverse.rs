@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::programs::Programs;
-use super::record::Stage as Recorded;
+use super::record::StageRecord;
 use super::rollout::{Rollout, StageIndex};
 use super::rows::update;
 use super::workspace::{Scratch, Workspace};
@@ -144,7 +144,7 @@ impl<S: Simd> Rollout<'_, S> {
     fn networks_back(
         &self,
         at: StageIndex,
-        record: &mut Recorded,
+        record: &mut StageRecord,
         workspace: &mut Workspace,
         seed: f32,
     ) {

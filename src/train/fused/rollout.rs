@@ -3,7 +3,7 @@ use std::ops::Range;
 use pulp::Simd;
 
 use super::problem::{Problem, Weights};
-use super::record::{Layout, Stage};
+use super::record::{Layout, StageRecord};
 use super::rows::update;
 use crate::expr::Tape;
 use crate::lanes::Vector;
@@ -63,7 +63,7 @@ impl<S: Simd> Rollout<'_, S> {
 
     /// The record of a stage.
     #[inline(always)]
-    pub(super) fn stage<'r>(&self, record: &'r mut [Rows], at: StageIndex) -> Stage<'r> {
+    pub(super) fn stage<'r>(&self, record: &'r mut [Rows], at: StageIndex) -> StageRecord<'r> {
         let (substeps, stages) = (
             self.problem.integrator.substeps(),
             self.problem.integrator.scheme().stages.len(),

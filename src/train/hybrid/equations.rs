@@ -1,17 +1,18 @@
-//! The physical parameters of declared equations as one tensor, each divided by its scale: an optimiser's step is then
+//! The physical parameters of declared equations as learnable numbers, each divided by its scale: an optimiser's step is then
 //! relative to each parameter's own magnitude. The entries of fixed parameters are never read.
 
 use burn::tensor::{Device, Tensor};
 
 use super::HybridError;
-use super::tensor::{to_f64, vector};
+use super::tensor::vector;
 use crate::model::{Dynamics, Parameter};
 
-/// value / scale of every parameter, `[parameters]`.
+/// value / scale of every parameter.
 ///
 /// # Errors
 /// A parameter that is not finite, outside of its bounds, or without a scale.
-pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, HybridError> {
+#[allow(clippy::cast_possible_truncation)] // training runs in f32
+pub(super) fn scaled(dynamics: &Dynamics) -> Result<Vec<f32>, HybridError> {
     for p in &dynamics.parameters {
         let scaled = p.scale.is_finite() && p.scale > 0.0;
         let inside = p.bounds[0] <= p.value && p.value <= p.bounds[1];
@@ -24,12 +25,13 @@ pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, 
             });
         }
     }
-    Ok(each(&dynamics.parameters, |p| p.value / p.scale, device))
+    let parameters = dynamics.parameters.iter();
+    Ok(parameters.map(|p| (p.value / p.scale) as f32).collect())
 }
 
 /// The equations with these values; fixed ones as declared, to the last bit.
-pub(super) fn current(declared: &Dynamics, scaled: Tensor<1>) -> Dynamics {
-    let scaled = to_f64(scaled);
+pub(super) fn current(declared: &Dynamics, scaled: &[f32]) -> Dynamics {
+    let scaled: Vec<f64> = scaled.iter().copied().map(f64::from).collect();
     let values = values(&declared.parameters, &scaled);
     declared.clone().with_values(values)
 }

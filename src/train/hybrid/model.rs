@@ -1,19 +1,14 @@
 use std::sync::Arc;
 
-use burn::module::{Module, Param, ParamId};
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 
-use super::tensor::{rows_of, to_f32, to_f64, vector};
-use super::{HybridError, Prepared, Structure, equations};
+use super::tensor::{rows_of, vector_of_f32};
+use super::{HybridError, Structure, Unpacked, equations};
 use crate::control::Predictor;
 use crate::model::{
-    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
+    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, to_f32, with_residual,
 };
 use crate::sim::Integrator;
-
-// Burn's identifiers of the tensors.
-const PRIOR_ID: u64 = 1;
-const RESIDUAL_ID: u64 = 2;
 
 /// Learnable numbers of the prior and of the residual.
 pub(in crate::train) type Numbers = [Vec<f32>; 2];
@@ -22,15 +17,13 @@ pub(in crate::train) type Numbers = [Vec<f32>; 2];
 ///
 /// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
-#[derive(Module, Debug)]
+#[derive(Debug, Clone)]
 pub struct HybridModel {
-    // One tensor for each part: the cost of an optimiser's step grows with the number of tensors.
-    /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`].
-    prior: Param<Tensor<1>>,
-    /// The residual network's numbers.
-    residual: Option<Param<Tensor<1>>>,
-    #[module(skip)]
+    /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`]; and the
+    /// residual network's.
+    numbers: Numbers,
     structure: Arc<Structure>,
+    device: Device,
 }
 
 impl HybridModel {
@@ -43,9 +36,9 @@ impl HybridModel {
     /// A parameter that is not finite, outside of its bounds, or without a scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
         Ok(Self {
-            prior: learnable(PRIOR_ID, equations::scaled(dynamics, device)?),
-            residual: None,
+            numbers: [equations::scaled(dynamics)?, Vec::new()],
             structure: Arc::new(Structure::of_equations(dynamics)),
+            device: device.clone(),
         })
     }
 
@@ -63,9 +56,9 @@ impl HybridModel {
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
         Ok(Self {
-            prior: learnable(PRIOR_ID, vector(&weights.flat(), device)),
-            residual: None,
+            numbers: [to_f32(&weights.flat()), Vec::new()],
             structure: Arc::new(Structure::of_network(system, joints, weights)),
+            device: device.clone(),
         })
     }
 
@@ -75,11 +68,9 @@ impl HybridModel {
     /// A network that is not one for the model's joints.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
+        let [prior, _] = self.numbers;
         Ok(Self {
-            residual: Some(learnable(
-                RESIDUAL_ID,
-                vector(&weights.flat(), &self.device()),
-            )),
+            numbers: [prior, to_f32(&weights.flat())],
             structure: Arc::new(self.structure.with_residual(weights)),
             ..self
         })
@@ -147,19 +138,16 @@ impl HybridModel {
 
     /// Every learnable number.
     pub fn weights(&self) -> ModelWeights {
+        let network = |made: Option<&MlpWeights>, numbers: &[f32]| {
+            let numbers: Vec<f64> = numbers.iter().copied().map(f64::from).collect();
+            Some(made?.with_flat(&numbers))
+        };
+        let [prior, residual] = &self.numbers;
         ModelWeights {
             parameters: self.parameters().into_iter().map(|(_, v)| v).collect(),
-            prior: self.network_of(self.structure.prior(), Some(&self.prior)),
-            residual: self.network_of(self.structure.residual(), self.residual.as_ref()),
+            prior: network(self.structure.prior(), prior),
+            residual: network(self.structure.residual(), residual),
         }
-    }
-
-    fn network_of(
-        &self,
-        made: Option<&MlpWeights>,
-        numbers: Option<&Param<Tensor<1>>>,
-    ) -> Option<MlpWeights> {
-        Some(made?.with_flat(&to_f64(numbers?.val())))
     }
 
     /// The same model with other numbers.
@@ -223,18 +211,23 @@ impl HybridModel {
     /// The declared equations with the current values.
     fn equations(&self) -> Option<Dynamics> {
         let declared = self.structure.equations.as_ref()?;
-        Some(equations::current(declared, self.prior.val()))
+        Some(equations::current(declared, &self.numbers[0]))
     }
 
-    /// Unpacks the learnable numbers, once for all evaluations that one gradient runs through.
-    pub fn prepare(&self) -> Prepared<'_> {
-        let each = |tensor: Option<Tensor<1>>| tensor.and_then(|numbers| rows_of(numbers, 1));
-        Prepared::new(&self.structure, 1, self.tensors().map(each))
+    /// Unpacks the learnable numbers for evaluations without a gradient.
+    pub fn unpack(&self) -> Unpacked<'_> {
+        self.unpack_tensors(&self.tensors())
+    }
+
+    /// Unpacks the model's [`HybridModel::tensors`], once for all evaluations that one gradient runs through.
+    pub(in crate::train) fn unpack_tensors(&self, tensors: &[Tensor<1>; 2]) -> Unpacked<'_> {
+        let tensors = tensors.clone().map(|numbers| rows_of(numbers, 1));
+        Unpacked::new(&self.structure, 1, tensors)
     }
 
     /// The device that the model was made on.
     pub fn device(&self) -> Device {
-        self.prior.val().device()
+        self.device.clone()
     }
 
     /// The model without its learnable numbers.
@@ -242,37 +235,30 @@ impl HybridModel {
         &self.structure
     }
 
-    /// The learnable numbers of the prior and of the residual.
-    pub(in crate::train) fn tensors(&self) -> [Option<Tensor<1>>; 2] {
-        [
-            Some(self.prior.val()),
-            self.residual.as_ref().map(Param::val),
-        ]
+    /// The same model on the device without gradients.
+    #[must_use]
+    pub(in crate::train) fn without_gradients(&self) -> Self {
+        Self {
+            device: self.device().without_autodiff(),
+            ..self.clone()
+        }
     }
 
     /// The learnable numbers of the prior and of the residual; none where there is no residual.
-    pub(in crate::train) fn numbers(&self) -> Numbers {
-        self.tensors()
-            .map(|tensor| tensor.map_or_else(Vec::new, to_f32))
+    pub(in crate::train) fn numbers(&self) -> &Numbers {
+        &self.numbers
     }
 
-    /// The same model with these learnable numbers, physical parameters brought back within their bounds (projected
-    /// gradient descent): a parameter may rest on a bound and leave it again.
-    pub(in crate::train) fn with_numbers(&self, [mut prior, residual]: Numbers) -> Self {
-        equations::project(self.structure.parameters(), &mut prior);
-        let device = self.device();
-        let tensor = |numbers: Vec<f32>| {
-            let shape = [numbers.len()];
-            Tensor::from_data(TensorData::new(numbers, shape), &device)
-        };
-        Self {
-            prior: learnable(PRIOR_ID, tensor(prior)),
-            residual: (self.residual.is_some()).then(|| learnable(RESIDUAL_ID, tensor(residual))),
-            structure: self.structure.clone(),
-        }
+    /// The numbers as tensors of their own on the model's device.
+    pub(in crate::train) fn tensors(&self) -> [Tensor<1>; 2] {
+        let numbers = self.numbers.each_ref();
+        numbers.map(|numbers| vector_of_f32(numbers, &self.device).require_grad())
     }
-}
 
-fn learnable(id: u64, tensor: Tensor<1>) -> Param<Tensor<1>> {
-    Param::initialized(ParamId::from(id), tensor.require_grad())
+    /// Applies `step` to the learnable numbers, then brings physical parameters back within their bounds (projected gradient
+    /// descent): a parameter may rest on a bound and leave it again.
+    pub(in crate::train) fn update(&mut self, step: impl FnOnce(&mut Numbers)) {
+        step(&mut self.numbers);
+        equations::project(self.structure.parameters(), &mut self.numbers[0]);
+    }
 }

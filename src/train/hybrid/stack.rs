@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use burn::tensor::{Bool, Device, Tensor};
 
-use super::tensor::{rows_of, tensor, to_f64};
-use super::{HybridModel, Prepared, Structure, equations};
+use super::tensor::{rows_of, tensor, to_f64, vector_of_f32};
+use super::{HybridModel, Structure, Unpacked, equations};
 use crate::model::{MlpWeights, Parameter};
 
 /// Independent models of one structure, evaluated together by one operation on a device.
@@ -35,11 +35,9 @@ impl Stack {
         let flat: Vec<f64> = networks.iter().flat_map(MlpWeights::flat).collect();
         let width = flat.len() / models;
         let drawn = tensor(&flat, [models, width], &device);
-        let [prior, _] = model.tensors();
-        let detached = |prior: Tensor<1>| Tensor::from_inner(prior.inner());
         let tensors = if structure.has_residual {
-            let prior = prior.and_then(|prior| rows_of(detached(prior), models));
-            [prior, Some(drawn)]
+            let prior = vector_of_f32(&model.numbers()[0], &device);
+            [rows_of(prior, models), Some(drawn)]
         } else {
             [Some(drawn), None]
         };
@@ -72,8 +70,8 @@ impl Stack {
     }
 
     /// Unpack the parameters for evaluations at so many rows for each model, one model's after the other's.
-    pub(in crate::train) fn prepare(&self, rows: usize) -> Prepared<'_> {
-        Prepared::new(&self.structure, rows, self.tensors())
+    pub(in crate::train) fn unpack(&self, rows: usize) -> Unpacked<'_> {
+        Unpacked::new(&self.structure, rows, self.tensors())
     }
 
     /// The models that are `alive` (`[models]`) with other learnable numbers, physical parameters brought back within

@@ -1,6 +1,6 @@
 use burn::tensor::Tensor;
 
-use super::{Derivative, Prepared};
+use super::{Derivative, Unpacked};
 use crate::sim::{Integrator, Scheme};
 
 /// A batch after one step.
@@ -13,7 +13,7 @@ pub struct StepResult {
     pub residual: Option<Tensor<2>>,
 }
 
-impl Prepared<'_> {
+impl Unpacked<'_> {
     /// Advances columns `[batch]` of states by `dt` seconds (`[batch]`) from `time`, under `input`.
     pub fn step(
         &self,
@@ -42,7 +42,7 @@ impl Prepared<'_> {
 /// A substep of length `h`; `first` is the derivative at its start.
 fn substep(
     scheme: &Scheme,
-    model: &Prepared,
+    model: &Unpacked,
     state: &[Tensor<1>],
     input: &[Tensor<1>],
     time: &Tensor<1>,

@@ -17,6 +17,10 @@ pub(super) fn tensor<const D: usize>(
     Tensor::from_data(TensorData::new(model::to_f32(values), shape), device)
 }
 
+pub(super) fn vector_of_f32(values: &[f32], device: &Device) -> Tensor<1> {
+    Tensor::from_data(TensorData::new(values.to_vec(), [values.len()]), device)
+}
+
 /// The entries of a tensor, row after row.
 pub(in crate::train) fn to_f32<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     let data = tensor.into_data();

@@ -17,9 +17,9 @@ fn an_environment_steps_as_training_does() {
     for integrator in Integrator::each() {
         let mut state = start;
         Environment::new(&dynamics, integrator, 0.02).step(&mut state, &tau, 0.0);
-        let prepared = model.prepare();
+        let unpacked = model.unpack();
         let (columns, inputs) = (start.map(column), tau.map(column));
-        let step = prepared.step(integrator, &columns, &inputs, &column(0.0), &column(0.02));
+        let step = unpacked.step(integrator, &columns, &inputs, &column(0.0), &column(0.02));
         for (mine, trained) in state.iter().zip(step.state) {
             let trained = f64::from(trained.into_scalar::<f32>());
             assert!(

@@ -5,7 +5,7 @@ use std::path::Path;
 use burn::tensor::Device;
 use rand::RngExt;
 
-use super::{fit, hybrid, one_joint, parameter, rng, transitions};
+use super::{fit, hybrid, hybrid_of, one_joint, parameter, rng, transitions};
 use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
 use crate::train::loss::Gradient;
@@ -143,9 +143,7 @@ fn equations_without_parameters_can_have_a_residual() {
     let segments = segments(1, 40, 2);
     let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
-    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device())
-        .and_then(|model| model.with_residual(&residual))
-        .unwrap();
+    let model = hybrid_of(&dynamics, &residual, &Backend::NdArray.device());
     assert_agrees(&model, &segments, Integrator::RK4);
 }
 

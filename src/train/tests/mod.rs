@@ -12,12 +12,13 @@ mod sweep;
 
 use std::ops::ControlFlow;
 
+use burn::tensor::Device;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Backend, Ended, FitSettings, HybridModel, Segments, Training};
 use crate::expr::{Graph, Scope, SignForm, parse};
-use crate::model::{Dynamics, LastLayer, MlpSettings, Parameter};
+use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
 
 pub(super) const DT: f64 = 0.02;
 
@@ -97,8 +98,17 @@ pub(super) fn hybrid(
     last: LastLayer,
 ) -> HybridModel {
     let residual = segments.network(&MlpSettings::for_joints(1), last, &mut rng(7));
-    HybridModel::physics(&pendulum(c_g, c_i), &backend.device())
-        .and_then(|model| model.with_residual(&residual))
+    hybrid_of(&pendulum(c_g, c_i), &residual, &backend.device())
+}
+
+/// These equations and this residual.
+pub(super) fn hybrid_of(
+    dynamics: &Dynamics,
+    residual: &MlpWeights,
+    device: &Device,
+) -> HybridModel {
+    HybridModel::physics(dynamics, device)
+        .and_then(|model| model.with_residual(residual))
         .unwrap()
 }
 

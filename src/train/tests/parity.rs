@@ -1,10 +1,9 @@
 use std::path::Path;
 
-use burn::module::Module;
 use burn::tensor::{Tensor, TensorData};
 use rand::RngExt;
 
-use super::{pendulum, rng, transitions};
+use super::{hybrid_of, pendulum, rng, transitions};
 use crate::expr::Program;
 use crate::lanes::Row;
 use crate::model::{
@@ -31,7 +30,7 @@ fn derivative<const N: usize>(model: &HybridModel, rows: &[[f32; N]]) -> Vec<f64
     };
     let columns: Vec<Tensor<1>> = (0..N).map(column).collect();
     let (state, input) = columns[..N - 1].split_at(states);
-    let derivative = model.prepare().derivative(state, input, &columns[N - 1]);
+    let derivative = model.unpack().derivative(state, input, &columns[N - 1]);
     let residual = model.structure().networks.last();
     if let (Some(found), Some(made)) = (derivative.residual, residual) {
         assert_eq!(found.dims(), [rows.len(), made.on.outputs(model.joints())]);
@@ -102,15 +101,13 @@ fn tensors_lanes_and_the_exported_program_agree() {
         .flat_map(|b| networks().into_iter().map(|m| (*b, m)))
     {
         let device = backend.device();
-        let hybrid = HybridModel::physics(&pendulum(15.0, 3.0), &device)
-            .and_then(|model| model.with_residual(&mlp))
-            .unwrap();
+        let hybrid = hybrid_of(&pendulum(15.0, 3.0), &mlp, &device);
         let alone = HybridModel::network("pendulum", 1, &mlp, &device).unwrap();
         for model in [hybrid, alone] {
             let dynamics = model.to_dynamics().unwrap();
             let exact = numbers(&dynamics);
             assert_close(&tensors(&model), &exact, 1e-5);
-            assert_close(&tensors(&model.clone().valid()), &exact, 1e-5);
+            assert_close(&tensors(&model.without_gradients()), &exact, 1e-5);
             assert_close(&lanes(&dynamics.program, &dynamics.values()), &exact, 1e-5);
         }
     }
@@ -132,9 +129,7 @@ fn tensors_and_the_exported_program_of_two_joints_agree() {
         let scaling = InputScaling::identity(8);
         let mlp = MlpWeights::new(2, &settings, scaling, LastLayer::Random, &mut rng);
         let device = Backend::NdArray.device();
-        let model = HybridModel::physics(&acrobot, &device)
-            .and_then(|model| model.with_residual(&mlp))
-            .unwrap();
+        let model = hybrid_of(&acrobot, &mlp, &device);
         let found = derivative(&model, &rows);
         let written = model.to_dynamics().unwrap();
         let exact = rows.iter().flat_map(|row| {
@@ -152,9 +147,7 @@ fn a_model_returns_the_weights_that_it_was_made_of() {
         .iter()
         .flat_map(|b| networks().into_iter().map(|m| (*b, m)))
     {
-        let model = HybridModel::physics(&pendulum(15.0, 3.0), &backend.device())
-            .and_then(|model| model.with_residual(&mlp))
-            .unwrap();
+        let model = hybrid_of(&pendulum(15.0, 3.0), &mlp, &backend.device());
         let weights = model.weights();
         assert_eq!(weights.residual.as_ref(), Some(&mlp));
         assert_eq!(model.with_weights(&weights).unwrap().weights(), weights);

@@ -1,6 +1,6 @@
 use std::ops::ControlFlow;
 
-use super::{fit, hybrid, rng, transitions};
+use super::{fit, hybrid, hybrid_of, rng, transitions};
 use crate::model::{LastLayer, MlpSettings};
 use crate::train::{Backend, FitSettings, HybridModel, LearningRates, Penalty, Segments, Training};
 
@@ -53,9 +53,7 @@ fn fixed_parameters_and_frozen_parts_do_not_move_and_bounds_hold() {
     let device = Backend::NdArray.device();
     let settings = MlpSettings::for_joints(1);
     let mlp = segments.network(&settings, LastLayer::Random, &mut rng(7));
-    let model = HybridModel::physics(&dynamics, &device)
-        .and_then(|model| model.with_residual(&mlp))
-        .unwrap();
+    let model = hybrid_of(&dynamics, &mlp, &device);
     let settings = FitSettings {
         epochs: 200,
         learning_rates: LearningRates {
@@ -111,7 +109,7 @@ fn the_best_model_by_validation_is_kept_even_the_untrained_one() {
             &mut |_| ControlFlow::Continue(()),
         )
         .unwrap();
-    assert_eq!(training.best().unwrap().epoch, 0);
+    assert_eq!(training.best.as_ref().unwrap().epoch, 0);
     assert_eq!(training.result().unwrap().weights(), start);
     assert_ne!(training.model().weights(), start);
     assert_eq!(training.history().len(), 5);

@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use super::fused::{equations, network, segments};
-use super::{one_joint, parameter, rng, run, transitions};
+use super::{hybrid_of, one_joint, parameter, rng, run, transitions};
 use crate::model::{Angles, LastLayer, ResidualOn};
 use crate::sim::Integrator;
 use crate::train::stacked::StackedSweep;
@@ -71,9 +71,7 @@ fn a_model_of_a_sweep_is_trained_as_if_alone() {
             let segments = segments(joints, 37, steps);
             let network = |on| network(joints, Angles::SinCos, on, 7);
             let residual = network(ResidualOn::Derivative);
-            let hybrid = HybridModel::physics(&equations(joints), &backend.device())
-                .and_then(|model| model.with_residual(&residual))
-                .unwrap();
+            let hybrid = hybrid_of(&equations(joints), &residual, &backend.device());
             let prior = network(ResidualOn::Accelerations);
             let data_driven =
                 HybridModel::network("system", joints, &prior, &backend.device()).unwrap();
@@ -103,9 +101,7 @@ fn bounded(backend: Backend) -> (HybridModel, Segments) {
         vec![parameter("C_g", 8.0), c_i],
     );
     let residual = network(1, Angles::Raw, ResidualOn::Derivative, 7);
-    let model = HybridModel::physics(&dynamics, &backend.device())
-        .and_then(|model| model.with_residual(&residual))
-        .unwrap();
+    let model = hybrid_of(&dynamics, &residual, &backend.device());
     (model, transitions(50, -0.5, 1))
 }
 
@@ -178,9 +174,7 @@ fn equations_without_parameters_can_have_a_residual() {
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
     for &backend in Backend::ALL {
         let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
-        let model = HybridModel::physics(&dynamics, &backend.device())
-            .and_then(|model| model.with_residual(&residual))
-            .unwrap();
+        let model = hybrid_of(&dynamics, &residual, &backend.device());
         let variants = variants(&model, LastLayer::Zero);
         let together = sweep(&model, &settings(), &variants, &segments);
         for (variant, found) in variants.iter().zip(&together) {

@@ -16,14 +16,14 @@ pub struct Derivative {
 
 /// A model, or several of one structure, with its learnable numbers unpacked for the evaluations of one loss.
 #[derive(Debug)]
-pub struct Prepared<'m> {
+pub struct Unpacked<'m> {
     structure: &'m Structure,
     parameters: Vec<Tensor<1>>,
     prior: Option<Mlp<'m>>,
     residual: Option<Mlp<'m>>,
 }
 
-impl<'m> Prepared<'m> {
+impl<'m> Unpacked<'m> {
     /// Models of `structure` with the learnable numbers `[models, numbers]` of prior and residual, where they have any.
     /// Each evaluates `rows` rows, one model's after the other's; a single model takes any number where `rows` is 1.
     pub(in crate::train) fn new(
