@@ -130,7 +130,7 @@ impl Objective {
     ) -> Gradient {
         match batch {
             Batch::Columns(columns) => {
-                let tensors = model.tensors();
+                let tensors = model.tensors().map(Tensor::require_grad);
                 let loss = self.composed_loss(&model.unpack_tensors(&tensors), columns);
                 let weights = vector(&weights, &loss.device());
                 let mut gradients = (loss.clone() * weights).backward();

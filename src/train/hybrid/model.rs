@@ -252,7 +252,7 @@ impl HybridModel {
     /// The numbers as tensors of their own on the model's device.
     pub(in crate::train) fn tensors(&self) -> [Tensor<1>; 2] {
         let numbers = self.numbers.each_ref();
-        numbers.map(|numbers| vector_of_f32(numbers, &self.device).require_grad())
+        numbers.map(|numbers| vector_of_f32(numbers, &self.device))
     }
 
     /// Applies `step` to the learnable numbers, then brings physical parameters back within their bounds (projected gradient
