@@ -26,7 +26,7 @@ pub struct Checkpoint {
     /// The model to use.
     pub weights: ModelWeights,
     last: ModelWeights,
-    optimizer: [Option<Moments>; 2],
+    moments: [Moments; 2],
     dir: PathBuf,
 }
 
@@ -41,8 +41,8 @@ pub struct Checkpoint {
 pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
     let dir = &end_of_links(dir);
     refuse_other_contents(dir)?;
-    let moments = training.optimizer.moments();
-    let steps = [0, 1].map(|k| moments[k].as_ref().map_or(0, |moments| moments.steps));
+    let moments = &training.optimizer.moments;
+    let steps = moments.each_ref().map(|moments| moments.steps);
     let manifest = Manifest::of(training, &origin.config, origin.seed, steps);
     let last = training.model.weights();
     let used = training.best.as_ref().map_or(&last, |best| &best.weights);
@@ -51,7 +51,7 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     let files: [(&str, &[u8]); 5] = [
         (WEIGHTS, &weights::to_bytes(&manifest.shape, used)),
         (LAST, &weights::to_bytes(&manifest.shape, &last)),
-        (OPTIMIZER, &moments::to_bytes(&manifest, &moments)),
+        (OPTIMIZER, &moments::to_bytes(&manifest, moments)),
         (MODEL, origin.model_toml.as_bytes()),
         (MANIFEST, &json),
     ];
@@ -154,7 +154,7 @@ impl Checkpoint {
         let (weights, last) = (numbers(WEIGHTS)?, numbers(LAST)?);
         let bytes = read(&dir, OPTIMIZER)?;
         Ok(Self {
-            optimizer: moments::from_bytes(&manifest, &last, &bytes, OPTIMIZER, &dir)?,
+            moments: moments::from_bytes(&manifest, &last, &bytes, OPTIMIZER, &dir)?,
             weights,
             last,
             model_toml,
@@ -205,7 +205,7 @@ impl Checkpoint {
         let model = self.build(&self.last, dynamics, device)?;
         let manifest = &self.manifest;
         let mut training = Training::new(model, manifest.settings.clone(), manifest.rng.clone())?;
-        training.optimizer.resume(self.optimizer.clone(), device);
+        training.optimizer.moments = self.moments.clone();
         training.epoch = manifest.epoch;
         training.penalty_weight = manifest.penalty_weight;
         training.history.clone_from(&manifest.history);

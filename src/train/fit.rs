@@ -3,8 +3,9 @@ use std::ops::ControlFlow;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+use super::loss::Gradient;
 use super::optimizer::Optimizer;
-use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
+use super::{Batch, Batching, Best, FitSettings, Objective, Record, Segments, TrainError};
 use crate::train::HybridModel;
 
 /// A training run, which can be saved, loaded and continued. Interruptions do not change its
@@ -13,7 +14,7 @@ use crate::train::HybridModel;
 pub struct Training {
     pub(super) model: HybridModel,
     pub(super) settings: FitSettings,
-    pub(super) optimizer: Optimizer<1>,
+    pub(super) optimizer: Optimizer,
     pub(super) rng: ChaCha8Rng,
     pub(super) epoch: usize,
     pub(super) penalty_weight: f64,
@@ -127,7 +128,9 @@ impl Training {
             self.record(batches)?;
         }
         while self.epoch < self.settings.epochs {
-            self.optimizer.anneal(self.settings.share_in(self.epoch));
+            self.optimizer
+                .rates
+                .anneal(self.settings.share_in(self.epoch));
             let Epoch { loss, error } = self.run_epoch(batches)?;
             self.epoch += 1;
             self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);
@@ -200,29 +203,31 @@ impl Training {
 
     /// One step of the optimiser on one batch.
     fn step(&mut self, batch: &Batch) -> Result<Epoch, TrainError> {
-        let loss = self.objective.loss(&self.model, batch);
-        let weights = self.weights();
-        let (total, [error, _]) = self.total(&loss, weights)?;
-        let gradients = loss.weighted(weights).backward();
-        let stepped = self.optimizer.step(self.model.tensors(), gradients);
-        self.model = self.model.with_tensors(stepped).project();
-        Ok(Epoch { loss: total, error })
+        let Gradient { loss, by_numbers } =
+            self.objective.gradient(&self.model, batch, self.weights());
+        let total = self.total(loss)?;
+        let mut numbers = self.model.numbers();
+        self.optimizer.step(&mut numbers, &by_numbers);
+        self.model = self.model.with_numbers(numbers);
+        Ok(Epoch {
+            loss: total,
+            error: loss[0],
+        })
     }
 
     /// Evaluates the current model on all training segments and on validation.
     fn record(&mut self, batches: &Batches) -> Result<(), TrainError> {
         let model = self.model.without_gradients();
         let evaluate = |batch| self.objective.loss(&model, batch);
-        let (loss, [error, residual_norm]) =
-            self.total(&evaluate(&batches.evaluation), self.weights())?;
-        let validation =
-            batches
-                .validation
-                .as_ref()
-                .map(|batch| match evaluate(batch).numbers()[0] {
-                    error if error.is_finite() => error,
-                    _ => f64::INFINITY,
-                });
+        let parts = evaluate(&batches.evaluation);
+        let (loss, [error, residual_norm]) = (self.total(parts)?, parts);
+        let validation = batches
+            .validation
+            .as_ref()
+            .map(|batch| match evaluate(batch)[0] {
+                error if error.is_finite() => error,
+                _ => f64::INFINITY,
+            });
         let weights = self.model.weights();
         self.history.push(Record {
             epoch: self.epoch,
@@ -253,12 +258,12 @@ impl Training {
         penalty.weights(self.penalty_weight, self.model.structure().has_residual)
     }
 
-    /// What is minimised, and its parts before they are weighted.
-    fn total(&self, loss: &Loss, weights: [f64; 2]) -> Result<(f64, [f64; 2]), TrainError> {
-        let parts = loss.numbers();
-        let total = parts[0] * weights[0] + parts[1] * weights[1];
+    /// What is minimised.
+    fn total(&self, loss: [f64; 2]) -> Result<f64, TrainError> {
+        let weights = self.weights();
+        let total = loss[0] * weights[0] + loss[1] * weights[1];
         if total.is_finite() {
-            return Ok((total, parts));
+            return Ok(total);
         }
         let named = self.model.parameters().into_iter();
         let list: Vec<String> = named.map(|(name, v)| format!("{name} = {v:.6}")).collect();

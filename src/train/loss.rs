@@ -2,10 +2,11 @@ use std::sync::Arc;
 
 use burn::tensor::{Device, Tensor};
 
-use super::hybrid::vector;
+use super::composed;
+use super::fused::{Evaluation, Problem, Workers};
+use super::hybrid::{Numbers, to_f32, to_f64, vector};
 use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, Unpacked};
-use super::{composed, fused};
-use crate::model::to_f32;
+use crate::model;
 use crate::sim::Integrator;
 
 /// What a model is fitted to: the way its predictions are made, and the units of their errors.
@@ -17,7 +18,7 @@ pub struct Objective {
     /// 1 / scale.
     precision: Arc<[f32]>,
     implementation: Implementation,
-    workers: Arc<fused::Workers>,
+    workers: Arc<Workers>,
 }
 
 /// What evaluates losses.
@@ -38,17 +39,14 @@ pub enum Batch {
     Blocks(Arc<Blocks>),
 }
 
-/// The two parts of the loss, `[2]`.
-///
-/// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
-/// first state by the unrolled integrator.
-///
-/// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
-/// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean of
-/// the norms would treat rows one by one and pull small residuals to zero as hard as large ones, so that an effect in
-/// few rows would vanish first.
+/// A loss with its gradient.
 #[derive(Debug, Clone)]
-pub struct Loss(Tensor<1>);
+pub(super) struct Gradient {
+    /// E and ||F_r||.
+    pub loss: [f64; 2],
+    /// Of their weighted sum, by the learnable numbers.
+    pub by_numbers: Numbers,
+}
 
 impl Objective {
     /// Errors in the units of `error_scale`, one for each of `2n` states, or 1 for each.
@@ -70,7 +68,7 @@ impl Objective {
         let precision: Vec<f64> = scale.iter().map(|scale| 1.0 / scale).collect();
         Ok(Self {
             integrator,
-            precision: to_f32(&precision).into(),
+            precision: model::to_f32(&precision).into(),
             scale,
             implementation: Implementation::Fused,
             workers: Arc::default(),
@@ -103,24 +101,66 @@ impl Objective {
     }
 
     /// The threads of its losses.
-    pub(super) fn workers(&self) -> Arc<fused::Workers> {
+    pub(super) fn workers(&self) -> Arc<Workers> {
         self.workers.clone()
     }
 
-    /// The loss of a model on a batch, through the unrolled integrator.
-    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
-        Loss(match batch {
+    /// E and ||F_r|| of a model on a batch.
+    ///
+    /// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
+    /// first state by the unrolled integrator.
+    ///
+    /// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
+    /// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean
+    /// of the norms would treat rows one by one and pull small residuals to zero as hard as large ones, so that an effect
+    /// in few rows would vanish first.
+    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> [f64; 2] {
+        match batch {
+            Batch::Columns(columns) => numbers(self.composed_loss(model, columns)),
+            Batch::Blocks(blocks) => self.evaluation(model, blocks).loss.map(f64::from),
+        }
+    }
+
+    /// The loss, and the gradient of the sum of its parts times `weights`. The model must be on a device with gradients.
+    pub(super) fn gradient(
+        &self,
+        model: &HybridModel,
+        batch: &Batch,
+        weights: [f64; 2],
+    ) -> Gradient {
+        match batch {
             Batch::Columns(columns) => {
-                Tensor::cat(self.of_each(1, &model.unpack(), columns).to_vec(), 0)
+                let loss = self.composed_loss(model, columns);
+                let weights = vector(&weights, &loss.device());
+                let mut gradients = (loss.clone() * weights).backward();
+                let by_numbers = model.tensors().map(|tensor| {
+                    let gradient = tensor.and_then(|tensor| tensor.grad_remove(&mut gradients));
+                    gradient.map_or_else(Vec::new, to_f32)
+                });
+                Gradient {
+                    loss: numbers(loss),
+                    by_numbers,
+                }
             }
-            Batch::Blocks(blocks) => fused::loss(
-                model,
-                blocks,
-                self.integrator,
-                &self.precision,
-                &self.workers,
-            ),
-        })
+            Batch::Blocks(blocks) => {
+                let evaluation = self.evaluation(model, blocks);
+                Gradient {
+                    loss: evaluation.loss.map(f64::from),
+                    by_numbers: evaluation.derivative(weights),
+                }
+            }
+        }
+    }
+
+    fn evaluation(&self, model: &HybridModel, blocks: &Arc<Blocks>) -> Evaluation {
+        let structure = model.structure();
+        let problem = Problem::new(structure, blocks, self.integrator, &self.precision);
+        Evaluation::new(problem, &self.workers, &model.numbers())
+    }
+
+    /// E and ||F_r||, `[2]`.
+    fn composed_loss(&self, model: &HybridModel, columns: &Columns) -> Tensor<1> {
+        Tensor::cat(self.of_each(1, &model.unpack(), columns).to_vec(), 0)
     }
 
     /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
@@ -148,17 +188,7 @@ impl Clone for Objective {
     }
 }
 
-impl Loss {
-    /// E and ||F_r|| as numbers.
-    pub fn numbers(&self) -> [f64; 2] {
-        let data = self.0.to_data();
-        let mut numbers = data.iter::<f32>().map(f64::from);
-        [(); 2].map(|()| numbers.next().expect("a loss has two parts"))
-    }
-
-    /// The parts times their weights, `[2]`.
-    pub fn weighted(self, weights: [f64; 2]) -> Tensor<1> {
-        let weights = vector(&weights, &self.0.device());
-        self.0 * weights
-    }
+fn numbers(loss: Tensor<1>) -> [f64; 2] {
+    let parts = to_f64(loss).try_into();
+    parts.expect("a loss has two parts")
 }

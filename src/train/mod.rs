@@ -19,6 +19,7 @@ pub mod recipe;
 mod residual;
 mod segments;
 mod settings;
+mod stacked;
 mod sweep;
 
 #[cfg(test)]
@@ -34,7 +35,7 @@ pub use history::Record;
 pub use hybrid::{Derivative, HybridError, HybridModel, StepResult, Unpacked, replay};
 use hybrid::{Stack, Structure};
 pub use import::save_imported;
-pub use loss::{Batch, Loss, Objective};
+pub use loss::{Batch, Objective};
 pub use manifest::{FORMAT, Manifest};
 pub use penalty::Penalty;
 pub use residual::ResidualTrainer;

@@ -32,6 +32,17 @@ impl Penalty {
         }
     }
 
+    /// The same with another alpha or initial lambda.
+    pub(super) fn from(self, weight: f64) -> Self {
+        match self {
+            Self::Fixed { .. } => Self::Fixed { alpha: weight },
+            Self::Adaptive { rate, .. } => Self::Adaptive {
+                initial: weight,
+                rate,
+            },
+        }
+    }
+
     /// The weight for the next epoch.
     pub fn next(self, weight: f64, epoch_error: f64) -> f64 {
         match self {

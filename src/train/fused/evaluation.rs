@@ -7,6 +7,7 @@ use super::problem::{Problem, Weights};
 use crate::lanes::WorkerPool;
 use crate::train::Structure;
 use crate::train::composed::NORM_FLOOR;
+use crate::train::hybrid::Numbers;
 
 /// The threads that evaluate losses, and the idle buffers of earlier evaluations.
 #[derive(Debug, Default)]
@@ -36,7 +37,7 @@ struct Buffers {
 
 /// An evaluated loss, with everything its derivative needs.
 #[derive(Debug)]
-pub(super) struct Evaluation {
+pub(in crate::train) struct Evaluation {
     workers: Arc<Workers>,
     problem: Arc<Problem>,
     buffers: Arc<Buffers>,
@@ -96,25 +97,25 @@ impl Task {
 impl Evaluation {
     /// Evaluates the loss with these learnable numbers of the prior and of the residual.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn new(
-        problem: Arc<Problem>,
-        workers: Arc<Workers>,
-        prior: &[f32],
-        residual: &[f32],
+    pub(in crate::train) fn new(
+        problem: Problem,
+        workers: &Arc<Workers>,
+        numbers: &Numbers,
     ) -> Self {
+        let problem = Arc::new(problem);
         let buffers = workers.take(&problem.structure, problem.parts().count());
         let mut weights = buffers
             .weights
             .write()
             .unwrap_or_else(PoisonError::into_inner);
-        weights.set(&problem.structure, prior, residual);
+        weights.set(&problem.structure, numbers);
         for (part, blocks) in buffers.parts.iter().zip(problem.parts()) {
             lock(part).begin(blocks, &problem, &weights);
         }
         drop(weights);
         let mut evaluation = Self {
             loss: [0.0; 2],
-            workers,
+            workers: workers.clone(),
             problem,
             buffers,
         };
@@ -134,13 +135,13 @@ impl Evaluation {
     /// From the derivatives of a quantity by the two parts of the loss to those by the learnable numbers of the prior and
     /// of the residual.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn derivative(&self, by_loss: [f32; 2]) -> [Vec<f32>; 2] {
-        let (problem, loss) = (&self.problem, self.loss);
+    pub(in crate::train) fn derivative(&self, by_loss: [f64; 2]) -> Numbers {
+        let (problem, norm) = (&self.problem, self.loss[1]);
         let by_mean = match problem.structure.has_residual {
-            true => f64::from(by_loss[1]) / (2.0 * f64::from(loss[1])),
+            true => by_loss[1] / (2.0 * f64::from(norm)),
             false => 0.0,
         };
-        let seeds = [f64::from(by_loss[0]), by_mean].map(|by| (by / problem.count()) as f32);
+        let seeds = [by_loss[0], by_mean].map(|by| (by / problem.count()) as f32);
         self.run(Pass::Reverse(seeds));
         summed(&problem.structure, &self.buffers.parts)
     }
@@ -167,7 +168,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// The derivatives by the learnable numbers of the prior and of the residual, summed over the parts.
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
-fn summed(structure: &Structure, parts: &[Mutex<Part>]) -> [Vec<f32>; 2] {
+fn summed(structure: &Structure, parts: &[Mutex<Part>]) -> Numbers {
     let (first, others) = parts.split_first().expect("there is a part");
     let first = &mut *lock(first);
     for other in others {
@@ -197,7 +198,7 @@ fn summed(structure: &Structure, parts: &[Mutex<Part>]) -> [Vec<f32>; 2] {
 mod tests {
     use std::sync::Arc;
 
-    use super::{Evaluation, Workers};
+    use super::Evaluation;
     use crate::model::LastLayer;
     use crate::sim::Integrator;
     use crate::train::Backend;
@@ -209,24 +210,14 @@ mod tests {
         let segments = transitions(1000, -0.5, 1);
         let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Random);
         let blocks = Arc::new(segments.blocks(&(0..segments.len()).collect::<Vec<_>>()));
-        let numbers = model.tensors().map(|numbers| {
-            let data = numbers.unwrap().into_data();
-            data.iter().collect::<Vec<f32>>()
-        });
         let derivative = |record_limit| {
+            let precision = [1.0; 2].into();
+            let problem = Problem::new(model.structure(), &blocks, Integrator::RK4, &precision);
             let problem = Problem {
-                structure: model.structure().clone(),
-                blocks: blocks.clone(),
-                integrator: Integrator::RK4,
-                precision: [1.0; 2].into(),
                 record_limit,
+                ..problem
             };
-            let evaluation = Evaluation::new(
-                Arc::new(problem),
-                Arc::new(Workers::default()),
-                &numbers[0],
-                &numbers[1],
-            );
+            let evaluation = Evaluation::new(problem, &Arc::default(), &model.numbers());
             (evaluation.loss, evaluation.derivative([1.0, 0.3]))
         };
         assert_eq!(derivative(0), derivative(RECORD_LIMIT));

@@ -1,10 +1,9 @@
 //! The loss and its derivative in one operation: rollout, networks and penalty together, many rows at a time, on all
-//! cores. The composed operations of [`composed`](super::composed) are its reference, and what other devices use.
+//! cores. The composed operations of [`composed`](super::composed) are its reference, and used on other devices.
 
 mod blocks;
 mod evaluation;
 mod forward;
-mod operation;
 mod part;
 mod problem;
 mod programs;
@@ -15,5 +14,5 @@ mod rows;
 mod workspace;
 
 pub use blocks::Blocks;
-pub(super) use evaluation::Workers;
-pub(super) use operation::loss;
+pub(super) use evaluation::{Evaluation, Workers};
+pub(super) use problem::Problem;

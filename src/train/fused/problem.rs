@@ -5,6 +5,7 @@ use super::Blocks;
 use crate::sim::Integrator;
 use crate::sim::batch::{Network, Rows};
 use crate::train::Structure;
+use crate::train::hybrid::Numbers;
 
 /// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
 /// enough that their intermediate values stay in the processor's cache.
@@ -15,7 +16,7 @@ pub(super) const RECORD_LIMIT: usize = (1 << 30) / size_of::<Rows>();
 
 /// A loss but for the learnable numbers: model, data, integrator and units of the errors.
 #[derive(Debug)]
-pub(super) struct Problem {
+pub(in crate::train) struct Problem {
     pub structure: Arc<Structure>,
     pub blocks: Arc<Blocks>,
     pub integrator: Integrator,
@@ -34,6 +35,22 @@ pub(super) struct Weights {
 }
 
 impl Problem {
+    /// `precision` is 1 / scale of each state's error.
+    pub(in crate::train) fn new(
+        structure: &Arc<Structure>,
+        blocks: &Arc<Blocks>,
+        integrator: Integrator,
+        precision: &Arc<[f32]>,
+    ) -> Self {
+        Self {
+            structure: structure.clone(),
+            blocks: blocks.clone(),
+            integrator,
+            precision: precision.clone(),
+            record_limit: RECORD_LIMIT,
+        }
+    }
+
     /// Derivatives of the dynamics that a segment's rollout takes.
     pub(super) fn stages(&self) -> usize {
         self.blocks.steps * self.integrator.substeps() * self.integrator.scheme().stages.len()
@@ -85,7 +102,7 @@ impl Weights {
 
     /// Sets the learnable numbers of the prior and of the residual.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn set(&mut self, structure: &Structure, prior: &[f32], residual: &[f32]) {
+    pub(super) fn set(&mut self, structure: &Structure, [prior, residual]: &Numbers) {
         let parameters = structure.parameters().iter().zip(prior);
         for (to, (parameter, scaled)) in self.parameters.iter_mut().zip(parameters) {
             *to = match parameter.fixed {
@@ -94,8 +111,8 @@ impl Weights {
             };
         }
         let flat = match structure.equations {
-            None => [prior, residual],
-            Some(_) => [residual, &[]],
+            None => [prior.as_slice(), residual],
+            Some(_) => [residual.as_slice(), &[]],
         };
         for (network, flat) in self.networks.iter_mut().zip(flat) {
             network.set_numbers(flat);

@@ -1,7 +1,7 @@
 //! The physical parameters of declared equations as one tensor, each divided by its scale: an optimiser's step is then
 //! relative to each parameter's own magnitude. The entries of fixed parameters are never read.
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 
 use super::HybridError;
 use super::tensor::{to_f64, vector};
@@ -60,23 +60,13 @@ pub(super) fn columns(parameters: &[Parameter], scaled: Tensor<2>, rows: usize) 
         .collect()
 }
 
-/// The values brought back within their bounds; none where they are there already.
+/// Brings values / scale back within their bounds. What is not a number stays so.
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
-pub(super) fn projected(parameters: &[Parameter], scaled: &Tensor<1>) -> Option<Tensor<1>> {
-    let bounded = |p: &Parameter| p.bounds.iter().any(|bound| bound.is_finite());
-    if !parameters.iter().any(bounded) {
-        return None;
-    }
-    let mut values: Vec<f32> = scaled.to_data().iter().collect();
-    let mut moved = false;
-    for (value, p) in values.iter_mut().zip(parameters) {
+pub(super) fn project(parameters: &[Parameter], scaled: &mut [f32]) {
+    for (value, p) in scaled.iter_mut().zip(parameters) {
         let [lowest, highest] = p.bounds.map(|bound| (bound / p.scale) as f32);
-        let inside = value.clamp(lowest, highest);
-        moved |= inside != *value;
-        *value = inside;
+        *value = value.clamp(lowest, highest);
     }
-    let shape = [values.len()];
-    moved.then(|| Tensor::from_data(TensorData::new(values, shape), &scaled.device()))
 }
 
 fn each(parameters: &[Parameter], value: impl Fn(&Parameter) -> f64, device: &Device) -> Tensor<1> {

@@ -13,9 +13,10 @@ mod unpacked;
 
 pub use error::HybridError;
 pub use model::HybridModel;
+pub(super) use model::Numbers;
 pub use replay::replay;
 pub(super) use stack::Stack;
 pub use step::StepResult;
 pub(crate) use structure::Structure;
-pub(super) use tensor::{to_f64, vector};
+pub(super) use tensor::{to_f32, to_f64, vector};
 pub use unpacked::{Derivative, Unpacked};

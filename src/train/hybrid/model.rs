@@ -1,8 +1,8 @@
 use std::sync::Arc;
 
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
 
-use super::tensor::{rows_of, to_f64, vector};
+use super::tensor::{rows_of, to_f32, to_f64, vector};
 use super::{HybridError, Structure, Unpacked, equations};
 use crate::control::Predictor;
 use crate::model::{
@@ -10,13 +10,15 @@ use crate::model::{
 };
 use crate::sim::Integrator;
 
+/// Learnable numbers of the prior and of the residual.
+pub(in crate::train) type Numbers = [Vec<f32>; 2];
+
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
 /// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
 #[derive(Debug, Clone)]
 pub struct HybridModel {
-    // One tensor for each part: the cost of an optimiser's step grows with the number of tensors.
     /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`].
     prior: Tensor<1>,
     /// The residual network's numbers.
@@ -215,20 +217,6 @@ impl HybridModel {
         Unpacked::new(&self.structure, 1, self.tensors().map(each))
     }
 
-    /// Brings every physical parameter back within its bounds, after each optimiser step (projected gradient descent): a
-    /// parameter may rest on a bound and leave it again.
-    #[must_use]
-    pub fn project(self) -> Self {
-        let prior = self.prior.clone().inner();
-        match equations::projected(self.structure.parameters(), &prior) {
-            Some(inside) => Self {
-                prior: Tensor::from_inner(inside).require_grad(),
-                ..self
-            },
-            None => self,
-        }
-    }
-
     /// The device that the model was made on.
     pub fn device(&self) -> Device {
         self.prior.device()
@@ -254,12 +242,24 @@ impl HybridModel {
         [Some(self.prior.clone()), self.residual.clone()]
     }
 
-    /// The same model with these learnable numbers, where some are given.
-    pub(in crate::train) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
-        let [prior, residual] = tensors;
+    /// The learnable numbers of the prior and of the residual; none where there is no residual.
+    pub(in crate::train) fn numbers(&self) -> Numbers {
+        self.tensors()
+            .map(|tensor| tensor.map_or_else(Vec::new, to_f32))
+    }
+
+    /// The same model with these learnable numbers, physical parameters brought back within their bounds (projected
+    /// gradient descent): a parameter may rest on a bound and leave it again.
+    pub(in crate::train) fn with_numbers(&self, [mut prior, residual]: Numbers) -> Self {
+        equations::project(self.structure.parameters(), &mut prior);
+        let device = self.device();
+        let tensor = |numbers: Vec<f32>| {
+            let shape = [numbers.len()];
+            Tensor::from_data(TensorData::new(numbers, shape), &device).require_grad()
+        };
         Self {
-            prior: prior.unwrap_or_else(|| self.prior.clone()),
-            residual: residual.or_else(|| self.residual.clone()),
+            prior: tensor(prior),
+            residual: (self.residual.is_some()).then(|| tensor(residual)),
             structure: self.structure.clone(),
         }
     }

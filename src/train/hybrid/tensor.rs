@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 
-use crate::model::to_f32;
+use crate::model;
 
 pub(in crate::train) fn vector(values: &[f64], device: &Device) -> Tensor<1> {
     tensor(values, [values.len()], device)
@@ -14,12 +14,18 @@ pub(super) fn tensor<const D: usize>(
     shape: [usize; D],
     device: &Device,
 ) -> Tensor<D> {
-    Tensor::from_data(TensorData::new(to_f32(values), shape), device)
+    Tensor::from_data(TensorData::new(model::to_f32(values), shape), device)
 }
 
 /// The entries of a tensor, row after row.
+pub(in crate::train) fn to_f32<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    let data = tensor.into_data();
+    data.try_into_vec().expect("training runs in f32")
+}
+
+/// The same in f64.
 pub(in crate::train) fn to_f64<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
-    tensor.into_data().iter::<f32>().map(f64::from).collect()
+    to_f32(tensor).into_iter().map(f64::from).collect()
 }
 
 /// A vector as so many equal rows of a matrix; none of an empty vector, since Burn has no empty matrices.

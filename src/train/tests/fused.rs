@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use burn::tensor::{Device, Gradients};
+use burn::tensor::Device;
 use rand::RngExt;
 
 use super::{fit, hybrid, hybrid_of, one_joint, parameter, rng, transitions};
 use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
-use crate::train::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Sweep, Variant};
+use crate::train::loss::Gradient;
+use crate::train::stacked::StackedSweep;
+use crate::train::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Variant};
 
 /// Segments of `steps` irregular steps that lead through random states.
 pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
@@ -66,35 +68,18 @@ fn models(joints: usize, device: &Device) -> Vec<HybridModel> {
     models
 }
 
-/// The parts of the loss, and the gradients of all that is learnable, one after the other.
-fn value_and_gradients(
-    model: &HybridModel,
-    batch: &Batch,
-    objective: &Objective,
-) -> ([f64; 2], [Option<Vec<f64>>; 2]) {
-    let loss = objective.loss(model, batch);
-    let numbers = loss.numbers();
-    let weights = [
-        0.7,
-        if model.structure().has_residual {
-            1.3
-        } else {
-            0.0
-        },
-    ];
-    let gradients = loss.weighted(weights).backward();
-    (numbers, gradients_of(model, &gradients))
+/// The loss and its gradient with weights of a training.
+fn gradient(model: &HybridModel, batch: &Batch, objective: &Objective) -> Gradient {
+    let of_norm = if model.structure().has_residual {
+        1.3
+    } else {
+        0.0
+    };
+    objective.gradient(model, batch, [0.7, of_norm])
 }
 
-fn gradients_of(model: &HybridModel, gradients: &Gradients) -> [Option<Vec<f64>>; 2] {
-    model.tensors().map(|numbers| {
-        let gradient = numbers?.grad(gradients)?.into_data();
-        Some(gradient.iter::<f32>().map(f64::from).collect())
-    })
-}
-
-fn norm(numbers: impl Iterator<Item = f64>) -> f64 {
-    numbers.map(|x| x * x).sum::<f64>().sqrt()
+fn norm(numbers: impl Iterator<Item = f32>) -> f64 {
+    numbers.map(|x| f64::from(x).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Sums of f32 in another order: some 1e-7 for each of the few hundred operations on the way.
@@ -103,19 +88,15 @@ fn assert_agrees(model: &HybridModel, segments: &Segments, integrator: Integrato
     let objective = Objective::new(integrator, Some(&scale), model.joints()).unwrap();
     let fused = objective.all(segments, &model.device());
     assert!(matches!(fused, Batch::Blocks(_)));
-    let (value, gradients) = value_and_gradients(model, &fused, &objective);
+    let found = gradient(model, &fused, &objective);
     let objective = objective.composed();
     let composed = objective.all(segments, &model.device());
     assert!(matches!(composed, Batch::Columns(_)));
-    let (wanted, wanted_gradients) = value_and_gradients(model, &composed, &objective);
-    for (value, wanted) in value.iter().zip(wanted) {
-        assert!((value - wanted).abs() <= 1e-5 * wanted, "{value} {wanted}");
+    let wanted = gradient(model, &composed, &objective);
+    for (found, wanted) in found.loss.iter().zip(wanted.loss) {
+        assert!((found - wanted).abs() <= 1e-5 * wanted, "{found} {wanted}");
     }
-    for (found, wanted) in gradients.iter().zip(&wanted_gradients) {
-        assert_eq!(found.is_some(), wanted.is_some());
-        let (Some(found), Some(wanted)) = (found, wanted) else {
-            continue;
-        };
+    for (found, wanted) in found.by_numbers.iter().zip(&wanted.by_numbers) {
         assert_eq!(found.len(), wanted.len());
         let off = norm(found.iter().zip(wanted).map(|(a, b)| a - b));
         let size = norm(wanted.iter().copied());
@@ -167,35 +148,6 @@ fn equations_without_parameters_can_have_a_residual() {
 }
 
 #[test]
-fn freezing_one_part_does_not_change_the_gradient_of_the_other() {
-    let segments = segments(1, 40, 2);
-    let device = Backend::NdArray.device();
-    let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
-    let batch = objective.all(&segments, &device);
-    let gradients = |model: &HybridModel| {
-        let loss = objective.loss(model, &batch).weighted([1.0, 1.0]);
-        gradients_of(model, &loss.backward())
-    };
-    let models = models(1, &device).into_iter();
-    for model in models.filter(|model| model.structure().has_residual) {
-        let both = gradients(&model);
-        assert!(both.iter().all(Option::is_some));
-        for frozen in 0..2 {
-            let mut tensors = model.tensors();
-            tensors[frozen] = tensors[frozen].take().map(|t| t.set_require_grad(false));
-            let some = gradients(&model.with_tensors(tensors));
-            assert_eq!(some[frozen], None);
-            assert_eq!(some[1 - frozen], both[1 - frozen]);
-        }
-        let value = objective.loss(&model, &batch).numbers();
-        assert_eq!(
-            objective.loss(&model.without_gradients(), &batch).numbers(),
-            value
-        );
-    }
-}
-
-#[test]
 fn a_diverging_rollout_makes_the_loss_infinite_or_nan() {
     let segments = segments(1, 40, 3);
     let dynamics = one_joint("C * exp(1000 * q1 * q1)", vec![parameter("C", 3.0)]);
@@ -204,7 +156,7 @@ fn a_diverging_rollout_makes_the_loss_infinite_or_nan() {
     let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
     let batch = objective.all(&segments, &model.device());
     for model in [model.clone(), model.with_residual(&residual).unwrap()] {
-        let [error, _] = objective.loss(&model, &batch).numbers();
+        let [error, _] = objective.loss(&model, &batch);
         assert!(!error.is_finite(), "{error}");
     }
 }
@@ -240,7 +192,7 @@ fn fused_and_composed_runs_reach_the_same_error() {
         order: rng(3),
     };
     // A sweep composes its loss of Burn's operations.
-    let mut sweep = Sweep::new(&model, settings.clone(), vec![variant]).unwrap();
+    let mut sweep = StackedSweep::new(&model, settings.clone(), vec![variant]).unwrap();
     let composed = sweep.run(&segments, &mut |_| ()).unwrap().remove(0);
     let training = fit(model, &segments, settings);
     let fused = training.history().last().unwrap();

@@ -6,9 +6,9 @@ use super::fused::{equations, network, segments};
 use super::{hybrid_of, one_joint, parameter, rng, run, transitions};
 use crate::model::{Angles, LastLayer, ResidualOn};
 use crate::sim::Integrator;
+use crate::train::stacked::StackedSweep;
 use crate::train::{
-    Backend, Batching, FitSettings, HybridModel, Penalty, Segments, Sweep, Trained, Training,
-    Variant,
+    Backend, Batching, FitSettings, HybridModel, Penalty, Segments, Sweep, Trained, Variant,
 };
 
 fn settings() -> FitSettings {
@@ -35,45 +35,17 @@ fn sweep(
     variants: &[Variant],
     on: &Segments,
 ) -> Vec<Trained> {
-    let mut sweep = Sweep::new(model, settings.clone(), variants.to_vec()).unwrap();
+    let mut sweep = StackedSweep::new(model, settings.clone(), variants.to_vec()).unwrap();
     sweep.run(on, &mut |_| ()).unwrap()
-}
-
-/// `model` with the variant's network.
-fn begun(model: &HybridModel, variant: &Variant) -> HybridModel {
-    let mut weights = model.weights();
-    match &mut weights.residual {
-        Some(residual) => *residual = variant.network.clone(),
-        None => weights.prior = Some(variant.network.clone()),
-    }
-    model.with_weights(&weights).unwrap()
 }
 
 /// The variant trained alone by the composed loss, as the sweep's.
 fn alone(model: &HybridModel, settings: &FitSettings, variant: &Variant, on: &Segments) -> Trained {
-    let order = variant.order.clone();
-    let settings = FitSettings {
-        penalty: match settings.penalty {
-            Penalty::Fixed { .. } => Penalty::Fixed {
-                alpha: variant.penalty_weight,
-            },
-            Penalty::Adaptive { rate, .. } => Penalty::Adaptive {
-                initial: variant.penalty_weight,
-                rate,
-            },
-        },
-        ..settings.clone()
-    };
-    let mut training = Training::new(begun(model, variant), settings, order).unwrap();
+    let sweep = Sweep::new(model, settings.clone(), vec![variant.clone()]).unwrap();
+    let mut training = sweep.training(variant).unwrap();
     training.objective = training.objective.composed();
     run(&mut training, on);
-    let last = training.history().last().unwrap();
-    Trained {
-        error: last.error,
-        residual_norm: last.residual_norm,
-        parameters: last.parameters.clone(),
-        diverged: false,
-    }
+    Trained::of(&training)
 }
 
 /// Products in another order leave some 1e-7 after one step, which thirty steps of Adam carry on.
@@ -191,7 +163,7 @@ fn a_diverging_model_does_not_change_the_others() {
 fn segments_of_other_joints_are_refused() {
     let (model, _) = bounded(Backend::NdArray);
     let variants = variants(&model, LastLayer::Zero);
-    let mut sweep = Sweep::new(&model, settings(), variants).unwrap();
+    let sweep = Sweep::new(&model, settings(), variants).unwrap();
     let message = sweep.run(&segments(2, 5, 1), &mut |_| ()).unwrap_err();
     assert!(message.to_string().contains("2 joints"), "{message}");
 }
