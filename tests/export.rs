@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use residyn::control::{Meter, Task};
+use residyn::control::Task;
 use residyn::formats::{
     Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
 };
@@ -152,10 +152,10 @@ fn gymnasium_takes_the_environment_of_a_module() {
         };
         let (folder, path) = written(find("python").unwrap(), name, &model);
         let samples = model.samples(&mut rng(1)).unwrap();
-        let meter = Meter::of(&task.objective());
+        let objective = task.objective();
         let points = samples.states.iter().zip(&samples.torques);
         let rewards: Vec<f64> = points
-            .map(|(state, tau)| meter.read(state, tau, 0.0))
+            .map(|(state, tau)| objective.value(state, tau, 0.0))
             .collect();
         let expected =
             json!({"states": samples.states, "torques": samples.torques, "rewards": rewards});

@@ -1,7 +1,8 @@
 use rand::Rng;
 
-use super::{Meter, Policy, Task};
+use super::{Policy, Task};
 use crate::data::Log;
+use crate::plan::Objective;
 use crate::plant::{PlantError, Rig};
 
 /// A stretch of steps of a rig under a policy.
@@ -60,11 +61,10 @@ pub fn episode(
     rng: &mut impl Rng,
 ) -> Result<Episode, PlantError> {
     let stretch = drive(rig, policy, task.steps, rng)?;
-    let read = |meter: &Meter| stretch.read(meter);
-    let rewards = read(&Meter::of(&task.objective()));
+    let rewards = stretch.values(&task.objective());
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
     let held = (task.goal.hold_s / task.step_s).round() as usize;
-    let goal = read(&task.goal_meter());
+    let goal = stretch.values(&task.goal_formula());
     let last = &goal[goal.len().saturating_sub(held)..];
     Ok(Episode {
         success: last.iter().all(|value| *value >= task.goal.at_least),
@@ -91,11 +91,11 @@ impl Stretch {
     }
 
     /// The values of a formula after each step.
-    fn read(&self, meter: &Meter) -> Vec<f64> {
+    fn values(&self, formula: &Objective) -> Vec<f64> {
         let steps = self.states.iter().enumerate().skip(1);
         let after = |(row, state): (usize, &Vec<f64>)| {
             let held: Vec<f64> = self.log.tau.iter().map(|tau| tau[row - 1]).collect();
-            meter.read(state, &held, self.log.time[row])
+            formula.value(state, &held, self.log.time[row])
         };
         steps.map(after).collect()
     }

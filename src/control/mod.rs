@@ -2,14 +2,12 @@
 
 mod controller;
 mod episode;
-mod meter;
 mod predictor;
 mod session;
 mod task;
 
 pub use controller::{Controller, Policy, RandomTorque};
 pub use episode::{Episode, Stretch, drive, episode};
-pub use meter::Meter;
 pub use predictor::Predictor;
 pub use session::with_controller;
 pub use task::{Goal, PlantSettings, Task, TaskError};

@@ -5,7 +5,6 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Meter;
 use crate::files::text_or_embedded;
 use crate::model::Dynamics;
 use crate::plan::{Objective, Settings};
@@ -146,8 +145,8 @@ impl Task {
     }
 
     /// The formula of the goal.
-    pub fn goal_meter(&self) -> Meter {
-        Meter::new(&self.goal.formula, self.joints()).expect("checked when it was read")
+    pub fn goal_formula(&self) -> Objective {
+        Objective::new(&self.goal.formula, self.joints()).expect("checked when it was read")
     }
 
     /// Draw a true start state.

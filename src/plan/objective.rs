@@ -1,14 +1,14 @@
 use crate::expr::{FormulaError, Graph, Program, Scope, SignForm, parse};
 
-/// The reward, summed over the steps of a rollout and maximised: a formula of the state at the end of a step (`q1`,
-/// `qd1`, ...), the torque held over it (`tau1`, ...) and time (`t`).
+/// A formula of the state at the end of a step (`q1`, `qd1`, ...), the torque held over it (`tau1`, ...) and time (`t`):
+/// the reward of a step, which planners sum over a rollout and maximise, or another quantity of a task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Objective {
     program: Program,
 }
 
 impl Objective {
-    /// The objective of `joints` joints that this formula gives, e.g. `cos(q1) - 0.01 * tau1^2`.
+    /// The formula in terms of `joints` joints, e.g. `cos(q1) - 0.01 * tau1^2`.
     ///
     /// # Errors
     /// A syntax error, or an unknown name.
@@ -26,6 +26,14 @@ impl Objective {
         Ok(Self {
             program: graph.finish(&[reward]),
         })
+    }
+
+    /// The value at `state` (positions, then velocities) after `tau` was held, at `time_s`.
+    ///
+    /// # Panics
+    /// When `state` or `tau` has another number of joints.
+    pub fn value(&self, state: &[f64], tau: &[f64], time_s: f64) -> f64 {
+        self.program.eval(&[state, tau, &[time_s]].concat())[0]
     }
 
     /// Inputs: `q`, `qd` and `tau` of every joint, then `t`. One output.

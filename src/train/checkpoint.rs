@@ -211,7 +211,7 @@ impl Checkpoint {
         training.history.clone_from(&manifest.history);
         training.best = manifest.best.as_ref().map(|best| Best {
             epoch: best.epoch,
-            validation: best.validation.unwrap_or(f64::INFINITY),
+            validation: best.validation,
             weights: self.weights.clone(),
         });
         Ok(training)

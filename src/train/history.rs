@@ -1,4 +1,4 @@
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::model::ModelWeights;
 
@@ -18,7 +18,7 @@ pub struct Record {
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
-        with = "null_if_infinite"
+        deserialize_with = "infinite_if_null"
     )]
     pub validation: Option<f64>,
     /// alpha, or the current lambda.
@@ -35,17 +35,10 @@ pub(super) struct Best {
     pub weights: ModelWeights,
 }
 
-/// JSON has no infinity.
-pub(super) mod null_if_infinite {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    #[allow(clippy::ref_option)] // the signature is serde's
-    pub fn serialize<S: Serializer>(value: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
-        value.filter(|value| value.is_finite()).serialize(to)
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
-        let value = Option::<f64>::deserialize(from)?;
-        Ok(Some(value.unwrap_or(f64::INFINITY)))
-    }
+/// JSON has no infinity, which is written as null.
+pub(super) fn infinite_if_null<'de, D: Deserializer<'de>, T: From<f64>>(
+    from: D,
+) -> Result<T, D::Error> {
+    let value = Option::<f64>::deserialize(from)?;
+    Ok(value.unwrap_or(f64::INFINITY).into())
 }

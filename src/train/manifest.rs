@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::history::null_if_infinite;
+use super::history::infinite_if_null;
 use super::{FitSettings, Record, Training};
 use crate::model::ModelShape;
 
@@ -34,8 +34,8 @@ pub struct Manifest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedBest {
     pub epoch: usize,
-    #[serde(with = "null_if_infinite")]
-    pub validation: Option<f64>,
+    #[serde(deserialize_with = "infinite_if_null")]
+    pub validation: f64,
 }
 
 impl Manifest {
@@ -64,7 +64,7 @@ impl Manifest {
             optimizer_steps,
             best: training.best.as_ref().map(|best| SavedBest {
                 epoch: best.epoch,
-                validation: Some(best.validation),
+                validation: best.validation,
             }),
             history: training.history.clone(),
         }

@@ -61,15 +61,20 @@ impl Penalty {
     }
 
     pub(super) fn check(self) -> Result<(), TrainError> {
-        let numbers = match self {
-            Self::Fixed { alpha } => vec![("alpha", alpha)],
-            Self::Adaptive { initial, rate } => vec![("initial", initial), ("rate", rate)],
-        };
-        for (name, value) in numbers {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(TrainError::Setting { name, value });
+        match self {
+            Self::Fixed { alpha } => not_negative(&[("alpha", alpha)]),
+            Self::Adaptive { initial, rate } => {
+                not_negative(&[("initial", initial), ("rate", rate)])
             }
         }
-        Ok(())
+    }
+}
+
+/// Refuses settings that are negative or not finite.
+pub(super) fn not_negative(settings: &[(&'static str, f64)]) -> Result<(), TrainError> {
+    let wrong = |(_, value): &&(&str, f64)| !(value.is_finite() && *value >= 0.0);
+    match settings.iter().find(wrong) {
+        Some(&(name, value)) => Err(TrainError::Setting { name, value }),
+        None => Ok(()),
     }
 }

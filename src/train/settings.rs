@@ -2,6 +2,7 @@ use std::num::NonZeroUsize;
 
 use serde::{Deserialize, Serialize};
 
+use super::penalty::not_negative;
 use super::{Penalty, TrainError};
 use crate::sim::Integrator;
 
@@ -82,17 +83,12 @@ impl FitSettings {
             prior,
             residual,
         } = self.learning_rates;
-        let rates = [
+        not_negative(&[
             ("learning_rates.physics", physics),
             ("learning_rates.prior", prior),
             ("learning_rates.residual", residual),
             ("weight_decay", self.weight_decay),
-        ];
-        for (name, value) in rates {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(TrainError::Setting { name, value });
-            }
-        }
+        ])?;
         if !(self.anneal > 0.0 && self.anneal <= 1.0) {
             return Err(TrainError::Anneal(self.anneal));
         }

@@ -6,9 +6,10 @@ mod strips;
 use self::animation::{Animation, Chain, animation};
 use self::strips::{Strip, StripLine};
 use super::plot::{PlotError, Quantity};
-use crate::control::{Episode, Meter, Task};
+use crate::control::{Episode, Task};
 use crate::data::Joint;
 use crate::expr::FormulaError;
+use crate::plan::Objective;
 
 /// An episode to watch, as SVG text; none for a task without a figure.
 ///
@@ -58,18 +59,18 @@ pub fn film(task: &Task, episode: &Episode, title: &str) -> Result<Option<String
 }
 
 fn chain(task: &Task, points: &[[String; 2]], episode: &Episode) -> Chain {
-    let meter = |formula: &String| Meter::new(formula, task.joints());
-    let meters: Result<Vec<[Meter; 2]>, FormulaError> = (points.iter())
-        .map(|[x, y]| Ok([meter(x)?, meter(y)?]))
+    let formula = |text: &String| Objective::new(text, task.joints());
+    let formulas: Result<Vec<[Objective; 2]>, FormulaError> = (points.iter())
+        .map(|[x, y]| Ok([formula(x)?, formula(y)?]))
         .collect();
-    let meters = meters.expect("formulas are checked when a task is read");
+    let formulas = formulas.expect("formulas are checked when a task is read");
     let idle = vec![0.0; task.joints()];
     let rows = episode.stretch.states.iter().zip(&episode.stretch.log.time);
     let frame = |(state, time): (&Vec<f64>, &f64)| {
-        let read = |meter: &Meter| meter.read(state, &idle, *time);
-        meters
+        let value = |formula: &Objective| formula.value(state, &idle, *time);
+        formulas
             .iter()
-            .map(|point| point.each_ref().map(read))
+            .map(|point| point.each_ref().map(value))
             .collect()
     };
     Chain {
