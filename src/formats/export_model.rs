@@ -4,6 +4,7 @@ use rand::Rng;
 use serde::Serialize;
 use serde_json::json;
 
+use super::ExportError;
 use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use crate::data::Joint;
 use crate::expr::Op;
@@ -94,6 +95,15 @@ impl ExportModel {
     pub fn declared(&self) -> Dynamics {
         let declared = self.system.with_effects(Vec::new()).dynamics();
         declared.with_values(self.equations.values())
+    }
+
+    /// Why this model cannot be written in a format.
+    pub(super) fn refused(&self, format: &'static str, reason: String) -> ExportError {
+        ExportError::Model {
+            format,
+            system: self.name().to_owned(),
+            reason,
+        }
     }
 
     /// Name of the system.

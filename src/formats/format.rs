@@ -64,6 +64,16 @@ pub enum ExportError {
     Hybrid(#[from] NetworkError),
 }
 
+impl File {
+    pub(super) fn new(path: &Path, bytes: impl Into<Vec<u8>>, about: impl Into<String>) -> Self {
+        Self {
+            path: path.to_owned(),
+            bytes: bytes.into(),
+            about: about.into(),
+        }
+    }
+}
+
 impl Format {
     /// Write the model. All files are made in memory first; then each appears whole or not at all.
     ///

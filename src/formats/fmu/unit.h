@@ -18,10 +18,6 @@
 #define EXPORT
 #endif
 
-/* Where the code of several FMUs is linked together, names begin with that of the model. */
-#define JOIN_(a, b) a##b
-#define JOIN(a, b) JOIN_(a, b)
-
 /* Torques that follow their command with a lag. */
 #define LAGS @LAGS@
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use roxmltree::Node;
 
 use super::element::{Classes, Element};
-use crate::formats::robot::xml::{Source, elements, named};
+use crate::formats::xml::{Source, elements, named};
 use crate::model::FileError;
 
 /// The effort limit (N m or N) of each joint whose drive has one.

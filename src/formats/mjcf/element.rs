@@ -6,7 +6,7 @@ use std::fmt;
 use nalgebra::Vector3;
 use roxmltree::Node;
 
-use crate::formats::robot::xml::{Source, elements, named};
+use crate::formats::xml::{Source, elements, named};
 use crate::model::FileError;
 
 /// The default classes of a file.

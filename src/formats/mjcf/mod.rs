@@ -7,4 +7,4 @@ mod orientation;
 mod read;
 mod write;
 
-pub(super) use write::{DRY_FRICTION, FORMAT, option};
+pub(super) use write::FORMAT;

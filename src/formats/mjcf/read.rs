@@ -10,7 +10,7 @@ use super::element::{Classes, Element};
 use super::orientation::Angles;
 use super::{actuator, geom};
 use crate::formats::robot::tree::{self, Body, Hinge};
-use crate::formats::robot::xml::{self, Source, elements, named};
+use crate::formats::xml::{self, Source, elements, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, Spring};
 

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
 use crate::formats::robot::tree::{self, Body, Hinge};
-use crate::formats::robot::xml::{self, Source, named};
+use crate::formats::xml::{self, Source, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 

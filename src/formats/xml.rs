@@ -241,6 +241,15 @@ pub(in crate::formats) fn named<'a, 'x>(
     elements(node).filter(move |child| child.has_tag_name(name))
 }
 
+/// Text that can stand in an element or an attribute.
+pub(super) fn escaped(text: &str) -> String {
+    let text = text
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;");
+    text.replace('"', "&quot;").replace(['\n', '\r', '\t'], " ")
+}
+
 /// A difference (rad) without influence on the equations.
 const ROUNDING: f64 = 1e-10;
 
