@@ -1,5 +1,5 @@
-use super::graph::{Graph, Node};
-use super::op::{Binary, Op, Unary};
+use super::graph::Graph;
+use super::op::{Binary, Node, Op, Unary};
 
 impl Graph {
     /// Reverse mode: the gradient of `sum_k seeds[k] * outputs[k]` with respect to each of `wrt`,

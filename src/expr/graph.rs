@@ -1,18 +1,7 @@
 use std::collections::HashMap;
 
 use super::Program;
-use super::op::{Binary, Op, Unary};
-
-/// A value in a [`Graph`] or [`Program`]: the position of the operation that makes it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Node(pub(super) u32);
-
-impl Node {
-    /// Its place in the list of operations.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-}
+use super::op::{Binary, Node, Op, Unary};
 
 /// A growing program. Equal operations are stored once (hash-consing), constants are folded, and an
 /// operand always stands before its user, so that the list is its own evaluation order.

@@ -1,6 +1,15 @@
 use serde::{Deserialize, Serialize};
 
-use super::Node;
+/// A value in a [`Graph`](super::Graph) or [`Program`](super::Program): the position of the operation that computes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Node(pub(super) u32);
+
+impl Node {
+    /// Its place in the list of operations.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// Functions of one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

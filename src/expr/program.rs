@@ -1,5 +1,4 @@
-use super::Node;
-use super::op::Op;
+use super::op::{Node, Op};
 use super::steps::{Steps, steps};
 
 /// A closed list of operations: inputs by name, then values each made from earlier ones, and the

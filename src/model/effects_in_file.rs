@@ -1,9 +1,10 @@
 //! The `[[effect]]` entries of a model file.
 
+use super::dynamics::OwnValue;
 use super::effect::{Effect, EffectParameter};
+use super::fitted::FittedEffect;
 use super::reader::{FileError, Section};
 use super::sections::interval;
-use super::system::{FittedEffect, OwnValue};
 use crate::data::Joint;
 use crate::expr::suggestion;
 

@@ -44,16 +44,20 @@ pub(super) struct Located<T> {
 }
 
 impl Document {
+    pub fn new(path: &Path, text: &str) -> Self {
+        Self {
+            path: path.to_owned(),
+            text: text.to_owned(),
+        }
+    }
+
     pub fn open(path: &Path) -> Result<Self, FileError> {
         let text = std::fs::read_to_string(path).map_err(|error| FileError {
             path: path.to_owned(),
             place: None,
             message: format!("cannot be read: {error}"),
         })?;
-        Ok(Self {
-            path: path.to_owned(),
-            text,
-        })
+        Ok(Self::new(path, &text))
     }
 
     pub fn parse(&self) -> Result<Section<'_>, FileError> {
@@ -217,6 +221,37 @@ impl<'a> Section<'a> {
         items
             .map(|items| items.iter().map(|item| self.number_of(key, item)).collect())
             .transpose()
+    }
+
+    /// The admissible range that `positive` and `bounds` declare.
+    pub fn bounds(&self) -> Result<[f64; 2], FileError> {
+        let lowest = if self.flag("positive")? {
+            0.0
+        } else {
+            f64::NEG_INFINITY
+        };
+        match self.numbers("bounds")?.as_deref() {
+            None => Ok([lowest, f64::INFINITY]),
+            Some(&[low, high]) if low < high => Ok([low.max(lowest), high]),
+            Some(_) => Err(self.error_at(
+                "bounds",
+                "`bounds` is a list of two rising numbers, such as [0, 2]",
+            )),
+        }
+    }
+
+    /// The value that stands for a text; an absent text is empty. `allowed` is for the message.
+    pub fn choice<T: Copy>(
+        &self,
+        key: &str,
+        allowed: &str,
+        choices: &[(&str, T)],
+    ) -> Result<T, FileError> {
+        let text = self.text_or_empty(key)?;
+        let chosen = choices.iter().find(|(name, _)| *name == text);
+        chosen
+            .map(|(_, value)| *value)
+            .ok_or_else(|| self.error_at(key, format!("`{key}` is {allowed}, found {text:?}")))
     }
 
     pub fn texts(&self, key: &str) -> Result<Option<Vec<Located<String>>>, FileError> {

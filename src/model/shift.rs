@@ -2,7 +2,8 @@
 
 use super::Parameter;
 use super::effect::{Effect, EffectParameter, Entry, Measure};
-use super::system::{FittedEffect, Model, Motion};
+use super::fitted::FittedEffect;
+use super::system::{Model, Motion};
 use crate::data::Joint;
 use crate::expr::{Formula, parse};
 

@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use super::system::{FittedEffect, Model, OwnValue};
+use super::dynamics::OwnValue;
+use super::fitted::FittedEffect;
+use super::system::Model;
 
 impl Model {
     /// The model as a model file. What the user declared stays as it is, comments included; only numbers of

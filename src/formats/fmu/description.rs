@@ -60,7 +60,9 @@ impl Standard {
 
     /// One element for each of the variables at these places.
     fn each(&self, element: &str, places: &[usize]) -> String {
-        let elements = places.iter().map(|k| filled(element, &[("PLACE", &(self.first + k))]));
+        let elements = places
+            .iter()
+            .map(|k| filled(element, &[("PLACE", &(self.first + k))]));
         elements.collect()
     }
 }

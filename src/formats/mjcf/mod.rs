@@ -1,7 +1,7 @@
 //! MJCF, the format of MuJoCo: read and written.
 
 mod actuator;
-mod element;
+mod classes;
 mod geom;
 mod orientation;
 mod read;
