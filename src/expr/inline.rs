@@ -41,7 +41,7 @@ mod tests {
     use crate::expr::{Graph, Scope, parse};
 
     #[test]
-    fn an_appended_program_is_the_composed_function() {
+    fn an_appended_program_is_a_composition() {
         let mut inner = Graph::new();
         let scope = Scope::of_inputs(&mut inner, ["a", "b"]);
         let formula = parse("where(a < b, sin(a) * 2, b^3 - max(a, 1))").unwrap();

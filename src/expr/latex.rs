@@ -87,14 +87,14 @@ impl Notation for Latex {
     fn quotient(&self, a: Part, b: Part) -> Part {
         Part {
             text: format!("\\frac{{{}}}{{{}}}", a.text, b.text),
-            strength: PRODUCT,
+            precedence: PRODUCT,
         }
     }
 
     fn power(&self, a: Part, b: Part) -> Part {
         Part {
             text: format!("{{{}}}^{{{}}}", a.binding(self, POWER + 1), b.text),
-            strength: POWER,
+            precedence: POWER,
         }
     }
 

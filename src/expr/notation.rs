@@ -1,8 +1,8 @@
 //! How a language writes expressions.
 
-/// How one language writes what a program can do. Strings come with the strength with which they
-/// bind, so that parentheses stand only where they must. What is not said otherwise is written as most
-/// programming languages do.
+/// How a language writes the operations of a program. Printed expressions carry the precedence of their weakest
+/// operator, so that parentheses are added only where they are needed. The defaults are those of most programming
+/// languages.
 pub trait Notation {
     /// A constant; it may be negative.
     fn number(&self, value: f64) -> String;
@@ -29,7 +29,7 @@ pub trait Notation {
         let (a, b) = (a.binding(self, PRODUCT), b.binding(self, PRODUCT + 1));
         Part {
             text: format!("{a} / {b}"),
-            strength: PRODUCT,
+            precedence: PRODUCT,
         }
     }
 
@@ -42,11 +42,11 @@ pub trait Notation {
     }
 }
 
-/// A printed expression and the strength of its weakest operator.
+/// A printed expression and the precedence of its weakest operator.
 #[derive(Debug, Clone)]
 pub struct Part {
     pub text: String,
-    pub(super) strength: u8,
+    pub(super) precedence: u8,
 }
 
 pub(super) const COMPARE: u8 = 1;
@@ -59,14 +59,14 @@ pub(super) const ATOM: u8 = 11;
 impl Part {
     /// Whether it is a comparison.
     pub fn is_comparison(&self) -> bool {
-        self.strength == COMPARE
+        self.precedence == COMPARE
     }
 
     /// A product of factors that are already printed.
     pub fn product(text: String) -> Self {
         Self {
             text,
-            strength: PRODUCT,
+            precedence: PRODUCT,
         }
     }
 
@@ -82,7 +82,7 @@ impl Part {
 
     /// The text, in parentheses if it binds weaker than `least`.
     pub(super) fn binding<N: Notation + ?Sized>(&self, notation: &N, least: u8) -> String {
-        if self.strength < least {
+        if self.precedence < least {
             notation.parenthesis(&self.text)
         } else {
             self.text.clone()
@@ -93,7 +93,7 @@ impl Part {
 pub(super) fn atom(text: String) -> Part {
     Part {
         text,
-        strength: ATOM,
+        precedence: ATOM,
     }
 }
 
@@ -112,7 +112,7 @@ impl Notation for Text {
     fn power(&self, a: Part, b: Part) -> Part {
         Part {
             text: format!("{}^{}", a.binding(self, POWER + 1), b.binding(self, POWER)),
-            strength: POWER,
+            precedence: POWER,
         }
     }
 

@@ -8,16 +8,16 @@ use super::notation::{COMPARE, Notation, PRODUCT, Part, SIGN, SUM, Text, atom};
 use super::op::{Binary, Node, Op, Unary};
 
 impl Program {
-    /// The equations as formulas that the parser reads back: one line an intermediate that has a
-    /// name, then one line an output (`names` are theirs).
+    /// The equations as formulas that the parser reads back: one line for each labelled intermediate, then one for each
+    /// output, with these `names`.
     pub fn text(&self, names: &[&str]) -> String {
         self.lines(&Text, names)
             .map(|(l, r)| format!("{l} = {r}\n"))
             .collect()
     }
 
-    /// The equations as assignments, left side and right side, of a language in which every value that is used more
-    /// than once is worth a name; `names` are those of the outputs.
+    /// The equations as assignments, left side and right side, with a name for every value that is used more than once;
+    /// `names` are those of the outputs.
     pub fn assignments(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
         let shared = self.shared();
         self.lines_with(notation, &shared, names).collect()
@@ -137,7 +137,7 @@ impl Program {
         match op {
             Op::Const(value) if value < 0.0 => Part {
                 text: notation.number(value),
-                strength: SIGN,
+                precedence: SIGN,
             },
             Op::Const(value) => atom(notation.number(value)),
             Op::Input(k) => atom(notation.name(&self.inputs[k as usize])),
@@ -159,7 +159,7 @@ fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
         Unary::Neg => {
             return Part {
                 text: format!("-{}", a.binding(notation, PRODUCT + 1)),
-                strength: SIGN,
+                precedence: SIGN,
             };
         }
         Unary::Abs => return atom(notation.absolute(&a.text)),
@@ -176,13 +176,13 @@ fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
 }
 
 fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
-    let infix = |sign: &str, strength: u8| Part {
+    let infix = |sign: &str, precedence: u8| Part {
         text: format!(
             "{} {sign} {}",
-            a.binding(notation, strength),
-            b.binding(notation, strength + 1)
+            a.binding(notation, precedence),
+            b.binding(notation, precedence + 1)
         ),
-        strength,
+        precedence,
     };
     match op {
         Binary::Add => infix("+", SUM),
@@ -193,7 +193,7 @@ fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
                 &a.binding(notation, PRODUCT),
                 &b.binding(notation, PRODUCT + 1),
             ),
-            strength: PRODUCT,
+            precedence: PRODUCT,
         },
         Binary::Div => notation.quotient(a, b),
         Binary::Pow => notation.power(a, b),

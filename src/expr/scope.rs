@@ -6,7 +6,7 @@ use super::op::{Binary, Function, Node, Unary};
 use super::parse::{Formula, Infix, Kind, Term};
 use super::{FormulaError, Program};
 
-/// How `sign` is written into a program.
+/// The form in which `sign` enters a program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SignForm {
     /// -1, 0, 1: for printing, and for simulations that handle the jump.
@@ -16,7 +16,7 @@ pub enum SignForm {
     Smooth { width: f64 },
 }
 
-/// The names that a formula may use, and what they stand for.
+/// The names that a formula may use, and their nodes.
 #[derive(Debug, Clone)]
 pub struct Scope {
     names: HashMap<String, Node>,
@@ -48,7 +48,7 @@ impl Scope {
         }
     }
 
-    /// Let `name` stand for `node` from now on.
+    /// Bind a name to a node.
     pub fn bind(&mut self, name: &str, node: Node) {
         self.names.insert(name.to_owned(), node);
     }

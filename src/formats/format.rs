@@ -18,7 +18,7 @@ pub struct Format {
     pub about: &'static str,
     /// The usual extension of its files, without a dot.
     pub extension: &'static str,
-    /// What of a model the format cannot carry, and what takes its place; known before anything is written.
+    /// Parts of a model that the format cannot represent, and what replaces them.
     pub not_carried: fn(&ExportModel) -> Vec<String>,
     /// The files for an output path, in memory.
     pub files: fn(&ExportModel, &Path) -> Result<Vec<File>, ExportError>,

@@ -72,7 +72,7 @@ impl Model {
     }
 }
 
-/// The graph while it grows.
+/// The program under construction.
 struct Assembly<'a> {
     system: &'a Model,
     effects: Vec<(&'a FittedEffect, Vec<Node>)>,
@@ -126,7 +126,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The state's angles are those that the sensors read: everything else sees the rig's own.
+    /// The angles of the state are those of the sensors; everything that follows uses the rig's own.
     fn apply_sensors(&mut self) {
         for (index, joint, formula) in self.entries(Effect::is_of_sensor) {
             self.q[joint] = self.effect_node(index, formula);
@@ -221,19 +221,19 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The angles of the declared equations: those of the rig as effects turn them.
+    /// The angles of the declared equations: those of the rig after effects on them.
     fn declared_angles(&mut self) -> Vec<Node> {
         self.turned(|effect| matches!(effect.entry, Entry::Angle(_)) && !effect.is_of_sensor())
     }
 
-    /// What sensors show where effects stand between them and the rig.
+    /// The measured angles, where effects change them.
     fn reading(&mut self) -> Option<Program> {
         let stands_between = |effect: &Effect| matches!(effect.entry, Entry::Reading(_));
         let shown = self.turned(stands_between);
         (shown != self.q).then(|| self.graph.clone().finish(&shown))
     }
 
-    /// The angles as some effects turn them, one after the other.
+    /// The angles after some effects, applied in order.
     fn turned(&mut self, by: impl Fn(&Effect) -> bool) -> Vec<Node> {
         let before = self.q.clone();
         for (index, joint, formula) in self.entries(by) {
@@ -242,7 +242,7 @@ impl<'a> Assembly<'a> {
         std::mem::replace(&mut self.q, before)
     }
 
-    /// The names of the declared equations: angles as effects turn them, torques as effects leave them.
+    /// The names of the declared equations: angles and torques after effects on them.
     fn declared_scope(&mut self) -> Scope {
         let angles = self.declared_angles();
         let mut scope = Scope::new(self.narrowest_sign());
@@ -275,7 +275,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// A declared formula may mix joints, so the narrowest of their widths is safe for all.
+    /// A declared formula may use several joints: the narrowest of their widths serves all.
     fn narrowest_sign(&self) -> SignForm {
         let width = |sign: &SignForm| match sign {
             SignForm::Exact => 0.0,

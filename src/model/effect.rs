@@ -1,5 +1,5 @@
 use super::filter::CommandFilter;
-use crate::expr::{Formula, Graph, Scope, SignForm};
+use crate::expr::{Formula, Graph, Scope, SignForm, suggestion};
 
 /// What a formula of an effect may mention besides its parameters.
 pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
@@ -11,9 +11,9 @@ pub struct Effect {
     pub about: String,
     pub entry: Entry,
     pub parameters: Vec<EffectParameter>,
-    /// What must be positive of the parameters, where not every combination makes sense.
+    /// A condition on the parameters, which holds where it is positive.
     pub valid_if: Option<Formula>,
-    /// Simpler effects that this one becomes for special values of its parameters.
+    /// Simpler effects that are special cases of this one.
     pub contains: Vec<String>,
     pub confused_with: Vec<String>,
     /// The motion that shows the effect.
@@ -22,23 +22,23 @@ pub struct Effect {
     pub first_joint_only: bool,
 }
 
-/// How an effect enters the equations of its joint. Formulas speak of `q`, `qd`, `tau`, `load`, `t` of
-/// that joint and of the effect's parameters.
+/// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in
+/// the effect's parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
     /// Added to the generalised force, and so passed through the mass matrix.
     Force(Formula),
-    /// What becomes of the commanded torque.
+    /// Replaces the commanded torque.
     Torque(Formula),
-    /// What stands for the joint's angle in the declared equations.
+    /// Replaces the joint's angle in the declared equations.
     Angle(Formula),
     /// Added to the joint's own entry of the mass matrix.
     Inertia(Formula),
-    /// Added to the declared parameter of this number.
+    /// Added to the declared parameter of this index.
     Shift(usize, Formula),
-    /// A filter of the commanded torque, ahead of everything else that becomes of it.
+    /// A filter of the commanded torque, applied before all other effects on it.
     Command(CommandFilter),
-    /// What the sensor shows for the joint's angle.
+    /// Replaces the measured angle.
     Reading(Formula),
 }
 
@@ -61,7 +61,7 @@ impl Entry {
         self.formula_or_filter().ok()
     }
 
-    /// Whether the effect cannot be seen on a joint without torque.
+    /// Whether the effect is invisible on a joint without torque.
     pub fn needs_torque(&self) -> bool {
         match self.formula_or_filter() {
             Ok(formula) => {
@@ -73,10 +73,10 @@ impl Entry {
     }
 }
 
-/// What a parameter's bounds and starting values are multiples of.
+/// The unit of a parameter's bounds and starting values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measure {
-    /// Itself, in the parameter's own unit.
+    /// The parameter's own unit.
     One,
     /// The highest speed of the joint in the logs.
     Speed,
@@ -90,23 +90,35 @@ pub struct EffectParameter {
     pub name: String,
     pub unit: String,
     pub about: String,
-    /// Usual magnitude on a rig for the lab bench.
+    /// Typical magnitude on a desktop rig.
     pub typical: f64,
     /// Admissible range, in `measure`.
     pub bounds: [f64; 2],
-    /// Values from which a fit starts, in `measure`. One value: zero or whatever leaves the rig as it is.
+    /// Values from which fits start, in `measure`. A single one is the value without effect, mostly zero.
     pub starts: Vec<f64>,
-    /// What bounds and starting values are multiples of.
+    /// Unit of bounds and starting values.
     pub measure: Measure,
-    /// Only whole numbers make sense: searched, never refined.
+    /// Whole numbers only: searched among the starting values, not fitted.
     pub whole: bool,
-    /// Has a value of its own in each log.
+    /// Takes a value of its own in each log.
     pub per_log: bool,
 }
 
 impl Effect {
-    /// The same effect with bounds and starting values in the parameters' own units, for a joint of which the
-    /// logs show this top speed and top torque.
+    /// The effect of this name.
+    ///
+    /// # Errors
+    /// Unknown name, with a similar known one.
+    pub(super) fn find<'e>(effects: &'e [Self], name: &str) -> Result<&'e Self, String> {
+        let found = effects.iter().find(|effect| effect.name == name);
+        found.ok_or_else(|| {
+            let near = suggestion(name, effects.iter().map(|effect| effect.name.as_str()));
+            format!("unknown effect `{name}`{near}; `residyn list effects` shows all")
+        })
+    }
+
+    /// The same effect with bounds and starting values in the parameters' own units, for a joint with this highest speed
+    /// and torque in the logs.
     #[must_use]
     pub fn measured_by(&self, top_speed: f64, top_torque: f64) -> Self {
         let mut effect = self.clone();
@@ -122,7 +134,7 @@ impl Effect {
         effect
     }
 
-    /// What the effect does, in the names of its file.
+    /// The effect as text, in the names of its file.
     pub fn text(&self) -> String {
         match self.entry.formula_or_filter() {
             Ok(formula) => formula.text().to_owned(),
@@ -130,7 +142,7 @@ impl Effect {
         }
     }
 
-    /// Whether these values of the parameters, in their order, make sense together.
+    /// Whether `valid_if` holds for these values of the parameters, in their order.
     pub fn is_valid(&self, values: &[f64]) -> bool {
         let condition = |formula| self.evaluate(formula, values, 0.0) > 0.0;
         self.valid_if.as_ref().is_none_or(condition)
@@ -165,15 +177,14 @@ impl Effect {
         (0..16).fold(angle, |read, _| step(read))
     }
 
-    /// Whether the effect is one of how a joint's angle is read, not of the rig: a rig does not change from log
-    /// to log.
+    /// Whether the effect belongs to the sensor of an angle, not to the rig: its parameters change from log to log.
     pub fn is_of_sensor(&self) -> bool {
         matches!(self.entry, Entry::Angle(_)) && self.parameters.iter().all(|p| p.per_log)
     }
 }
 
 impl EffectParameter {
-    /// Whether the parameter at zero leaves the rig as it is.
+    /// Whether the effect is absent at zero of this parameter.
     pub fn is_switch(&self) -> bool {
         self.starts == [0.0]
     }

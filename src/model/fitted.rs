@@ -1,4 +1,4 @@
-//! An effect on a joint, with its values.
+//! Effects as part of a model.
 
 use super::Parameter;
 use super::dynamics::OwnValue;
@@ -7,7 +7,7 @@ use super::filter::CommandFilter;
 use crate::data::Joint;
 use crate::expr::{Graph, Program, Scope, SignForm};
 
-/// An effect that a model file already carries.
+/// An effect on a joint of a model, with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedEffect {
     pub effect: Effect,
@@ -32,7 +32,7 @@ impl FittedEffect {
         }
     }
 
-    /// What tells this effect from others in one model.
+    /// Identifies the effect within a model.
     pub fn label(&self) -> String {
         format!("{} on joint {}", self.title(), self.joint)
     }
@@ -117,7 +117,7 @@ impl FittedEffect {
     }
 }
 
-/// Effect files speak of turning joints; on a sliding one forces stand for torques and metres for radians.
+/// Effect files give units for joints that turn; on one that slides, N replaces N m and m replaces rad.
 fn unit_on(prismatic: bool, unit: &str) -> String {
     if prismatic {
         unit.replace("kg m^2", "kg")

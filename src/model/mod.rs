@@ -1,5 +1,4 @@
-//! Dynamics models: the file format, the assembly of equations and effects into one program, and the
-//! integrators that run it.
+//! Dynamics models: the file format, the library of effects, and the assembly of equations and effects into one program.
 
 mod assemble;
 pub mod chain;

@@ -251,7 +251,7 @@ impl MlpWeights {
         network
     }
 
-    /// Does this network belong to a system of `joints` joints?
+    /// Check that the network fits a system of `joints` joints.
     ///
     /// # Errors
     /// When widths do not follow from each other, from the joints or from the scaling.

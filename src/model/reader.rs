@@ -1,5 +1,4 @@
-//! Reading hand-written TOML so that every complaint names file, line and column, and an unknown key
-//! is met with the nearest known one.
+//! Reads hand-written TOML. Errors name file, line and column; for an unknown key they suggest a similar known one.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,11 +8,11 @@ use toml::de::{DeTable, DeValue};
 
 use crate::expr::{Formula, FormulaError, parse, suggestion};
 
-/// What is wrong with a model or effect file.
+/// An error in a model or effect file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileError {
     pub path: PathBuf,
-    /// Line and column, counted from 1; `None` where the file as a whole is meant.
+    /// Line and column, counted from 1; `None` where the error concerns the whole file.
     pub place: Option<(usize, usize)>,
     pub message: String,
 }
@@ -36,7 +35,7 @@ pub(super) struct Document {
     pub text: String,
 }
 
-/// A value and where in the text it stands.
+/// A value and its position in the text, in bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Located<T> {
     pub value: T,
@@ -276,7 +275,7 @@ impl<'a> Section<'a> {
         rows.iter().map(row).collect::<Result<_, _>>().map(Some)
     }
 
-    /// Complain about the first key that is not one of `known`.
+    /// Refuse keys other than `known`.
     pub fn only(&self, known: &[&str]) -> Result<(), FileError> {
         let stranger = self
             .table
@@ -299,12 +298,12 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// A complaint about this table.
+    /// An error at this table.
     pub fn error(&self, message: impl Into<String>) -> FileError {
         self.document.error(self.at, message)
     }
 
-    /// A complaint about the value of `key`.
+    /// An error at the value of `key`.
     pub fn error_at(&self, key: &str, message: impl Into<String>) -> FileError {
         let at = self.get(key).map_or(self.at, |value| value.span().start);
         self.document.error(at, message)

@@ -9,9 +9,9 @@ use crate::expr::{Formula, parse};
 
 /// The name of the effect.
 const NAME: &str = "parameter_shift";
-/// Gravity is the same on every rig: parameters in this unit are not asked about.
+/// Gravity is the same on every rig: parameters in this unit are not shifted.
 const UNIT_OF_GRAVITY: &str = "m/s^2";
-/// What is positive keeps at least this share of its declared value.
+/// A positive parameter keeps at least this share of its declared value.
 const LEAST: f64 = 1e-3;
 
 impl Model {

@@ -5,7 +5,7 @@ use crate::expr::{Formula, latex_name};
 
 impl Model {
     /// The declared equations as lines of a LaTeX `align` environment: intermediates, then the motion. Torques are
-    /// those that effects leave.
+    /// those after all effects.
     pub fn latex(&self) -> Vec<String> {
         let mut names = self.input_names();
         let mut lines = Vec::new();

@@ -61,7 +61,7 @@ fn value_and_interval(value: f64, ci95: Option<[f64; 2]>) -> String {
     format!("value = {value:?}{}", interval.unwrap_or_default())
 }
 
-/// What is known of single logs, each called by its file name, or by its path where that is not enough.
+/// Values in single logs, each named by its file name, or by its path where file names are equal.
 fn of_logs(effect: &FittedEffect, k: usize) -> String {
     let own: Vec<&OwnValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
     if own.is_empty() {

@@ -109,7 +109,7 @@ fn head(model: &ExportModel, names: &Names) -> String {
     format!("/*\n{lines} */\n")
 }
 
-/// Text that can stand in a comment.
+/// Text that does not end a comment.
 fn comment(text: &str) -> String {
     let text = text
         .replace("*/", "* /")

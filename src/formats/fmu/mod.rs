@@ -38,7 +38,7 @@ struct Standard {
     platform: fn() -> String,
 }
 
-/// A model as all versions see it.
+/// What all versions share.
 struct Fmu<'m> {
     model: &'m ExportModel,
     identifier: String,
@@ -67,7 +67,7 @@ const CLIENT: PythonClient = PythonClient {
     packages: "fmpy",
 };
 
-/// What FMPy predicts, where the unit holds a library for this machine.
+/// The predictions of FMPy, where the unit holds a library for this machine.
 fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let refused =
         |error: &dyn std::error::Error| ClientError::Failed(format!("{}: {error}", path.display()));

@@ -159,7 +159,7 @@ fn unit(unit: &str) -> String {
     plain(unit)
 }
 
-/// Text that can stand in a comment or docstring.
+/// Text without quotes, backslashes and line breaks, for comments and docstrings.
 fn plain(text: &str) -> String {
     text.replace(['"', '\\'], "'")
         .replace(char::is_control, " ")

@@ -243,7 +243,7 @@ mod tests {
     use super::angle_meant;
 
     #[test]
-    fn rounded_fractions_of_a_turn_are_meant() {
+    fn rounded_fractions_of_a_turn_are_recognised() {
         for (word, meant) in [
             ("1.57", FRAC_PI_2),
             ("-1.5708", -FRAC_PI_2),

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn the_acrobots_elbow_is_a_link_away() {
+    fn the_acrobots_elbow_is_one_link_from_its_shoulder() {
         let acrobot = built_in("acrobot");
         let elbow = acrobot.joints[1].pose.origin;
         assert!((elbow.norm() - 1.0).abs() < 1e-12, "{elbow}");
