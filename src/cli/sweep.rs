@@ -8,7 +8,7 @@ use clap::Args;
 
 use super::{Answer, Common, command_line, inputs, progress};
 use crate::runs::RunFolder;
-use crate::train::recipe::{Job, Member, Recipe, Swept};
+use crate::train::recipe::{Job, Member, Recipe, SweepResults};
 use crate::train::{SweepProgress, Trained};
 
 /// Train many models by one recipe at once, with different initial weights or different weights of the penalty
@@ -98,7 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let members = arguments.members();
     let begun = Instant::now();
     let trained = train(&job, &members, arguments)?;
-    let swept = Swept::new(&job, &members, trained, begun.elapsed().as_secs_f64());
+    let swept = SweepResults::new(&job, &members, trained, begun.elapsed().as_secs_f64());
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;
     inputs::print(&if common.json { json } else { swept.text() })?;
@@ -127,7 +127,7 @@ impl Arguments {
 }
 
 fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
-    for note in &job.material.notes {
+    for note in &job.data.notes {
         eprintln!("note: {note}");
     }
     let epochs = job.recipe.fit.epochs;
@@ -139,7 +139,7 @@ fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Tra
             bar.inc(1);
             bar.set_message(format!("epochs, {} diverged", diverged + at.diverged));
         };
-        let trained = (job.sweep(part)?).run(&job.material.training, &mut observer)?;
+        let trained = (job.sweep(part)?).run(&job.data.training, &mut observer)?;
         diverged += trained.iter().filter(|model| model.diverged).count();
         Ok::<_, anyhow::Error>(trained)
     };

@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::{Experience, Progress, Round, Run, RunError};
+use super::{Progress, Round, Run, RunError};
 use crate::data::{Columns, Log};
 use crate::model::{Dynamics, Origin};
 use crate::runs::{RunFolder, RunFolderError};
@@ -18,7 +18,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Read the rounds in `folder`, which is made where it is missing.
+    /// Reads the rounds in `folder`, which is created if missing.
     ///
     /// # Errors
     /// A folder that cannot be made, or a damaged file.
@@ -58,7 +58,7 @@ impl Folder {
         let done = self.rounds.len();
         if done == 0 {
             let progress = run.begin()?;
-            self.write_stretch(&progress.experience.logs[0], 0)?;
+            self.write_stretch(&progress.logs[0], 0)?;
             return Ok(progress);
         }
         let columns = Columns::default();
@@ -66,9 +66,7 @@ impl Folder {
         let device = run.learner.backend.device();
         let checkpoint = Checkpoint::load(&self.checkpoint())?;
         Ok(Progress {
-            experience: Experience {
-                logs: (0..=done).map(read).collect::<Result<_, _>>()?,
-            },
+            logs: (0..=done).map(read).collect::<Result<_, _>>()?,
             model: Some(checkpoint.model(dynamics, &device)?),
             rounds: done,
         })
@@ -86,7 +84,7 @@ impl Folder {
         training: &Training,
         origin: &Origin,
     ) -> Result<(), RunError> {
-        let logs = &progress.experience.logs;
+        let logs = &progress.logs;
         self.write_stretch(&logs[logs.len() - 1], logs.len() - 1)?;
         self.rounds.push(round);
         save(&self.checkpoint(), training, origin)?;

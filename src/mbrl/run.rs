@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Judge, Judged, Learner, RunError};
+use super::{EpisodeScore, Evaluator, Learner, RunError, transitions};
 use crate::control::{Predictor, RandomTorque, Task, drive, with_controller};
 use crate::data::Log;
 use crate::model::Dynamics;
@@ -32,7 +32,8 @@ pub struct Run<'a> {
 /// The state of a run between two rounds.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {
-    pub experience: Experience,
+    /// The recorded motion: one log for each stretch, the first one under random torques.
+    pub logs: Vec<Log>,
     /// The model after the last round; none before the first.
     pub model: Option<HybridModel>,
     /// Rounds done.
@@ -47,7 +48,7 @@ pub struct Round {
     /// Number of real transitions that the model was trained on.
     pub transitions: usize,
     #[serde(flatten)]
-    pub judged: Judged,
+    pub score: EpisodeScore,
     /// Prediction error on these transitions after training: mean of ||s' - s_hat'||^2.
     pub error: f64,
     /// ||F_r||
@@ -68,43 +69,41 @@ impl Run<'_> {
         let mut noise = stream(self.seed, Purpose::Gather(0));
         let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
         Ok(Progress {
-            experience: Experience {
-                logs: vec![stretch.log],
-            },
+            logs: vec![stretch.log],
             ..Progress::default()
         })
     }
 
-    /// Carries out a round: train, judge, gather.
+    /// Carries out a round: train, evaluate, gather.
     ///
     /// # Errors
     /// A loss that is not finite, or a plant that diverges.
     pub fn round(&self, progress: &mut Progress) -> Result<(Round, Training), RunError> {
         let (round, seed) = (progress.rounds, self.seed);
-        let segments = progress.experience.segments(self.task.joints())?;
+        let segments = transitions(&progress.logs, self.task.joints())?;
         let previous = progress.model.as_ref();
         let training = self.learner.learn(&segments, previous, seed, round)?;
         let model = training.result()?;
         let predictor = model.predictor(self.learner.fit.integrator);
-        let judged = self.judge().judge(&predictor, self.task.replan)?;
+        let score = self.evaluator().score(&predictor, self.task.replan)?;
         let last = training.history().last().expect("a run records its end");
         let record = Round {
             round,
             transitions: segments.len(),
-            judged,
+            score,
             error: last.error,
             residual_norm: last.residual_norm,
             parameters: model.parameters(),
         };
         let gathered = self.gather(&predictor, progress)?;
-        progress.experience.logs.push(gathered);
+        progress.logs.push(gathered);
         progress.model = Some(model);
         progress.rounds += 1;
         Ok((record, training))
     }
 
-    fn judge(&self) -> Judge<'_> {
-        Judge {
+    fn evaluator(&self) -> Evaluator<'_> {
+        Evaluator {
             task: self.task,
             plant: self.plant,
             seed: self.seed,
@@ -134,7 +133,7 @@ impl Run<'_> {
         let of_episode = self.task.steps / self.schedule.gather;
         let (episode, begun) = (progress.rounds / of_episode, progress.rounds % of_episode);
         let mut rig = self.rig(dynamics, 1 + episode);
-        let controlled = &progress.experience.logs[1..];
+        let controlled = &progress.logs[1..];
         for log in &controlled[controlled.len() - begun..] {
             for row in 0..log.rows() - 1 {
                 let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();

@@ -13,7 +13,7 @@ const MANIFEST: &str = "checkpoint.json";
 const MODEL: &str = "model.toml";
 /// The model to use.
 const WEIGHTS: &str = "weights.safetensors";
-/// The model to go on from, which differs where an earlier one was the best.
+/// The model to continue from, which differs where an earlier one was the best.
 const LAST: &str = "last.safetensors";
 const OPTIMIZER: &str = "optimizer.safetensors";
 
@@ -30,7 +30,7 @@ pub struct Checkpoint {
     dir: PathBuf,
 }
 
-/// Write a run to `dir`, whole or not at all, in place of any checkpoint that is there.
+/// Writes a run to `dir`, completely or not at all, in place of any checkpoint that is there.
 ///
 /// The files are written to a new directory beside `dir`, which then takes its name. The old one is
 /// meanwhile called `dir.previous`; should the program die between the two renamings, [`Checkpoint::load`]
@@ -65,8 +65,8 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     replace(dir, fresh)
 }
 
-/// A directory that vanishes unless it is kept; as readable as any other, where temporary ones are private.
-/// It has one name for each `dir`, so that what a killed program left is met and removed.
+/// A temporary directory, deleted unless it is kept; with the usual permissions, where temporary ones are private. Its
+/// name depends on `dir` alone, so that the remains of a killed program are found and removed.
 fn fresh_beside(dir: &Path, parent: &Path) -> std::io::Result<tempfile::TempDir> {
     let mut name = std::ffi::OsString::from(".");
     name.push(dir.file_name().unwrap_or_default());
@@ -108,7 +108,7 @@ fn replace(dir: &Path, fresh: tempfile::TempDir) -> Result<(), CheckpointError> 
         }
         return Err(io("move the checkpoint to", dir)(error));
     }
-    // The directory has moved: there is nothing left to clean up under its first name.
+    // The directory has been renamed: nothing is left to delete under its temporary name.
     let _ = fresh.keep();
     if previous.exists() {
         fs::remove_dir_all(&previous).map_err(io("remove", &previous))?;
@@ -116,7 +116,7 @@ fn replace(dir: &Path, fresh: tempfile::TempDir) -> Result<(), CheckpointError> 
     Ok(())
 }
 
-/// Where the older checkpoint waits while a new one takes its place.
+/// Where the older checkpoint is while a new one takes its place.
 fn previous(dir: &Path) -> PathBuf {
     let mut name = dir.as_os_str().to_owned();
     name.push(".previous");
@@ -132,7 +132,7 @@ fn io<'a>(action: &'static str, path: &'a Path) -> impl Fn(std::io::Error) -> Ch
 }
 
 impl Checkpoint {
-    /// Read a checkpoint and check that its files belong together.
+    /// Reads a checkpoint and checks that its files belong together.
     ///
     /// # Errors
     /// A missing or damaged file, or another format.
@@ -193,7 +193,7 @@ impl Checkpoint {
         self.build(&self.weights, dynamics, device)
     }
 
-    /// The run, ready to go on.
+    /// The run, to be continued.
     ///
     /// # Errors
     /// When `dynamics` is another model.
@@ -278,7 +278,7 @@ fn read(dir: &Path, file: &str) -> Result<Vec<u8>, CheckpointError> {
     }
 }
 
-/// The format is looked at first: another one may describe anything else differently.
+/// The format is read first: in another one everything else may differ.
 fn read_manifest(dir: &Path) -> Result<Manifest, CheckpointError> {
     let damaged = |error: serde_json::Error| corrupt(MANIFEST, error.to_string(), dir);
     let json: serde_json::Value = serde_json::from_slice(&read(dir, MANIFEST)?).map_err(damaged)?;

@@ -4,26 +4,26 @@ use burn::module::Module;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::optimizer::Stepper;
+use super::optimizer::Optimizer;
 use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
 use crate::train::HybridModel;
 
-/// A training run: a value that can be held, saved ([`save`](super::save)), loaded and continued. Where
-/// it was interrupted does not change its result by a bit on the same backend and machine.
+/// A training run, which can be saved ([`save`](super::save)), loaded and continued. Interruptions do not change its
+/// result by a bit on the same backend and machine.
 #[derive(Clone)]
 pub struct Training {
     pub(super) model: HybridModel,
     pub(super) settings: FitSettings,
-    pub(super) optimizer: Stepper<1>,
+    pub(super) optimizer: Optimizer<1>,
     pub(super) rng: ChaCha8Rng,
     pub(super) epoch: usize,
     pub(super) penalty_weight: f64,
     pub(super) history: Vec<Record>,
     pub(super) best: Option<Best>,
-    objective: Objective,
+    pub(super) objective: Objective,
 }
 
-/// What an observer sees after each epoch.
+/// The progress of a run, after each epoch.
 pub struct Progress<'a> {
     /// Epochs done.
     pub epoch: usize,
@@ -42,17 +42,17 @@ pub struct Progress<'a> {
 pub enum Ended {
     /// All epochs are done.
     Finished,
-    /// The observer asked to stop; the run can go on.
+    /// The observer asked to stop; the run can be continued.
     Stopped,
 }
 
-/// What a run is done with.
-struct Material<'a> {
+/// The data of a run.
+struct Batches<'a> {
     segments: &'a Segments,
-    /// All of them, with gradients.
-    trained: Batch,
-    /// The same without.
-    judged: Batch,
+    /// All segments, on a device with gradients.
+    training: Batch,
+    /// All segments, on a device without.
+    evaluation: Batch,
     validation: Option<Batch>,
 }
 
@@ -81,7 +81,7 @@ impl Training {
                 settings.error_scale.as_deref(),
                 model.joints(),
             )?,
-            optimizer: Stepper::new(model.frame(), &settings),
+            optimizer: Optimizer::new(model.structure(), &settings),
             epoch: 0,
             penalty_weight: settings.penalty.initial(),
             history: Vec::new(),
@@ -92,17 +92,8 @@ impl Training {
         })
     }
 
-    /// The same run with its losses composed of Burn's operations, see [`Objective::composed`].
-    #[must_use]
-    pub fn composed(self) -> Self {
-        Self {
-            objective: self.objective.composed(),
-            ..self
-        }
-    }
-
-    /// Train until all epochs are done or `observer`, called after each, breaks off. Call it again to
-    /// go on. With `validation` the best model by its error is kept, the one before training included.
+    /// Trains until all epochs are done or `observer`, called after each, asks to stop; called again, it
+    /// continues. With `validation` the best model by its error is kept, the one before training included.
     ///
     /// # Errors
     /// Segments that do not fit the model, or a loss that is no longer finite: numbers are never repaired.
@@ -112,38 +103,38 @@ impl Training {
         validation: Option<&Segments>,
         observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Ended, TrainError> {
-        segments.check_for(self.model.frame(), "training")?;
+        segments.check_for(self.model.structure(), "training")?;
         let device = self.model.device();
         let plain = device.clone().without_autodiff();
         if let Some(validation) = validation {
-            validation.check_for(self.model.frame(), "validation")?;
+            validation.check_for(self.model.structure(), "validation")?;
         }
-        let material = Material {
+        let batches = Batches {
             segments,
-            trained: self.objective.all(segments, &device),
-            judged: self.objective.all(segments, &plain),
+            training: self.objective.all(segments, &device),
+            evaluation: self.objective.all(segments, &plain),
             validation: validation.map(|segments| self.objective.all(segments, &plain)),
         };
         let workers = self.objective.workers();
-        workers.helped(|| self.run_epochs(&material, observer))
+        workers.with_workers(|| self.run_epochs(&batches, observer))
     }
 
     fn run_epochs(
         &mut self,
-        material: &Material,
+        batches: &Batches,
         observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Ended, TrainError> {
         if self.history.is_empty() {
-            self.record(material)?;
+            self.record(batches)?;
         }
         while self.epoch < self.settings.epochs {
             self.optimizer.anneal(self.settings.share_in(self.epoch));
-            let Epoch { loss, error } = self.run_epoch(material)?;
+            let Epoch { loss, error } = self.run_epoch(batches)?;
             self.epoch += 1;
             self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);
             let every = self.settings.record_every.get();
             if self.epoch.is_multiple_of(every) || self.epoch == self.settings.epochs {
-                self.record(material)?;
+                self.record(batches)?;
             }
             let progress = Progress {
                 epoch: self.epoch,
@@ -159,12 +150,12 @@ impl Training {
         Ok(Ended::Finished)
     }
 
-    /// The model as it is now.
+    /// The current model.
     pub fn model(&self) -> &HybridModel {
         &self.model
     }
 
-    /// The model to use: the best by validation error, or the present one where there is no validation.
+    /// The result: the best model by validation error, or the current one without validation.
     ///
     /// # Errors
     /// None for a run made or loaded by this module.
@@ -195,11 +186,11 @@ impl Training {
         self.best.as_ref()
     }
 
-    fn run_epoch(&mut self, material: &Material) -> Result<Epoch, TrainError> {
+    fn run_epoch(&mut self, batches: &Batches) -> Result<Epoch, TrainError> {
         let Batching::Mini { size } = self.settings.batching else {
-            return self.step(&material.trained);
+            return self.step(&batches.training);
         };
-        let segments = material.segments;
+        let segments = batches.segments;
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.shuffle(&mut self.rng);
         let device = self.model.device();
@@ -224,17 +215,17 @@ impl Training {
         Ok(Epoch { loss: total, error })
     }
 
-    /// Judge the present model on all training segments and on validation.
-    fn record(&mut self, material: &Material) -> Result<(), TrainError> {
+    /// Evaluates the current model on all training segments and on validation.
+    fn record(&mut self, batches: &Batches) -> Result<(), TrainError> {
         let model = self.model.clone().valid();
-        let judge = |batch| self.objective.loss(&model, batch);
+        let evaluate = |batch| self.objective.loss(&model, batch);
         let (loss, [error, residual_norm]) =
-            self.total(&judge(&material.judged), self.weights())?;
+            self.total(&evaluate(&batches.evaluation), self.weights())?;
         let validation =
-            material
+            batches
                 .validation
                 .as_ref()
-                .map(|batch| match judge(batch).numbers()[0] {
+                .map(|batch| match evaluate(batch).numbers()[0] {
                     error if error.is_finite() => error,
                     _ => f64::INFINITY,
                 });
@@ -265,7 +256,7 @@ impl Training {
 
     fn weights(&self) -> [f64; 2] {
         let penalty = self.settings.penalty;
-        penalty.weights(self.penalty_weight, self.model.frame().has_residual)
+        penalty.weights(self.penalty_weight, self.model.structure().has_residual)
     }
 
     /// What is minimised, and its parts before they are weighted.

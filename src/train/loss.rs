@@ -1,15 +1,14 @@
 use std::sync::Arc;
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 
-use super::{Batch, Columns, HybridModel, Prepared, Segments, TrainError, composed, fused};
+use super::hybrid::vector;
+use super::{Backend, Blocks, Columns, HybridModel, Prepared, Segments, TrainError};
+use super::{composed, fused};
+use crate::model::to_f32;
 use crate::sim::Integrator;
 
-/// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
-/// where every residual starts.
-pub(super) const NORM_FLOOR: f64 = 1e-6;
-
-/// What models are judged by: the way their predictions are made and the units of their errors.
+/// What a model is fitted to: the way its predictions are made, and the units of their errors.
 #[derive(Debug)]
 pub struct Objective {
     integrator: Integrator,
@@ -17,9 +16,26 @@ pub struct Objective {
     scale: Vec<f64>,
     /// 1 / scale.
     precision: Arc<[f32]>,
+    implementation: Implementation,
     workers: Arc<fused::Workers>,
-    /// Whether losses are composed of Burn's operations on the processor, too.
-    is_composed: bool,
+}
+
+/// What evaluates losses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Implementation {
+    /// One operation for the whole loss, on the processor; devices without it compose the loss.
+    Fused,
+    /// Burn's operations on every device.
+    Composed,
+}
+
+/// Segments ready for a loss of an [`Objective`].
+#[derive(Debug, Clone)]
+pub enum Batch {
+    /// For Burn's operations.
+    Columns(Columns),
+    /// For the fused operation.
+    Blocks(Arc<Blocks>),
 }
 
 /// The two parts of the loss, `[2]`.
@@ -29,8 +45,8 @@ pub struct Objective {
 ///
 /// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
 /// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean of
-/// the norms would be another choice; it treats rows one by one and pulls small residuals to zero as hard as large
-/// ones, so that an effect felt in few rows would vanish first.
+/// the norms would treat rows one by one and pull small residuals to zero as hard as large ones, so that an effect in
+/// few rows would vanish first.
 #[derive(Debug, Clone)]
 pub struct Loss(Tensor<1>);
 
@@ -51,42 +67,42 @@ impl Objective {
                 scale,
             });
         }
-        #[allow(clippy::cast_possible_truncation)] // training runs in f32
-        let precision = scale.iter().map(|scale| (1.0 / scale) as f32);
+        let precision: Vec<f64> = scale.iter().map(|scale| 1.0 / scale).collect();
         Ok(Self {
             integrator,
-            precision: precision.collect(),
+            precision: to_f32(&precision).into(),
             scale,
+            implementation: Implementation::Fused,
             workers: Arc::default(),
-            is_composed: false,
         })
     }
 
-    /// The same with losses composed of Burn's operations wherever they are evaluated: the reference of the fused loss,
-    /// and many times slower.
+    /// The same with losses composed of Burn's operations on every device: the reference of the fused loss, and many
+    /// times slower.
     #[must_use]
     pub fn composed(self) -> Self {
         Self {
-            is_composed: true,
+            implementation: Implementation::Composed,
             ..self
         }
     }
 
-    /// The chosen segments, as [`Objective::loss`] takes them on a device.
-    pub(super) fn batch(&self, segments: &Segments, chosen: &[usize], device: &Device) -> Batch {
-        if self.is_composed {
-            Batch::Columns(segments.columns(chosen, device))
-        } else {
-            segments.batch(chosen, device)
+    /// The chosen segments for losses on a device.
+    pub fn batch(&self, segments: &Segments, chosen: &[usize], device: &Device) -> Batch {
+        match self.implementation {
+            Implementation::Fused if *device == Backend::NdArray.device() => {
+                Batch::Blocks(Arc::new(segments.blocks(chosen)))
+            }
+            _ => Batch::Columns(segments.columns(chosen, device)),
         }
     }
 
-    /// All segments, as [`Objective::loss`] takes them on a device.
-    pub(super) fn all(&self, segments: &Segments, device: &Device) -> Batch {
+    /// All segments for losses on a device.
+    pub fn all(&self, segments: &Segments, device: &Device) -> Batch {
         self.batch(segments, &(0..segments.len()).collect::<Vec<_>>(), device)
     }
 
-    /// The threads for its losses.
+    /// The threads of its losses.
     pub(super) fn workers(&self) -> Arc<fused::Workers> {
         self.workers.clone()
     }
@@ -94,7 +110,9 @@ impl Objective {
     /// The loss of a model on a batch, through the unrolled integrator.
     pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
         Loss(match batch {
-            Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
+            Batch::Columns(columns) => {
+                Tensor::cat(self.of_each(1, &model.prepare(), columns).to_vec(), 0)
+            }
             Batch::Blocks(blocks) => fused::loss(
                 model,
                 blocks,
@@ -124,8 +142,8 @@ impl Clone for Objective {
             integrator: self.integrator,
             scale: self.scale.clone(),
             precision: self.precision.clone(),
+            implementation: self.implementation,
             workers: Arc::default(),
-            is_composed: self.is_composed,
         }
     }
 }
@@ -140,9 +158,7 @@ impl Loss {
 
     /// The parts times their weights, `[2]`.
     pub fn weighted(self, weights: [f64; 2]) -> Tensor<1> {
-        #[allow(clippy::cast_possible_truncation)] // training runs in f32
-        let weights = TensorData::from(weights.map(|weight| weight as f32));
-        let weights = Tensor::from_data(weights, &self.0.device());
+        let weights = vector(&weights, &self.0.device());
         self.0 * weights
     }
 }

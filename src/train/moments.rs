@@ -1,4 +1,4 @@
-//! What Adam remembers as a safetensors file: `prior.first`, `prior.second`, `residual.first` and `residual.second`,
+//! Adam's moments as a safetensors file: `prior.first`, `prior.second`, `residual.first` and `residual.second`,
 //! f32 each.
 
 use std::path::Path;
@@ -25,7 +25,7 @@ pub(super) fn to_bytes(manifest: &Manifest, moments: &[Option<Moments>; 2]) -> V
     serialize(&manifest.shape, &entries.flatten().collect::<Vec<_>>())
 }
 
-/// Read the file back; `manifest` says what must be in it, and `weights` how much of it.
+/// Reads the file back; `manifest` says which moments it has, and `weights` their lengths.
 pub(super) fn from_bytes(
     manifest: &Manifest,
     weights: &ModelWeights,

@@ -1,26 +1,26 @@
-use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer};
+use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer as _};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-use super::{FitSettings, Frame};
+use super::{FitSettings, Structure};
 
 // PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
 // and would stop them short of it.
 const ADAM_EPSILON: f32 = 1e-8;
 
-/// Adam on the two tensors of a model or, entry by entry alike, of many: each tensor with a learning rate of its own.
+/// Adam on the two tensors of one model (`D` = 1) or of many (`D` = 2), each tensor with its own learning rate.
 #[derive(Clone)]
-pub(super) struct Stepper<const D: usize> {
+pub(super) struct Optimizer<const D: usize> {
     adam: Adam,
     rates: [f64; 2],
     /// Each weight decays by this share of its learning rate.
     decays: [f64; 2],
-    /// What is left of the learning rates.
+    /// The current share of the learning rates.
     share: f64,
     /// Of the prior and of the residual; none before their first step.
     moments: [Option<AdamState<D>>; 2],
 }
 
-/// What Adam remembers of one tensor, in plain form.
+/// Adam's moments of one tensor as plain numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Moments {
     /// Steps taken.
@@ -30,13 +30,13 @@ pub(super) struct Moments {
     pub second: Vec<f32>,
 }
 
-impl<const D: usize> Stepper<D> {
-    pub(super) fn new(frame: &Frame, settings: &FitSettings) -> Self {
+impl<const D: usize> Optimizer<D> {
+    pub(super) fn new(structure: &Structure, settings: &FitSettings) -> Self {
         let (rates, decay) = (&settings.learning_rates, settings.weight_decay);
-        let (prior, of_prior) = match frame.equations {
+        let (prior, of_prior) = match structure.equations {
             Some(_) => (rates.physics, 0.0),
-            // Below a residual it knows from elsewhere what it must not forget.
-            None if frame.has_residual => (rates.prior, 0.0),
+            // A prior below a residual was trained before and must not decay.
+            None if structure.has_residual => (rates.prior, 0.0),
             None => (rates.prior, decay),
         };
         Self {
@@ -48,7 +48,7 @@ impl<const D: usize> Stepper<D> {
         }
     }
 
-    /// Take the next steps at this share of the learning rates.
+    /// Sets the share of the learning rates for the next steps.
     pub(super) fn anneal(&mut self, share: f64) {
         self.share = share;
     }
@@ -88,8 +88,8 @@ fn decayed<const D: usize>(numbers: Tensor<D>, share: f64) -> Tensor<D> {
     }
 }
 
-impl Stepper<1> {
-    /// What is remembered of the prior and of the residual.
+impl Optimizer<1> {
+    /// The moments of the prior and of the residual.
     pub(super) fn moments(&self) -> [Option<Moments>; 2] {
         let numbers = |tensor: &Tensor<1>| tensor.to_data().iter().collect();
         self.moments.each_ref().map(|state| {
@@ -102,7 +102,7 @@ impl Stepper<1> {
         })
     }
 
-    /// Go on from what was remembered; `device` is the model's.
+    /// Continues from these moments; `device` is the model's.
     pub(super) fn resume(&mut self, moments: [Option<Moments>; 2], device: &Device) {
         let plain = device.clone().without_autodiff();
         let tensor = |numbers: Vec<f32>| {
@@ -121,9 +121,8 @@ impl Stepper<1> {
     }
 }
 
-/// Every so many steps, numbers below the smallest normal f32 become zero. The moments of a weight whose gradient has
-/// become zero for good, as below a neuron that no row reaches, would shrink into them and stay there, where
-/// processors are slow.
+/// Sets subnormal moments to zero, every 32 steps. The moments of a weight whose gradient stays zero, as behind a ReLU
+/// that no row activates, would decay into the subnormal range, where processors are slow.
 fn without_subnormals<const D: usize>(mut state: AdamState<D>) -> AdamState<D> {
     let momentum = &mut state.momentum;
     if !momentum.time.is_multiple_of(32) {

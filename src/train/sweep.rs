@@ -2,15 +2,16 @@
 
 use std::ops::Range;
 
-use burn::tensor::{Bool, Tensor, TensorData};
+use burn::tensor::{Bool, Tensor};
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::optimizer::Stepper;
+use super::hybrid::{to_f64, vector};
+use super::optimizer::Optimizer;
 use super::{
     Batching, Columns, FitSettings, HybridModel, Objective, Penalty, Segments, Stack, TrainError,
 };
-use crate::model::{MlpWeights, to_f32};
+use crate::model::MlpWeights;
 
 /// A run of many models. The sum of their losses is minimised, in which each model has numbers of its own: every gradient
 /// and every step of Adam, which goes entry by entry, is that of a model alone. One whose loss is no longer finite
@@ -19,7 +20,7 @@ pub struct Sweep {
     stack: Stack,
     settings: FitSettings,
     objective: Objective,
-    optimizer: Stepper<2>,
+    optimizer: Optimizer<2>,
     /// Of the minibatches of each model.
     orders: Vec<ChaCha8Rng>,
     /// alpha, or the present lambda, of each model.
@@ -30,9 +31,9 @@ pub struct Sweep {
     alive: Tensor<1, Bool>,
 }
 
-/// What tells a model of a sweep from the others.
+/// What distinguishes one model of a sweep.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub struct Variant {
     /// In place of the network of the sweep's model.
     pub network: MlpWeights,
     /// alpha, or the first lambda.
@@ -54,7 +55,7 @@ pub struct Trained {
     pub diverged: bool,
 }
 
-/// What an observer sees after each epoch.
+/// The progress of a sweep, after each epoch.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepProgress {
     /// Epochs done.
@@ -63,39 +64,40 @@ pub struct SweepProgress {
     pub diverged: usize,
 }
 
-/// What a step saw.
-struct Step {
+/// The error of a batch before its step.
+struct BatchError {
+    /// The batch's share of all segments.
     share: f64,
-    /// The prediction error of each model before it, `[models]`.
+    /// The prediction error of each model, `[models]`.
     error: Tensor<1>,
 }
 
 impl Sweep {
-    /// A run that has not begun: copies of `model`, each with what its start says. The model must be on a device
+    /// A run that has not begun: copies of `model`, one for each variant. The model must be on a device
     /// with gradients and have a network.
     ///
     /// # Errors
     /// Settings that are out of range.
     ///
     /// # Panics
-    /// When there are no starts, or with networks that are not of the shape of the model's own.
+    /// When there are no variants, or with networks that are not of the shape of the model's own.
     pub fn new(
         model: &HybridModel,
         settings: FitSettings,
-        starts: Vec<Start>,
+        variants: Vec<Variant>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
         let scale = settings.error_scale.as_deref();
         let objective = Objective::new(settings.integrator, scale, model.joints())?;
-        let penalty_weights: Vec<f64> = starts.iter().map(|s| s.penalty_weight).collect();
-        let (networks, orders): (Vec<_>, Vec<_>) = (starts.into_iter())
-            .map(|start| (start.network, start.order))
+        let penalty_weights: Vec<f64> = variants.iter().map(|s| s.penalty_weight).collect();
+        let (networks, orders): (Vec<_>, Vec<_>) = (variants.into_iter())
+            .map(|variant| (variant.network, variant.order))
             .unzip();
         let stack = Stack::new(model, &networks);
         let weights = [(); 2].map(|()| Tensor::zeros([networks.len()], &stack.device()));
         let mut sweep = Self {
             alive: weights[0].clone().inner().is_finite(),
-            optimizer: Stepper::new(model.frame(), &settings),
+            optimizer: Optimizer::new(model.structure(), &settings),
             weights,
             stack,
             orders,
@@ -107,7 +109,7 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// Train to the last epoch; `observer` is called after each.
+    /// Trains to the last epoch; `observer` is called after each.
     ///
     /// # Errors
     /// Segments that do not fit the model.
@@ -116,7 +118,7 @@ impl Sweep {
         segments: &Segments,
         observer: &mut dyn FnMut(SweepProgress),
     ) -> Result<Vec<Trained>, TrainError> {
-        segments.check_for(self.stack.frame(), "training")?;
+        segments.check_for(self.stack.structure(), "training")?;
         let whole = self.columns(segments, &self.in_order(segments), 0..segments.len());
         let mut diverged = 0;
         for epoch in 1..=self.settings.epochs {
@@ -133,10 +135,10 @@ impl Sweep {
             }
             observer(SweepProgress { epoch, diverged });
         }
-        Ok(self.judge(&whole))
+        Ok(self.evaluate(&whole))
     }
 
-    fn run_epoch(&mut self, segments: &Segments, whole: &Columns) -> Vec<Step> {
+    fn run_epoch(&mut self, segments: &Segments, whole: &Columns) -> Vec<BatchError> {
         let Batching::Mini { size } = self.settings.batching else {
             return vec![self.step(whole, 1.0)];
         };
@@ -155,7 +157,7 @@ impl Sweep {
     }
 
     /// One step of the optimiser on one batch, which is so large a `share` of all segments.
-    fn step(&mut self, batch: &Columns, share: f64) -> Step {
+    fn step(&mut self, batch: &Columns, share: f64) -> BatchError {
         let rows = batch.size / self.stack.models();
         let prepared = self.stack.prepare(rows);
         let [error, norm] = self
@@ -168,21 +170,21 @@ impl Sweep {
         // Backwards from every loss at once, as from their sum.
         let stepped = (self.optimizer).step(self.stack.tensors(), losses.backward());
         self.stack = self.stack.stepped(stepped, &self.alive);
-        Step {
+        BatchError {
             share,
             error: before,
         }
     }
 
-    /// Carry the weights of the penalty on after an epoch's steps, as a run alone does.
-    fn reweigh(&mut self, steps: Vec<Step>) {
-        // It would wait for the device, for nothing.
+    /// Updates the weights of the penalty after an epoch, as a run of one model does.
+    fn reweigh(&mut self, steps: Vec<BatchError>) {
+        // Nothing changes; reading the errors would wait for the device.
         if let Penalty::Fixed { .. } = self.settings.penalty {
             return;
         }
         let mut means = vec![0.0; self.penalty_weights.len()];
-        for Step { share, error } in steps {
-            for (mean, error) in means.iter_mut().zip(error.into_data().iter::<f64>()) {
+        for BatchError { share, error } in steps {
+            for (mean, error) in means.iter_mut().zip(to_f64(error)) {
                 *mean += share * error;
             }
         }
@@ -193,24 +195,19 @@ impl Sweep {
     }
 
     fn weights_on_device(&self) -> [Tensor<1>; 2] {
-        let has_residual = self.stack.frame().has_residual;
+        let has_residual = self.stack.structure().has_residual;
         let weigh = |weight: &f64| self.settings.penalty.weights(*weight, has_residual);
         [0, 1].map(|part| {
-            let weights: Vec<f64> = self
-                .penalty_weights
-                .iter()
-                .map(|w| weigh(w)[part])
-                .collect();
-            let data = TensorData::new(to_f32(&weights), [weights.len()]);
-            Tensor::from_data(data, &self.stack.device())
+            let weights = self.penalty_weights.iter().map(|w| weigh(w)[part]);
+            vector(&weights.collect::<Vec<_>>(), &self.stack.device())
         })
     }
 
-    fn judge(&self, whole: &Columns) -> Vec<Trained> {
+    fn evaluate(&self, whole: &Columns) -> Vec<Trained> {
         let models = self.stack.models();
         let prepared = self.stack.prepare(whole.size / models);
         let parts = self.objective.of_each(models, &prepared, whole);
-        let [error, norm] = parts.map(|part| part.into_data().iter::<f64>().collect::<Vec<_>>());
+        let [error, norm] = parts.map(to_f64);
         let found = error.into_iter().zip(norm).zip(self.stack.parameters());
         found
             .zip(self.diverged())

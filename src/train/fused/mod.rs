@@ -2,14 +2,18 @@
 //! cores. The composed operations of [`composed`](super::composed) are its reference, and what other devices use.
 
 mod blocks;
+mod evaluation;
+mod forward;
 mod operation;
 mod part;
-mod plan;
+mod problem;
+mod programs;
 mod record;
-mod tapes;
-mod work;
-mod worker;
+mod reverse;
+mod rollout;
+mod rows;
+mod workspace;
 
 pub use blocks::Blocks;
+pub(super) use evaluation::Workers;
 pub(super) use operation::loss;
-pub(super) use work::Workers;

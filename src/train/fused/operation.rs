@@ -13,8 +13,8 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 
-use super::plan::{KEPT, Plan};
-use super::work::Work;
+use super::evaluation::Evaluation;
+use super::problem::{Problem, RECORD_LIMIT};
 use super::{Blocks, Workers};
 use crate::sim::Integrator;
 use crate::train::HybridModel;
@@ -29,17 +29,17 @@ pub(in crate::train) fn loss(
 ) -> Tensor<1> {
     let none = || Tensor::zeros([0], &model.device());
     let [prior, residual] = model.tensors().map(|numbers| numbers.unwrap_or_else(none));
-    let plan = Plan {
-        frame: model.frame().clone(),
+    let problem = Problem {
+        structure: model.structure().clone(),
         blocks: blocks.clone(),
         integrator,
         precision: precision.clone(),
-        kept: KEPT,
+        record_limit: RECORD_LIMIT,
     };
     Tensor::from_dispatch(<Dispatch as LossOperation>::fused_loss(
         prior.into_dispatch(),
         residual.into_dispatch(),
-        Arc::new(plan),
+        Arc::new(problem),
         workers.clone(),
     ))
 }
@@ -50,7 +50,7 @@ pub(super) trait LossOperation: Backend {
     fn fused_loss(
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
-        plan: Arc<Plan>,
+        problem: Arc<Problem>,
         workers: Arc<Workers>,
     ) -> FloatTensor<Self>;
 }
@@ -59,10 +59,10 @@ impl LossOperation for NdArray {
     fn fused_loss(
         prior: NdArrayTensor,
         residual: NdArrayTensor,
-        plan: Arc<Plan>,
+        problem: Arc<Problem>,
         workers: Arc<Workers>,
     ) -> NdArrayTensor {
-        vector(taken(&prior, &residual, plan, workers).loss.to_vec())
+        vector(evaluate(&prior, &residual, problem, workers).loss.to_vec())
     }
 }
 
@@ -70,14 +70,16 @@ impl<C: CheckpointStrategy> LossOperation for Autodiff<NdArray, C> {
     fn fused_loss(
         prior: FloatTensor<Self>,
         residual: FloatTensor<Self>,
-        plan: Arc<Plan>,
+        problem: Arc<Problem>,
         workers: Arc<Workers>,
     ) -> FloatTensor<Self> {
-        let work = taken(prior.primitive(), residual.primitive(), plan, workers);
-        let loss = vector(work.loss.to_vec());
+        let evaluation = evaluate(prior.primitive(), residual.primitive(), problem, workers);
+        let loss = vector(evaluation.loss.to_vec());
         let preparation = LossBackward.prepare::<C>([prior.node(), residual.node()]);
         match preparation.compute_bound().stateful() {
-            OpsKind::Tracked(preparation) => preparation.finish(Arc::new(Mutex::new(work)), loss),
+            OpsKind::Tracked(preparation) => {
+                preparation.finish(Arc::new(Mutex::new(evaluation)), loss)
+            }
             OpsKind::UnTracked(preparation) => preparation.finish(loss),
         }
     }
@@ -88,7 +90,7 @@ struct LossBackward;
 
 impl Backward<NdArray, 2> for LossBackward {
     // Burn asks for a state that can be cloned; it is used once.
-    type State = Arc<Mutex<Work>>;
+    type State = Arc<Mutex<Evaluation>>;
 
     fn backward(
         self,
@@ -99,8 +101,8 @@ impl Backward<NdArray, 2> for LossBackward {
         let by_loss = gradients.consume::<NdArray>(&ops.node);
         let by_loss = (*numbers(&by_loss)).try_into();
         let by_loss = by_loss.expect("the loss is of two numbers");
-        let work = ops.state.lock().expect("no other thread uses it");
-        for (parent, slopes) in ops.parents.into_iter().zip(work.derivative(by_loss)) {
+        let evaluation = ops.state.lock().expect("no other thread uses it");
+        for (parent, slopes) in ops.parents.into_iter().zip(evaluation.derivative(by_loss)) {
             // An input without numbers has no gradient.
             if let Some(parent) = parent.filter(|_| !slopes.is_empty()) {
                 gradients.register::<NdArray>(parent.id, vector(slopes));
@@ -109,13 +111,13 @@ impl Backward<NdArray, 2> for LossBackward {
     }
 }
 
-fn taken(
+fn evaluate(
     prior: &NdArrayTensor,
     residual: &NdArrayTensor,
-    plan: Arc<Plan>,
+    problem: Arc<Problem>,
     workers: Arc<Workers>,
-) -> Work {
-    Work::new(plan, workers, &numbers(prior), &numbers(residual))
+) -> Evaluation {
+    Evaluation::new(problem, workers, &numbers(prior), &numbers(residual))
 }
 
 /// The numbers of a tensor of any layout, in order.

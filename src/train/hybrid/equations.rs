@@ -4,8 +4,8 @@
 use burn::tensor::{Device, Tensor, TensorData};
 
 use super::HybridError;
-use super::mlp::to_f64;
-use crate::model::{Dynamics, Parameter, to_f32};
+use super::tensor::{to_f64, vector};
+use crate::model::{Dynamics, Parameter};
 
 /// value / scale of every parameter, `[parameters]`.
 ///
@@ -24,7 +24,7 @@ pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, 
             });
         }
     }
-    Ok(tensor(&dynamics.parameters, |p| p.value / p.scale, device))
+    Ok(each(&dynamics.parameters, |p| p.value / p.scale, device))
 }
 
 /// The equations with these values; fixed ones as declared, to the last bit.
@@ -36,8 +36,8 @@ pub(super) fn current(declared: &Dynamics, scaled: Tensor<1>) -> Dynamics {
 
 /// The value of every parameter in its unit; of fixed ones as declared, to the last bit.
 pub(super) fn values(declared: &[Parameter], scaled: &[f64]) -> impl Iterator<Item = f64> {
-    let each = declared.iter().zip(scaled);
-    each.map(|(p, scaled)| if p.fixed { p.value } else { scaled * p.scale })
+    let pairs = declared.iter().zip(scaled);
+    pairs.map(|(p, scaled)| if p.fixed { p.value } else { scaled * p.scale })
 }
 
 /// Every parameter in its unit, from value / scale `[models, parameters]`: a tensor of shape `[models * rows]`, each
@@ -47,11 +47,11 @@ pub(super) fn columns(parameters: &[Parameter], scaled: Tensor<2>, rows: usize) 
         return Vec::new();
     }
     let (device, models) = (scaled.device(), scaled.dims()[0]);
-    let values = scaled * tensor(parameters, |p| p.scale, &device).unsqueeze();
+    let values = scaled * each(parameters, |p| p.scale, &device).unsqueeze();
     (parameters.iter().enumerate())
         .map(|(k, parameter)| {
             if parameter.fixed {
-                tensor(std::slice::from_ref(parameter), |p| p.value, &device)
+                each(std::slice::from_ref(parameter), |p| p.value, &device)
             } else {
                 let column = values.clone().narrow(1, k, 1);
                 column.expand([models, rows]).reshape([models * rows])
@@ -79,12 +79,6 @@ pub(super) fn projected(parameters: &[Parameter], scaled: &Tensor<1>) -> Option<
     moved.then(|| Tensor::from_data(TensorData::new(values, shape), &scaled.device()))
 }
 
-fn tensor(
-    parameters: &[Parameter],
-    value: impl Fn(&Parameter) -> f64,
-    device: &Device,
-) -> Tensor<1> {
-    let values: Vec<f64> = parameters.iter().map(value).collect();
-    let shape = [values.len()];
-    Tensor::from_data(TensorData::new(to_f32(&values), shape), device)
+fn each(parameters: &[Parameter], value: impl Fn(&Parameter) -> f64, device: &Device) -> Tensor<1> {
+    vector(&parameters.iter().map(value).collect::<Vec<_>>(), device)
 }

@@ -2,20 +2,22 @@
 
 mod equations;
 mod error;
-mod frame;
 mod mlp;
 mod model;
 mod prepared;
 mod replay;
 mod stack;
 mod step;
+mod structure;
+mod tensor;
 
 pub use error::HybridError;
-pub(crate) use frame::Frame;
 pub use model::HybridModel;
 #[cfg(test)]
 pub(super) use model::{PRIOR_ID, RESIDUAL_ID};
-pub use prepared::{Flow, Prepared};
+pub use prepared::{Derivative, Prepared};
 pub use replay::replay;
 pub(super) use stack::Stack;
-pub use step::Step;
+pub use step::StepResult;
+pub(crate) use structure::Structure;
+pub(super) use tensor::{to_f64, vector};

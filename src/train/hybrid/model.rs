@@ -3,16 +3,15 @@ use std::sync::Arc;
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor};
 
-use super::mlp::{flat, to_f64};
-use super::prepared::{columns, rows_of};
-use super::{Frame, HybridError, Prepared, equations};
+use super::tensor::{rows_of, to_f64, vector};
+use super::{HybridError, Prepared, Structure, equations};
 use crate::control::Predictor;
 use crate::model::{
     Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
 };
 use crate::sim::Integrator;
 
-// The names by which Burn knows the tensors.
+// Burn's identifiers of the tensors.
 pub(in crate::train) const PRIOR_ID: u64 = 1;
 pub(in crate::train) const RESIDUAL_ID: u64 = 2;
 
@@ -22,13 +21,13 @@ pub(in crate::train) const RESIDUAL_ID: u64 = 2;
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
 #[derive(Module, Debug)]
 pub struct HybridModel {
-    // One tensor for each part: an optimiser's step costs by the tensor.
+    // One tensor for each part: the cost of an optimiser's step grows with the number of tensors.
     /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`].
     prior: Param<Tensor<1>>,
     /// The residual network's numbers.
     residual: Option<Param<Tensor<1>>>,
     #[module(skip)]
-    frame: Arc<Frame>,
+    structure: Arc<Structure>,
 }
 
 impl HybridModel {
@@ -43,7 +42,7 @@ impl HybridModel {
         Ok(Self {
             prior: learnable(PRIOR_ID, equations::scaled(dynamics, device)?),
             residual: None,
-            frame: Arc::new(Frame::of_equations(dynamics)),
+            structure: Arc::new(Structure::of_equations(dynamics)),
         })
     }
 
@@ -61,9 +60,9 @@ impl HybridModel {
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
         Ok(Self {
-            prior: learnable(PRIOR_ID, flat(weights, device)),
+            prior: learnable(PRIOR_ID, vector(&weights.flat(), device)),
             residual: None,
-            frame: Arc::new(Frame::of_network(system, joints, weights)),
+            structure: Arc::new(Structure::of_network(system, joints, weights)),
         })
     }
 
@@ -74,8 +73,11 @@ impl HybridModel {
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
         Ok(Self {
-            residual: Some(learnable(RESIDUAL_ID, flat(weights, &self.device()))),
-            frame: Arc::new(self.frame.with_residual(weights)),
+            residual: Some(learnable(
+                RESIDUAL_ID,
+                vector(&weights.flat(), &self.device()),
+            )),
+            structure: Arc::new(self.structure.with_residual(weights)),
             ..self
         })
     }
@@ -90,16 +92,27 @@ impl HybridModel {
         dynamics: &Dynamics,
         device: &Device,
     ) -> Result<Self, HybridError> {
-        let model = match &weights.prior {
-            Some(prior) => Self::network(&shape.system, shape.joints, prior, device)?,
-            None => {
-                let saved = shape.parameters.iter().zip(&weights.parameters);
-                let trained = Dynamics {
-                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
-                    ..dynamics.clone()
-                };
-                Self::physics(&trained, device)?
+        let equations = || {
+            let saved = shape.parameters.iter().zip(&weights.parameters);
+            Dynamics {
+                parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
+                ..dynamics.clone()
             }
+        };
+        Self::assembled(&shape.system, shape.joints, equations, weights, device)
+    }
+
+    /// A model with the networks of `weights`, and with `equations` where its prior is none of these.
+    fn assembled(
+        system: &str,
+        joints: usize,
+        equations: impl FnOnce() -> Dynamics,
+        weights: &ModelWeights,
+        device: &Device,
+    ) -> Result<Self, HybridError> {
+        let model = match &weights.prior {
+            Some(prior) => Self::network(system, joints, prior, device)?,
+            None => Self::physics(&equations(), device)?,
         };
         match &weights.residual {
             Some(residual) => model.with_residual(residual),
@@ -109,12 +122,12 @@ impl HybridModel {
 
     /// Name of the system.
     pub fn system(&self) -> &str {
-        &self.frame.system
+        &self.structure.system
     }
 
     /// Number of joints n.
     pub fn joints(&self) -> usize {
-        self.frame.joints
+        self.structure.joints
     }
 
     /// The physical parameters as declared, with their current values; none where the prior is a network.
@@ -129,18 +142,12 @@ impl HybridModel {
         declared.map(|p| (p.name, p.value)).collect()
     }
 
-    /// Current value of one physical parameter.
-    pub fn parameter(&self, name: &str) -> Option<f64> {
-        let mut parameters = self.parameters().into_iter();
-        parameters.find(|(n, _)| n == name).map(|(_, value)| value)
-    }
-
     /// Every learnable number.
     pub fn weights(&self) -> ModelWeights {
         ModelWeights {
             parameters: self.parameters().into_iter().map(|(_, v)| v).collect(),
-            prior: self.network_of(self.frame.prior(), Some(&self.prior)),
-            residual: self.network_of(self.frame.residual(), self.residual.as_ref()),
+            prior: self.network_of(self.structure.prior(), Some(&self.prior)),
+            residual: self.network_of(self.structure.residual(), self.residual.as_ref()),
         }
     }
 
@@ -157,27 +164,22 @@ impl HybridModel {
     /// # Errors
     /// When the numbers belong to a model of another shape.
     pub fn with_weights(&self, weights: &ModelWeights) -> Result<Self, HybridError> {
-        let device = self.device();
-        let prior = match (&self.frame.equations, &weights.prior) {
-            (Some(equations), None) if equations.parameters.len() == weights.parameters.len() => {
-                let values = weights.parameters.iter().copied();
-                Self::physics(&equations.clone().with_values(values), &device)?
-            }
-            (None, Some(mlp)) if weights.parameters.is_empty() => {
-                Self::network(self.system(), self.joints(), mlp, &device)?
-            }
-            _ => {
-                return Err(HybridError::Weights {
-                    system: self.system().to_owned(),
-                    expected: self.frame.parameters().len(),
-                    found: weights.parameters.len(),
-                });
-            }
-        };
-        match &weights.residual {
-            Some(mlp) => prior.with_residual(mlp),
-            None => Ok(prior),
+        let (expected, found) = (self.structure.parameters().len(), weights.parameters.len());
+        let declared = self.structure.equations.as_ref();
+        if expected != found || declared.is_some() == weights.prior.is_some() {
+            return Err(HybridError::Weights {
+                system: self.system().to_owned(),
+                expected,
+                found,
+            });
         }
+        let equations = || {
+            let declared = declared.expect("a prior is equations or a network");
+            let values = weights.parameters.iter().copied();
+            declared.clone().with_values(values)
+        };
+        let (system, joints, device) = (self.system(), self.joints(), self.device());
+        Self::assembled(system, joints, equations, weights, &device)
     }
 
     /// The whole model, networks included, as one program with the current numbers: what integrators in
@@ -217,38 +219,22 @@ impl HybridModel {
 
     /// The declared equations with the current values.
     fn equations(&self) -> Option<Dynamics> {
-        let declared = self.frame.equations.as_ref()?;
+        let declared = self.structure.equations.as_ref()?;
         Some(equations::current(declared, self.prior.val()))
     }
 
-    /// Unpack the parameters, once for all evaluations that one gradient runs through.
+    /// Unpacks the learnable numbers, once for all evaluations that one gradient runs through.
     pub fn prepare(&self) -> Prepared<'_> {
         let each = |tensor: Option<Tensor<1>>| tensor.and_then(|numbers| rows_of(numbers, 1));
-        Prepared::new(&self.frame, 1, self.tensors().map(each))
+        Prepared::new(&self.structure, 1, self.tensors().map(each))
     }
 
-    /// ds/dt and the part F_r of it that the residual makes, at a batch of points.
-    ///
-    /// `state` is `[batch, 2n]` (positions, velocities), `input` `[batch, n]`, `time` `[batch]` in
-    /// seconds. Returns `[batch, 2n]` and, where the model has a residual, `[batch, n or 2n]`.
-    pub fn derivative(
-        &self,
-        state: Tensor<2>,
-        input: Tensor<2>,
-        time: &Tensor<1>,
-    ) -> (Tensor<2>, Option<Tensor<2>>) {
-        let batch = state.dims()[0];
-        let flow = self.prepare().flow(&columns(state), &columns(input), time);
-        let rates = flow.rates.into_iter().map(|rate| rate.expand([batch]));
-        (Tensor::stack(rates.collect(), 1), flow.residual)
-    }
-
-    /// Bring every physical parameter back within its bounds. Called after each optimiser step
-    /// (projected gradient descent): a parameter may rest on a bound and leave it again.
+    /// Brings every physical parameter back within its bounds, after each optimiser step (projected gradient descent): a
+    /// parameter may rest on a bound and leave it again.
     #[must_use]
     pub fn project(self) -> Self {
         let prior = self.prior.val().inner();
-        match equations::projected(self.frame.parameters(), &prior) {
+        match equations::projected(self.structure.parameters(), &prior) {
             Some(inside) => Self {
                 prior: learnable(PRIOR_ID, Tensor::from_inner(inside)),
                 ..self
@@ -262,9 +248,9 @@ impl HybridModel {
         self.prior.val().device()
     }
 
-    /// What the model is without its learnable numbers.
-    pub(crate) fn frame(&self) -> &Arc<Frame> {
-        &self.frame
+    /// The model without its learnable numbers.
+    pub(crate) fn structure(&self) -> &Arc<Structure> {
+        &self.structure
     }
 
     /// The learnable numbers of the prior and of the residual.
@@ -275,7 +261,7 @@ impl HybridModel {
         ]
     }
 
-    /// The same model with other learnable numbers where some are given.
+    /// The same model with these learnable numbers, where some are given.
     pub(in crate::train) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
         let [prior, residual] = tensors;
         let prior = prior.map(|tensor| learnable(PRIOR_ID, tensor));
@@ -283,7 +269,7 @@ impl HybridModel {
         Self {
             prior: prior.unwrap_or_else(|| self.prior.clone()),
             residual: residual.or_else(|| self.residual.clone()),
-            frame: self.frame.clone(),
+            structure: self.structure.clone(),
         }
     }
 }

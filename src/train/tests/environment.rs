@@ -8,8 +8,8 @@ use crate::train::{Backend, HybridModel};
 
 #[test]
 fn an_environment_steps_as_training_does() {
-    let system = Library::built_in().model(Path::new("acrobot")).unwrap();
-    let dynamics = system.dynamics();
+    let model = Library::built_in().model(Path::new("acrobot")).unwrap();
+    let dynamics = model.dynamics();
     let device = Backend::NdArray.device();
     let model = HybridModel::physics(&dynamics, &device).unwrap();
     let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);

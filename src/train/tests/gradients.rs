@@ -25,7 +25,7 @@ fn segments() -> Segments {
 
 fn total(model: &HybridModel, segments: &Segments, integrator: Integrator) -> burn::Tensor<1> {
     let objective = Objective::new(integrator, Some(&[0.5, 2.0]), 1).unwrap();
-    let batch = segments.all(&model.device());
+    let batch = objective.all(segments, &model.device());
     let loss = objective.loss(model, &batch);
     loss.weighted([1.0, 0.3]).sum()
 }

@@ -10,12 +10,14 @@ mod resume;
 mod shrinking;
 mod sweep;
 
+use std::ops::ControlFlow;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Backend, HybridModel, Segments};
+use super::{Backend, Ended, FitSettings, HybridModel, Segments, Training};
 use crate::expr::{Graph, Scope, SignForm, parse};
-use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
+use crate::model::{Dynamics, LastLayer, MlpSettings, Parameter};
 
 pub(super) const DT: f64 = 0.02;
 
@@ -94,10 +96,21 @@ pub(super) fn hybrid(
     backend: Backend,
     last: LastLayer,
 ) -> HybridModel {
-    let settings = MlpSettings::for_joints(1);
-    let scaling = segments.scaling(settings.angles);
-    let residual = MlpWeights::new(1, &settings, scaling, last, &mut rng(7));
+    let residual = segments.network(&MlpSettings::for_joints(1), last, &mut rng(7));
     HybridModel::physics(&pendulum(c_g, c_i), &backend.device())
         .and_then(|model| model.with_residual(&residual))
         .unwrap()
+}
+
+/// A run of all epochs without validation.
+pub(super) fn fit(model: HybridModel, segments: &Segments, settings: FitSettings) -> Training {
+    let mut training = Training::new(model, settings, rng(3)).unwrap();
+    run(&mut training, segments);
+    training
+}
+
+/// Trains to the last epoch.
+pub(super) fn run(training: &mut Training, segments: &Segments) {
+    let ended = training.run(segments, None, &mut |_| ControlFlow::Continue(()));
+    assert_eq!(ended.unwrap(), Ended::Finished);
 }
