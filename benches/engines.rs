@@ -2,23 +2,22 @@
 //!
 //! The work is that of `benches/peers.py`: the same models, the same numbers of transitions, candidates and steps.
 
+mod search;
+mod work;
+
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use residyn::closeloop::{self, Request, Split, close_loop};
 use residyn::lanes::{Arch, Element, Simd, Vector, WithSimd};
-use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights};
-use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
+use residyn::model::{Dynamics, Library, MlpSettings, MlpWeights};
+use residyn::plan::Start;
 use residyn::plant::Plant;
-use residyn::sim::Integrator;
 use residyn::sim::batch::{Rollouts, Rows};
-use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
-
-const STEP_S: f64 = 0.02;
 
 /// One of the two systems on which the published method was tried.
 struct Task {
@@ -48,10 +47,7 @@ const TASKS: [Task; 2] = [
 
 impl Task {
     fn equations(&self) -> Dynamics {
-        let system = Library::built_in()
-            .model(Path::new(self.name))
-            .expect("a built-in system");
-        let mut dynamics = system.dynamics();
+        let mut dynamics = work::dynamics(self.name);
         for (name, value) in self.parameters {
             let found = dynamics.parameters.iter_mut().find(|p| p.name == *name);
             found.expect("a parameter of the system").value = *value;
@@ -61,47 +57,12 @@ impl Task {
 
     fn network(&self) -> MlpWeights {
         let joints = self.start.len() / 2;
-        network(joints, &MlpSettings::for_joints(joints))
+        work::network(joints, &MlpSettings::for_joints(joints))
     }
 
     fn rollouts(&self) -> Rollouts {
-        let equations = self.equations();
-        let objective = Objective::new(self.reward, equations.joints).expect("a formula");
-        let networks = [self.network()];
-        Rollouts::new(
-            &equations,
-            &networks,
-            objective.program(),
-            Integrator::default(),
-            STEP_S,
-        )
+        work::rollouts(&self.equations(), self.network(), self.reward)
     }
-}
-
-fn network(joints: usize, settings: &MlpSettings) -> MlpWeights {
-    let scaling = InputScaling::identity(settings.angles.features(joints));
-    MlpWeights::new(
-        joints,
-        settings,
-        scaling,
-        LastLayer::Random,
-        &mut ChaCha8Rng::seed_from_u64(1),
-    )
-}
-
-/// Transitions between random states, which is all that the cost depends on.
-fn transitions(joints: usize, count: usize) -> Segments {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let mut draw =
-        |count: usize| -> Vec<f64> { (0..count).map(|_| rng.random_range(-3.0..3.0)).collect() };
-    let mut segments = Segments::new(joints, 1);
-    for _ in 0..count {
-        let (states, inputs) = (draw(4 * joints), draw(2 * joints));
-        segments
-            .push_trajectory(&[0.0, STEP_S], &states, &inputs, 1)
-            .expect("two rows are a transition");
-    }
-    segments
 }
 
 /// Epochs that one measurement takes together.
@@ -115,17 +76,8 @@ fn train(c: &mut Criterion) {
             .measurement_time(Duration::from_secs(1));
         for count in [500, 2000, 5000] {
             let equations = task.equations();
-            let segments = transitions(equations.joints, count);
-            let model = HybridModel::physics(&equations, &Backend::NdArray.device())
-                .and_then(|model| model.with_residual(&task.network()))
-                .expect("a model of this system");
-            let settings = FitSettings {
-                epochs: EPOCHS,
-                record_every: EPOCHS.try_into().expect("not zero"),
-                ..FitSettings::default()
-            };
-            let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(3));
-            let training = training.expect("settings in range");
+            let segments = work::segments(equations.joints, 1, count);
+            let training = work::training(&equations, &task.network(), EPOCHS);
             group.bench_function(BenchmarkId::from_parameter(count), |b| {
                 b.iter(|| {
                     let mut training = training.clone();
@@ -145,15 +97,7 @@ fn train(c: &mut Criterion) {
 fn plan(c: &mut Criterion) {
     for task in &TASKS {
         let rollouts = task.rollouts();
-        let settings = Settings {
-            population: 300,
-            iterations: 10,
-            horizon: task.horizon,
-            method: Method::Cem(Cem { elite: 20 }),
-        };
-        let bounds = vec![[-3.0, 3.0]; rollouts.joints()];
-        let rng = ChaCha8Rng::seed_from_u64(4);
-        let planner = Planner::new(&settings, &bounds, || rollouts.block(), &rng);
+        let planner = search::planner(&rollouts, 300, task.horizon);
         let start = Start::new(task.start, 0.0);
         c.benchmark_group("plan")
             .measurement_time(Duration::from_secs(2))

@@ -3,21 +3,21 @@
 //! Prints one JSON object a measurement: what was done, which size was changed, its value, the time and the memory
 //! that the process has needed so far.
 
+mod search;
+mod work;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use residyn::identify::{Shooting, cut, fit};
-use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model};
-use residyn::plan::{Cem, Method, Objective, Planner, Settings, Start};
+use residyn::model::{Dynamics, Library, MlpSettings, MlpWeights, Model};
+use residyn::plan::Start;
 use residyn::plant::Plant;
-use residyn::sim::Integrator;
-use residyn::sim::batch::Rollouts;
-use residyn::train::{Backend, FitSettings, HybridModel, Progress, Segments, Training};
+use residyn::train::Progress;
 
-const STEP_S: f64 = 0.02;
 /// Of each time the best of so many.
 const REPEATS: usize = 5;
 
@@ -49,25 +49,14 @@ impl Work {
             hidden: vec![self.width; 3],
             ..MlpSettings::for_joints(self.joints)
         };
-        let scaling = InputScaling::identity(settings.angles.features(self.joints));
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        MlpWeights::new(self.joints, &settings, scaling, LastLayer::Random, &mut rng)
+        work::network(self.joints, &settings)
     }
 
     /// Seconds of one epoch.
     fn epoch(&self) -> f64 {
-        let segments = self.segments();
-        let model = HybridModel::physics(&chain(self.joints), &Backend::NdArray.device())
-            .and_then(|model| model.with_residual(&self.network()))
-            .expect("a model of this chain");
+        let segments = work::segments(self.joints, self.steps, self.transitions / self.steps);
         let epochs = (200_000 / self.transitions).clamp(3, 100);
-        let settings = FitSettings {
-            epochs,
-            record_every: epochs.try_into().expect("not zero"),
-            ..FitSettings::default()
-        };
-        let begin = Training::new(model, settings, ChaCha8Rng::seed_from_u64(2));
-        let begin = begin.expect("settings in range");
+        let begin = work::training(&chain(self.joints), &self.network(), epochs);
         best(|| {
             let mut training = begin.clone();
             // From one epoch to the next: neither the first nor what is recorded at the ends counts.
@@ -86,45 +75,10 @@ impl Work {
         })
     }
 
-    fn segments(&self) -> Segments {
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let time: Vec<f64> = (0..=self.steps).map(|k| STEP_S * k as f64).collect();
-        let mut segments = Segments::new(self.joints, self.steps);
-        for _ in 0..self.transitions / self.steps {
-            let mut draw = |count: usize| -> Vec<f64> {
-                (0..count).map(|_| rng.random_range(-1.0..1.0)).collect()
-            };
-            let (states, inputs) = (
-                draw(2 * self.joints * time.len()),
-                draw(self.joints * time.len()),
-            );
-            segments
-                .push_trajectory(&time, &states, &inputs, 1)
-                .expect("one segment");
-        }
-        segments
-    }
-
     /// Seconds of one decision.
     fn decision(&self) -> f64 {
-        let objective = Objective::new("cos(q1)", self.joints).expect("a formula");
-        let (equations, networks) = (chain(self.joints), [self.network()]);
-        let rollouts = Rollouts::new(
-            &equations,
-            &networks,
-            objective.program(),
-            Integrator::default(),
-            STEP_S,
-        );
-        let settings = Settings {
-            population: self.population,
-            iterations: 10,
-            horizon: self.horizon,
-            method: Method::Cem(Cem { elite: 20 }),
-        };
-        let bounds = vec![[-3.0, 3.0]; self.joints];
-        let rng = ChaCha8Rng::seed_from_u64(4);
-        let planner = Planner::new(&settings, &bounds, || rollouts.block(), &rng);
+        let rollouts = work::rollouts(&chain(self.joints), self.network(), "cos(q1)");
+        let planner = search::planner(&rollouts, self.population, self.horizon);
         let start = Start::new(&vec![0.1; 2 * self.joints], 0.0);
         planner.with_workers(|| {
             best(|| {
@@ -169,10 +123,7 @@ fn identification(duration_s: f64) -> f64 {
     let log = rig
         .record(&mut ChaCha8Rng::seed_from_u64(5))
         .expect("a log");
-    let dynamics = library
-        .model(Path::new("pendulum"))
-        .expect("a built-in system");
-    let dynamics = dynamics.dynamics();
+    let dynamics = work::dynamics("pendulum");
     let logs = [log];
     let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[1e-3]);
     let active = [0, 1];
@@ -212,72 +163,47 @@ fn tell(work: &str, size: &str, value: usize, seconds: f64) {
     println!("{line}");
 }
 
-const JOINTS: [usize; 5] = [1, 2, 3, 4, 6];
-const WIDTHS: [usize; 5] = [8, 16, 32, 64, 128];
+/// Measure one kind of work over values of one size.
+fn sweep(work: &str, size: &str, values: &[usize], seconds: impl Fn(usize) -> f64) {
+    for &value in values {
+        tell(work, size, value, seconds(value));
+    }
+}
+
+const JOINTS: &[usize] = &[1, 2, 3, 4, 6];
+const WIDTHS: &[usize] = &[8, 16, 32, 64, 128];
+const TRANSITIONS: &[usize] = &[500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000];
+const STEPS: &[usize] = &[1, 2, 5, 10, 20];
+const HORIZONS: &[usize] = &[10, 20, 40, 80, 160, 320];
+const POPULATIONS: &[usize] = &[32, 100, 300, 1000, 3000, 10_000];
+const DURATIONS: &[usize] = &[10, 20, 40, 80, 160, 320];
 
 fn main() {
     let w = WORK;
-    for transitions in [500, 1000, 2000, 5000, 10_000, 100_000, 1_000_000] {
-        tell(
-            "epoch",
-            "transitions",
-            transitions,
-            Work { transitions, ..w }.epoch(),
-        );
-    }
-    for steps in [1, 2, 5, 10, 20] {
-        tell(
-            "epoch",
-            "steps of a segment",
-            steps,
-            Work { steps, ..w }.epoch(),
-        );
-    }
-    for joints in JOINTS {
-        tell("epoch", "joints", joints, Work { joints, ..w }.epoch());
-        tell(
-            "decision",
-            "joints",
-            joints,
-            Work { joints, ..w }.decision(),
-        );
-    }
-    for width in WIDTHS {
-        tell(
-            "epoch",
-            "neurons of a layer",
-            width,
-            Work { width, ..w }.epoch(),
-        );
-        tell(
-            "decision",
-            "neurons of a layer",
-            width,
-            Work { width, ..w }.decision(),
-        );
-    }
-    for horizon in [10, 20, 40, 80, 160, 320] {
-        tell(
-            "decision",
-            "horizon",
-            horizon,
-            Work { horizon, ..w }.decision(),
-        );
-    }
-    for population in [32, 100, 300, 1000, 3000, 10_000] {
-        tell(
-            "decision",
-            "population",
-            population,
-            Work { population, ..w }.decision(),
-        );
-    }
-    for duration_s in [10, 20, 40, 80, 160, 320] {
-        tell(
-            "identification",
-            "seconds of log",
-            duration_s,
-            identification(duration_s as f64),
-        );
-    }
+    let layer = "neurons of a layer";
+    sweep("epoch", "transitions", TRANSITIONS, |transitions| {
+        Work { transitions, ..w }.epoch()
+    });
+    sweep("epoch", "steps of a segment", STEPS, |steps| {
+        Work { steps, ..w }.epoch()
+    });
+    sweep("epoch", "joints", JOINTS, |joints| {
+        Work { joints, ..w }.epoch()
+    });
+    sweep("decision", "joints", JOINTS, |joints| {
+        Work { joints, ..w }.decision()
+    });
+    sweep("epoch", layer, WIDTHS, |width| Work { width, ..w }.epoch());
+    sweep("decision", layer, WIDTHS, |width| {
+        Work { width, ..w }.decision()
+    });
+    sweep("decision", "horizon", HORIZONS, |horizon| {
+        Work { horizon, ..w }.decision()
+    });
+    sweep("decision", "population", POPULATIONS, |population| {
+        Work { population, ..w }.decision()
+    });
+    sweep("identification", "seconds of log", DURATIONS, |seconds| {
+        identification(seconds as f64)
+    });
 }

@@ -3,22 +3,22 @@
 //!
 //!     instructions WORK TIMES
 
+mod work;
+
 use std::hint::black_box;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use residyn::data::Log;
 use residyn::identify::{Shooting, cut, predicted_cost};
-use residyn::model::{Dynamics, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model};
-use residyn::plan::Objective;
+use residyn::model::{Library, MlpSettings, MlpWeights};
 use residyn::plant::Plant;
-use residyn::sim::Integrator;
-use residyn::sim::batch::{Rollouts, Rows};
-use residyn::train::{Backend, FitSettings, HybridModel, Segments, Training};
+use residyn::sim::batch::Rows;
 
-const STEP_S: f64 = 0.02;
+use work::{dynamics, rollouts, segments, training};
+
 /// Steps of a rollout.
 const HORIZON: usize = 30;
 /// Transitions of a training epoch.
@@ -45,35 +45,15 @@ fn main() {
     }
 }
 
-fn system(name: &str) -> Model {
-    let system = Library::built_in().model(Path::new(name));
-    system.expect("a built-in system")
-}
-
-fn dynamics(name: &str) -> Dynamics {
-    let system = system(name);
-    system.dynamics()
-}
-
 /// The published network for so many joints.
 fn network(joints: usize) -> MlpWeights {
-    let settings = MlpSettings::for_joints(joints);
-    let scaling = InputScaling::identity(settings.angles.features(joints));
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    MlpWeights::new(joints, &settings, scaling, LastLayer::Random, &mut rng)
+    work::network(joints, &MlpSettings::for_joints(joints))
 }
 
 /// Rollouts of one block of candidates.
 fn rollout(name: &str, reward: &str, times: usize) {
     let dynamics = dynamics(name);
-    let objective = Objective::new(reward, dynamics.joints).expect("a formula");
-    let rollouts = Rollouts::new(
-        &dynamics,
-        &[network(dynamics.joints)],
-        objective.program(),
-        Integrator::default(),
-        STEP_S,
-    );
+    let rollouts = rollouts(&dynamics, network(dynamics.joints), reward);
     let mut block = rollouts.block();
     let start = vec![0.1; 2 * dynamics.joints];
     let inputs = vec![Rows::splat(0.1); HORIZON * dynamics.joints];
@@ -84,35 +64,11 @@ fn rollout(name: &str, reward: &str, times: usize) {
     }
 }
 
-/// Transitions between random states.
-fn transitions(joints: usize) -> Segments {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let mut draw =
-        |count: usize| -> Vec<f64> { (0..count).map(|_| rng.random_range(-3.0..3.0)).collect() };
-    let mut segments = Segments::new(joints, 1);
-    for _ in 0..TRANSITIONS {
-        let (states, inputs) = (draw(4 * joints), draw(2 * joints));
-        segments
-            .push_trajectory(&[0.0, STEP_S], &states, &inputs, 1)
-            .expect("two rows are a transition");
-    }
-    segments
-}
-
 /// Epochs of one training.
 fn epochs(name: &str, times: usize) {
     let dynamics = dynamics(name);
-    let segments = transitions(dynamics.joints);
-    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device())
-        .and_then(|model| model.with_residual(&network(dynamics.joints)))
-        .expect("a model of this system");
-    let settings = FitSettings {
-        epochs: times,
-        record_every: times.try_into().expect("at least once"),
-        ..FitSettings::default()
-    };
-    let training = Training::new(model, settings, ChaCha8Rng::seed_from_u64(3));
-    let mut training = training.expect("settings in range");
+    let segments = segments(dynamics.joints, 1, TRANSITIONS);
+    let mut training = training(&dynamics, &network(dynamics.joints), times);
     let ended = training.run(&segments, None, &mut |_| ControlFlow::Continue(()));
     black_box(ended.expect("training does not diverge"));
 }

@@ -107,7 +107,7 @@ fn model_message(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn a_model_file_is_refused_with_line_column_and_the_near_name() {
+fn errors_in_model_files_name_line_column_and_a_similar_name() {
     let cases: &[(&str, &str, &[&str])] = &[
         (
             "C_g * sin",
@@ -150,7 +150,7 @@ fn a_model_file_is_refused_with_line_column_and_the_near_name() {
 }
 
 #[test]
-fn an_unknown_effect_in_a_model_file_is_met_with_the_near_one() {
+fn an_unknown_effect_in_a_model_file_suggests_a_similar_one() {
     let effect = "[[effect]]\nname = \"coulom_friction\"\njoint = 1\nF_c = 0.1\n\n[energy]";
     says(
         &model_message("[energy]", effect),
@@ -196,7 +196,7 @@ fn an_effect_that_cannot_act_is_refused() {
 }
 
 #[test]
-fn an_effect_file_says_per_what_a_parameter_differs() {
+fn per_takes_no_value_but_log() {
     let contents = "[effect]\nname = \"zero\"\nabout = \"zero\"\nangle = \"q - z\"\n\n[parameters]\n\
                 z = { unit = \"rad\", typical = 0.1, per = \"week\" }\n";
     let effect = scratch("zero.toml", contents);
@@ -212,7 +212,7 @@ fn an_effect_file_says_per_what_a_parameter_differs() {
 }
 
 #[test]
-fn values_of_single_logs_are_for_parameters_that_have_them() {
+fn only_parameters_per_log_take_values_of_single_logs() {
     let effect = |text: &str| model_message("[energy]", &format!("[[effect]]\n{text}\n\n[energy]"));
     says(
         &effect("name = \"viscous_friction\"\njoint = 1\nb = { value = 1, logs = { a = 1 } }"),
@@ -225,7 +225,7 @@ fn values_of_single_logs_are_for_parameters_that_have_them() {
 }
 
 #[test]
-fn a_model_that_is_not_there_is_met_with_what_is() {
+fn a_missing_model_is_answered_with_the_known_ones() {
     says(
         &scratch("log.csv", GOOD).closeloop("pendulun"),
         &["pendulun", "acrobot, cartpole, drive, pendulum"],
@@ -287,7 +287,7 @@ fn leave_out_must_name_a_log_and_a_time() {
 }
 
 #[test]
-fn a_checkpoint_must_be_one() {
+fn a_folder_that_is_no_checkpoint_is_refused() {
     let log = scratch("log.csv", GOOD);
     let evaluate =
         |dir: &str| refuses(&["evaluate", "--checkpoint", dir, "--test", text(&log.file)]);
@@ -381,7 +381,7 @@ fn good_input_is_not_refused() {
 }
 
 #[test]
-fn a_cause_is_told_once() {
+fn an_error_states_its_cause_once() {
     let folder = tempfile::tempdir().unwrap();
     let (missing, out) = (folder.path().join("none.toml"), folder.path().join("out"));
     let paths = ["--config", text(&missing), "--out", text(&out)];

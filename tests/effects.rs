@@ -85,7 +85,7 @@ fn points_and_edges(model: &residyn::model::Dynamics, joint: usize) -> Vec<Vec<f
 }
 
 #[test]
-fn effects_of_force_and_torque_do_what_their_row_says() {
+fn force_and_torque_effects_match_their_formulas() {
     let library = Library::built_in();
     for (name, meaning) in MEANINGS {
         let effect = library.effect(name).unwrap();
@@ -178,7 +178,7 @@ fn a_tilt_turns_gravity() {
 
 /// In logged angles: whatever the rig's own angle does, the logged one less the offset does.
 #[test]
-fn an_offset_sensor_reads_another_angle_than_the_rig_has() {
+fn a_sensor_offset_shifts_the_measured_angle_alone() {
     let library = Library::built_in();
     let effect = |name: &str, values: &[f64]| fitted(library.effect(name).unwrap(), 0, values);
     let others = [

@@ -216,7 +216,7 @@ fn the_compiled_header_predicts_what_the_program_does() {
 }
 
 #[test]
-fn in_single_precision_it_is_as_close_as_that_allows() {
+fn the_header_in_float_agrees_to_single_precision() {
     for header in headers(&["cc"]) {
         let samples = header.model.samples(&mut rng(4)).unwrap();
         let own = header.model.predict(&samples).unwrap();
@@ -231,7 +231,7 @@ fn in_single_precision_it_is_as_close_as_that_allows() {
 }
 
 #[test]
-fn nothing_is_read_or_written_where_it_must_not_be() {
+fn the_header_has_no_invalid_access_or_undefined_behaviour() {
     let flags = [
         "-g",
         "-fsanitize=address,undefined",
@@ -250,7 +250,7 @@ fn nothing_is_read_or_written_where_it_must_not_be() {
 }
 
 #[test]
-fn nothing_is_read_before_it_is_written() {
+fn the_header_reads_no_uninitialised_memory() {
     for header in headers(&["cc", "valgrind"]) {
         let mut samples = header.model.samples(&mut rng(5)).unwrap();
         samples.states.truncate(16);
@@ -300,7 +300,7 @@ fn no_compiler_warns() {
 }
 
 #[test]
-fn jacobians_are_the_slopes() {
+fn exported_jacobians_match_finite_differences() {
     for header in headers(&["cc"]) {
         let samples = header.model.samples(&mut rng(6)).unwrap();
         let worst = header.ask("tests/clients/jacobian.c", &["-O2"], &question(&samples));
@@ -312,7 +312,7 @@ fn jacobians_are_the_slopes() {
 
 /// Steps of varying length, so that a delay spans few or many of them.
 #[test]
-fn torques_act_as_the_filters_say_whatever_the_steps() {
+fn filtered_torques_are_exact_for_steps_of_any_length() {
     let filtered = |header: &Header| !header.model.equations.filters.is_empty();
     for header in headers(&["cc"]).into_iter().filter(filtered) {
         let (mut random, n, steps) = (rng(8), header.model.joints(), 200);

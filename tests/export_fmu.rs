@@ -54,7 +54,7 @@ fn a_simulator_predicts_what_the_program_does() {
 
 /// What a solver of its own may differ by is the step's own error, and that of straight lines through a delay.
 #[test]
-fn a_simulator_can_tune_keep_and_differentiate_it() {
+fn a_simulator_can_tune_save_and_differentiate_a_unit() {
     for ((name, parameter, tuned, solver_tolerance), format) in each(vec![
         (
             "pendulum_effects",

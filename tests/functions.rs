@@ -213,7 +213,7 @@ fn a_smooth_sign_is_a_tanh_of_its_width() {
 
 /// What is not a number must be seen at the end, by every reader.
 #[test]
-fn what_is_not_a_number_spreads() {
+fn nan_propagates() {
     let nan = f64::NAN;
     for formula in [
         "min(x, y)",

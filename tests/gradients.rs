@@ -65,7 +65,7 @@ fn smooth_point(model: &Dynamics, rng: &mut ChaCha8Rng) -> (Vec<f64>, Vec<Vec<f6
 }
 
 #[test]
-fn gradients_are_the_slopes_that_differences_see() {
+fn gradients_match_finite_differences() {
     let mut rng = rng(21);
     for case in cases() {
         let jacobian = jacobian(&case.dynamics);
@@ -85,7 +85,7 @@ fn gradients_are_the_slopes_that_differences_see() {
 }
 
 #[test]
-fn gradients_in_f32_lanes_are_those_in_f64() {
+fn gradients_in_f32_lanes_agree_with_f64() {
     for (k, case) in cases().enumerate() {
         let jacobian = jacobian(&case.dynamics);
         let points = points(&case.dynamics, ROWS, k as u64);

@@ -143,7 +143,7 @@ fn the_mass_matrix_is_symmetric_and_positive() {
 
 /// No change of one parameter can be compensated by the others: the derivatives of the torques are independent.
 #[test]
-fn all_parameters_can_be_told_apart() {
+fn base_parameters_are_linearly_independent() {
     for name in FILES {
         let system = system(&chain(name));
         let model = comparable(&system);
@@ -202,7 +202,7 @@ fn a_planar_arm_has_the_parameters_of_a_textbook() {
 }
 
 #[test]
-fn what_is_not_carried_is_noted() {
+fn properties_that_are_not_carried_are_noted() {
     let notes = chain("prr.xml").notes;
     assert_eq!(
         notes,
@@ -220,7 +220,7 @@ fn what_is_not_carried_is_noted() {
 }
 
 #[test]
-fn the_command_writes_what_other_commands_take() {
+fn new_writes_a_model_file_that_other_commands_read() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("arm.toml");
     let file = fixture("planar_2r.urdf");
@@ -262,7 +262,7 @@ fn message(name: &str, from: &str, to: &str) -> String {
 }
 
 #[test]
-fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
+fn anything_but_a_serial_chain_is_refused_with_place_and_remedy() {
     let cases: &[(&str, &str, &str, &[&str])] = &[
         (
             "planar_2r.urdf",
@@ -422,7 +422,7 @@ fn what_is_no_serial_chain_is_refused_with_place_and_remedy() {
 }
 
 #[test]
-fn the_other_format_is_named() {
+fn a_file_of_the_other_format_is_recognised() {
     let file = fixture("rp.xml");
     let said = refuses(&["new", "--from-urdf", text(&file)]);
     assert!(said.contains("this is MJCF, read it as mjcf"), "{said}");

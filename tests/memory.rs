@@ -82,7 +82,7 @@ fn stepped(delay: f64, lag: f64, from: f64, to: f64, parts: usize) -> Vec<f64> {
 }
 
 #[test]
-fn mean_torques_are_those_of_fine_steps() {
+fn mean_torques_match_those_of_fine_steps() {
     for (delay, lag) in [(DELAY_S, 0.0), (0.0, LAG_S), (DELAY_S, LAG_S), (0.02, 1e-5)] {
         let model = drive(&[effect("actuator_delay", delay), effect("actuator_lag", lag)]);
         for (from, to, parts) in [
@@ -111,7 +111,7 @@ fn without_delay_and_lag_the_command_acts() {
 }
 
 #[test]
-fn no_time_moves_nothing() {
+fn a_step_of_no_length_changes_nothing() {
     let model = drive(&[effect("actuator_delay", 0.0), effect("actuator_lag", 0.0)]);
     let (mean, slopes) = means(&model, 100.0, 100.0, 2);
     assert!(mean.iter().chain(&slopes).all(|x| *x == 0.0));
@@ -163,7 +163,7 @@ fn logs(model: &Dynamics) -> Vec<Log> {
 }
 
 #[test]
-fn a_delay_and_a_lag_come_back_within_their_intervals() {
+fn fitted_delay_and_lag_lie_within_their_intervals() {
     for (name, truth) in [("actuator_delay", DELAY_S), ("actuator_lag", LAG_S)] {
         let rig = pendulum(&[effect(name, truth)]);
         let logs = logs(&rig);
@@ -255,7 +255,7 @@ fn closing_the_loop_names_the_effect_with_memory() {
 }
 
 #[test]
-fn what_has_no_past_cannot_carry_a_delay() {
+fn independent_transitions_are_refused_for_a_rig_with_delay() {
     let recipe = include_str!("../configs/smoke/train-pendulum.toml");
     assert!(recipe.contains("plant = "));
     let folder = tempfile::tempdir().unwrap();
@@ -288,7 +288,7 @@ fn refused(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn a_filter_that_is_none_is_refused_with_its_line() {
+fn an_invalid_filter_is_refused_with_its_line() {
     let kind = refused("\"delay\"", "\"late\"");
     assert!(
         kind.contains("line 4") && kind.contains("\"delay\" or \"lag\""),
@@ -309,7 +309,7 @@ fn a_filter_that_is_none_is_refused_with_its_line() {
 }
 
 #[test]
-fn expressions_say_what_becomes_of_the_command() {
+fn expressions_of_filters_state_what_they_do_to_the_command() {
     let told = |name: &str, own: &str| effect(name, 0.01).expression(&[own.to_owned()]);
     assert_eq!(told("actuator_delay", "d1"), "tau1(t - d1)");
     assert_eq!(
@@ -327,7 +327,7 @@ fn backlash(delta: f64, driven: f64) -> FittedEffect {
 }
 
 #[test]
-fn play_parts_the_sensor_from_the_link() {
+fn play_separates_the_measured_angle_from_the_links() {
     for (driven, [v, tau], ahead) in [
         (1.0, [2.0, 0.5], 0.01),
         (1.0, [2.0, -0.5], -0.01),
@@ -354,7 +354,7 @@ fn play_parts_the_sensor_from_the_link() {
 }
 
 #[test]
-fn play_comes_back_within_its_interval() {
+fn fitted_play_lies_within_its_interval() {
     for driven in [0.0, 1.0] {
         let rig = pendulum(&[backlash(0.01, driven)]);
         let logs = logs(&rig);

@@ -174,7 +174,7 @@ fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> Ml
 }
 
 #[test]
-fn the_models_are_of_every_kind() {
+fn the_exported_models_cover_every_kind() {
     let models = all();
     let some = |kind: fn(&ExportModel) -> bool| models.iter().any(|(_, model)| kind(model));
     assert!(some(|m| m.prior.is_none()

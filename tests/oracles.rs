@@ -92,7 +92,7 @@ fn drive(x: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn systems_are_the_equations_written_by_hand() {
+fn systems_match_equations_written_by_hand() {
     for (name, oracle) in ORACLES {
         let model = dynamics(&system(name), &[], SignForm::Exact);
         let n = model.joints;

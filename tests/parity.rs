@@ -28,7 +28,7 @@ fn cases() -> impl Iterator<Item = (String, Program, Vec<Vec<f64>>)> {
 }
 
 #[test]
-fn eight_lanes_are_one_lane() {
+fn eight_lanes_give_the_values_of_one() {
     for (name, program, points) in cases() {
         let mut tape = program.tape::<f64, 8>();
         for points in points.chunks_exact(8) {
@@ -46,7 +46,7 @@ fn eight_lanes_are_one_lane() {
 }
 
 #[test]
-fn sixteen_lanes_of_f32_are_f64() {
+fn sixteen_lanes_of_f32_agree_with_f64() {
     for (name, program, points) in cases() {
         compare(&name, &program, &points, &in_f32(&program, &points));
     }
@@ -128,7 +128,7 @@ fn compare(name: &str, program: &Program, points: &[Vec<f64>], found: &[Vec<f64>
 }
 
 #[test]
-fn the_catalog_is_whole() {
+fn the_catalog_covers_every_system_and_effect() {
     // 4 systems and 6 joints; 26 shapes (18 effects, 7 probes, a user's own) on each joint, but no
     // tilt on a second joint and no rotor in the pendulum.
     assert_eq!(catalog(SignForm::Exact).len(), 4 + 6 * 26 - 2 - 1);

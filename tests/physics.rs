@@ -94,7 +94,7 @@ fn imbalance(system: &Model) -> f64 {
 }
 
 #[test]
-fn energy_less_work_stays_over_five_seconds() {
+fn energy_minus_work_is_constant_over_five_seconds() {
     for system in all_systems() {
         let off = imbalance(&system);
         // 50 000 sums whose rounding (1e-16 of some tens of J) walks at random. Measured: pendulum 4e-12,
@@ -104,7 +104,7 @@ fn energy_less_work_stays_over_five_seconds() {
 }
 
 #[test]
-fn the_acrobot_as_printed_makes_energy_from_nothing() {
+fn the_acrobot_as_printed_violates_the_energy_balance() {
     let text = include_str!("fixtures/acrobot_as_printed.toml");
     let printed = Model::from_text(Path::new("acrobot_as_printed.toml"), text, &[]).unwrap();
     let off = imbalance(&printed);
@@ -122,7 +122,7 @@ fn swung(scheme: &'static Scheme, steps: usize) -> [f64; 2] {
 }
 
 #[test]
-fn each_scheme_is_of_its_order() {
+fn each_scheme_converges_with_its_order() {
     // At 2^-12 s the error of order 4 is 2^-20 of that at 2^-7 s: as good as none.
     let truth = swung(RK4, 4096);
     for scheme in SCHEMES {
@@ -144,7 +144,7 @@ fn each_scheme_is_of_its_order() {
 }
 
 #[test]
-fn lanes_with_steps_of_their_own_do_not_disturb_each_other() {
+fn lanes_with_different_steps_are_independent() {
     let model = dynamics(&system("acrobot"), &[], SignForm::Exact);
     let lane = |l: usize| [0.2 * l as f64, 1.0 - 0.1 * l as f64, 0.3, -0.5 * l as f64];
     let (tau, dt) = (
@@ -181,7 +181,7 @@ fn lanes_with_steps_of_their_own_do_not_disturb_each_other() {
 }
 
 #[test]
-fn the_rollout_tells_the_equations_the_time() {
+fn rollouts_pass_the_time_to_the_equations() {
     // qdd = t from rest: v = t^2 / 2, q = t^3 / 6, which a method of order 4 finds exactly.
     let text = "[system]\nname = \"clock\"\njoints = 1\n[dynamics]\nqdd1 = \"t\"\n";
     let clock = Model::from_text(Path::new("clock.toml"), text, &[]).unwrap();

@@ -147,14 +147,14 @@ fn driven() -> Vec<(&'static str, ExportModel)> {
 }
 
 #[test]
-fn mujoco_moves_mjcf_alike() {
+fn mujoco_integrates_written_mjcf_to_the_same_states() {
     client_agrees(find("mjcf").unwrap(), &plain());
     client_agrees(find("mjcf").unwrap(), &driven());
     client_agrees(find("mjcf").unwrap(), &stated());
 }
 
 #[test]
-fn mujoco_moves_urdf_alike() {
+fn mujoco_integrates_written_urdf_to_the_same_states() {
     client_agrees(find("urdf").unwrap(), &plain());
 }
 
@@ -181,7 +181,7 @@ fn a_lag_has_the_same_derivative() {
 }
 
 #[test]
-fn what_is_written_is_read_back_to_the_same_accelerations() {
+fn written_mechanisms_read_back_with_the_same_accelerations() {
     let library = Library::built_in();
     for (name, model) in plain() {
         let folder = tempfile::tempdir().unwrap();
@@ -209,7 +209,7 @@ fn what_is_written_is_read_back_to_the_same_accelerations() {
 }
 
 #[test]
-fn what_is_not_carried_is_said() {
+fn parts_that_are_not_carried_are_listed() {
     let rest = effect("stribeck_friction", 1, "F_c = 0.1\nF_s = 0.2\nv_s = 0.1")
         + &effect("rotor_inertia", 2, "J = 0.1")
         + &effect("actuator_gain", 2, "g = 0.5");
@@ -231,7 +231,7 @@ fn what_is_not_carried_is_said() {
 }
 
 #[test]
-fn what_is_no_mechanism_is_refused() {
+fn equations_of_no_mechanism_cannot_be_exported() {
     let all = models::all();
     let (_, data) = all
         .iter()
@@ -268,7 +268,7 @@ fn what_is_no_mechanism_is_refused() {
 }
 
 #[test]
-fn the_command_says_what_is_lost_and_measures_the_rest() {
+fn export_lists_losses_and_measures_the_difference() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("cartpole.xml");
     let run = residyn(&[

@@ -1,15 +1,14 @@
 use std::fmt;
 use std::ops::Range;
 
-/// What is wrong with a formula, and where. Its [`Display`](fmt::Display) shows the formula with a
-/// caret below the offending place.
+/// An error in a formula, and its place. [`Display`](fmt::Display) shows the formula with carets below that place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FormulaError {
     /// The whole formula as written.
     pub formula: String,
     /// Byte range of the offending place within `formula`.
     pub span: Range<usize>,
-    /// What is wrong and, where one is near, the name that was probably meant.
+    /// The error and, where one is similar, the name that was probably meant.
     pub message: String,
 }
 
@@ -35,14 +34,14 @@ impl fmt::Display for FormulaError {
     }
 }
 
-/// The candidate nearest to `name`, if one is near enough to be a slip of the hand.
+/// The candidate most similar to `name`, if the difference may be a typing error.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name = name.to_lowercase();
     candidates
         .into_iter()
         .map(|c| (distance(&name, &c.to_lowercase()), c))
         .filter(|(distance, c)| *distance <= 1 + c.len().max(name.len()) / 4)
-        // Equal distances are told apart by the shared beginning.
+        // Ties are broken by the common prefix.
         .min_by(|a, b| {
             let likeness = |c: &str| strsim::jaro_winkler(&name, &c.to_lowercase());
             a.0.cmp(&b.0).then(likeness(b.1).total_cmp(&likeness(a.1)))
@@ -50,7 +49,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, c)| c)
 }
 
-/// Slips of the hand between two names; a beginning of at least four letters stands for the whole.
+/// Number of typing errors between two names; a prefix of at least four letters counts as one.
 fn distance(name: &str, candidate: &str) -> usize {
     if name.len() >= 4 && candidate.starts_with(name) {
         return 1;

@@ -1,7 +1,7 @@
 use std::marker::PhantomData;
 
 use super::Program;
-use super::op::Op;
+use super::op::{Binary, Op, Unary};
 use super::places::Places;
 use super::steps::{Kind, Step};
 use crate::lanes::{Element, Row, Simd, Vector, WithSimd};
@@ -236,9 +236,8 @@ impl<S: Simd, T: Element, const W: usize> Values<'_, S, T, W> {
     #[inline(always)]
     fn carry_out(&mut self, kind: Kind, steps: &[Step]) {
         match kind {
-            Kind::Neg => each!(self, steps, |a| -a),
-            Kind::Sin => each!(self, steps, |a| a.sin()),
-            Kind::Cos => each!(self, steps, |a| a.cos()),
+            Kind::Unary(op) => self.unary(op, steps),
+            Kind::Binary(op) => self.binary(op, steps),
             Kind::SinCos => {
                 for &step in steps {
                     for part in 0..Row::<T, W>::parts::<S>() {
@@ -248,28 +247,43 @@ impl<S: Simd, T: Element, const W: usize> Values<'_, S, T, W> {
                     }
                 }
             }
-            Kind::Tan => each!(self, steps, |a| a.tan()),
-            Kind::Exp => each!(self, steps, |a| a.exp()),
-            Kind::Log => each!(self, steps, |a| a.ln()),
-            Kind::Sqrt => each!(self, steps, |a| a.sqrt()),
-            Kind::Abs => each!(self, steps, |a| a.abs()),
-            Kind::Sign => each!(self, steps, |a| a.sign()),
-            Kind::Tanh => each!(self, steps, |a| a.tanh()),
             Kind::Reciprocal => each!(self, steps, |a| a.like(1.0) / a),
-            Kind::Add => each!(self, steps, |a, b| a + b),
-            Kind::Sub => each!(self, steps, |a, b| a - b),
-            Kind::Mul => each!(self, steps, |a, b| a * b),
-            Kind::Div => each!(self, steps, |a, b| a / b),
-            Kind::Pow => each!(self, steps, |a, b| a.pow(b)),
-            Kind::Atan2 => each!(self, steps, |a, b| a.atan2(b)),
-            // NaN propagates.
-            Kind::Min => each!(self, steps, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
-            Kind::Max => each!(self, steps, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
-            Kind::Less => each!(self, steps, |a, b| a.if_less(b, a.like(1.0), a.like(0.0))),
             Kind::Where => each!(self, steps, |a, b, c| c.like(0.0).if_less(c, a, b)),
             Kind::MulAdd => each!(self, steps, |a, b, c| a.mul_add(b, c)),
             Kind::MulSub => each!(self, steps, |a, b, c| a.mul_add(b, -c)),
             Kind::SubMul => each!(self, steps, |a, b, c| (-a).mul_add(b, c)),
+        }
+    }
+
+    #[inline(always)]
+    fn unary(&mut self, op: Unary, steps: &[Step]) {
+        match op {
+            Unary::Neg => each!(self, steps, |a| -a),
+            Unary::Sin => each!(self, steps, |a| a.sin()),
+            Unary::Cos => each!(self, steps, |a| a.cos()),
+            Unary::Tan => each!(self, steps, |a| a.tan()),
+            Unary::Exp => each!(self, steps, |a| a.exp()),
+            Unary::Log => each!(self, steps, |a| a.ln()),
+            Unary::Sqrt => each!(self, steps, |a| a.sqrt()),
+            Unary::Abs => each!(self, steps, |a| a.abs()),
+            Unary::Sign => each!(self, steps, |a| a.sign()),
+            Unary::Tanh => each!(self, steps, |a| a.tanh()),
+        }
+    }
+
+    #[inline(always)]
+    fn binary(&mut self, op: Binary, steps: &[Step]) {
+        match op {
+            Binary::Add => each!(self, steps, |a, b| a + b),
+            Binary::Sub => each!(self, steps, |a, b| a - b),
+            Binary::Mul => each!(self, steps, |a, b| a * b),
+            Binary::Div => each!(self, steps, |a, b| a / b),
+            Binary::Pow => each!(self, steps, |a, b| a.pow(b)),
+            Binary::Atan2 => each!(self, steps, |a, b| a.atan2(b)),
+            // NaN propagates.
+            Binary::Min => each!(self, steps, |a, b| a.if_less(b, a, a.if_equal(a, b, a))),
+            Binary::Max => each!(self, steps, |a, b| b.if_less(a, a, a.if_equal(a, b, a))),
+            Binary::Less => each!(self, steps, |a, b| a.if_less(b, a.like(1.0), a.like(0.0))),
         }
     }
 

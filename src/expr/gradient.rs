@@ -1,9 +1,9 @@
-use super::graph::{Graph, Node};
-use super::op::{Binary, Op, Unary};
+use super::graph::Graph;
+use super::op::{Binary, Node, Op, Unary};
 
 impl Graph {
     /// Reverse mode: the gradient of `sum_k seeds[k] * outputs[k]` with respect to each of `wrt`,
-    /// as further nodes of this graph. Every reader of programs is thereby a reader of gradients.
+    /// as further nodes of this graph, so that gradients are evaluated and printed as programs are.
     ///
     /// `sign`, comparisons and the condition of `where` count as constant.
     pub fn gradient(&mut self, outputs: &[Node], seeds: &[Node], wrt: &[Node]) -> Vec<Node> {

@@ -1,21 +1,10 @@
 use std::collections::HashMap;
 
 use super::Program;
-use super::op::{Binary, Op, Unary};
+use super::op::{Binary, Node, Op, Unary};
 
-/// A value in a [`Graph`] or [`Program`]: the position of the operation that makes it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Node(pub(super) u32);
-
-impl Node {
-    /// Its place in the list of operations.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-}
-
-/// A growing program. Equal operations are stored once (hash-consing), constants are folded, and an
-/// operand always stands before its user, so that the list is its own evaluation order.
+/// A program under construction. Equal operations are stored once (hash-consing), constants are folded, and operands
+/// precede the operations that use them, so that the list is in evaluation order.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
     pub(super) ops: Vec<Op>,
@@ -69,7 +58,7 @@ impl Graph {
             | (Binary::Mul | Binary::Div | Binary::Pow, _, Some(1.0)) => a,
             (Binary::Sub, Some(0.0), _) | (Binary::Mul, Some(-1.0), _) => self.unary(Unary::Neg, b),
             (Binary::Mul, _, Some(-1.0)) => self.unary(Unary::Neg, a),
-            // A factor of exactly zero comes from a derivative that does not exist on this path.
+            // An exact zero is a derivative that vanishes identically, whatever the other factor is.
             (Binary::Mul, Some(0.0), _)
             | (Binary::Mul, _, Some(0.0))
             | (Binary::Div, Some(0.0), _) => self.constant(0.0),
@@ -160,7 +149,7 @@ impl Graph {
         x
     }
 
-    /// Close the program over these outputs; operations that no output needs are dropped.
+    /// The finished program with these outputs; operations that no output needs are dropped.
     pub fn finish(self, outputs: &[Node]) -> Program {
         Program::compact(self.ops, self.inputs, self.labels, outputs)
     }

@@ -1,5 +1,5 @@
-use super::op::Op;
-use super::{Graph, Node, Program};
+use super::op::{Node, Op};
+use super::{Graph, Program};
 
 impl Graph {
     /// Write `program` into this graph with its inputs replaced by `inputs`, so that programs can be
@@ -38,16 +38,12 @@ impl Graph {
 
 #[cfg(test)]
 mod tests {
-    use crate::expr::{Graph, Scope, SignForm, parse};
+    use crate::expr::{Graph, Scope, parse};
 
     #[test]
-    fn an_appended_program_is_the_composed_function() {
+    fn an_appended_program_is_a_composition() {
         let mut inner = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        for name in ["a", "b"] {
-            let node = inner.input(name);
-            scope.bind(name, node);
-        }
+        let scope = Scope::of_inputs(&mut inner, ["a", "b"]);
         let formula = parse("where(a < b, sin(a) * 2, b^3 - max(a, 1))").unwrap();
         let output = scope.lower(&mut inner, &formula).unwrap();
         let inner = inner.finish(&[output, output]);

@@ -10,6 +10,8 @@ mod eval;
 mod gradient;
 mod graph;
 mod inline;
+mod latex;
+mod notation;
 mod op;
 mod parse;
 mod places;
@@ -20,9 +22,11 @@ mod steps;
 
 pub use error::{FormulaError, suggestion};
 pub use eval::Tape;
-pub use graph::{Graph, Node};
-pub use op::{Binary, Op, Unary};
+pub use graph::Graph;
+pub use latex::latex_name;
+pub use notation::{Notation, Part};
+pub use op::{Binary, Node, Op, Unary};
 pub use parse::{Formula, parse};
-pub use print::{Notation, Part, latex_name};
+
 pub use program::Program;
 pub use scope::{Scope, SignForm};

@@ -1,6 +1,15 @@
 use serde::{Deserialize, Serialize};
 
-use super::Node;
+/// A value in a [`Graph`](super::Graph) or [`Program`](super::Program): the position of the operation that computes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Node(pub(super) u32);
+
+impl Node {
+    /// Its place in the list of operations.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// Functions of one value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -47,7 +56,7 @@ pub enum Op {
     Where(Node, Node, Node),
 }
 
-/// Every function that a formula may call, with what it becomes.
+/// The functions that a formula may call, and their operations.
 pub(super) const FUNCTIONS: &[(&str, Function)] = &[
     ("abs", Function::Unary(Unary::Abs)),
     ("atan2", Function::Binary(Binary::Atan2)),
@@ -79,7 +88,7 @@ impl Function {
         FUNCTIONS.iter().find(|(n, _)| *n == name).map(|(_, f)| *f)
     }
 
-    /// The arguments that it takes, as a reminder for error messages.
+    /// Names of its arguments, for error messages.
     pub(super) fn arguments(self) -> &'static [&'static str] {
         match self {
             Self::Unary(_) | Self::Sign => &["x"],
@@ -92,7 +101,7 @@ impl Function {
 }
 
 impl Op {
-    /// The nodes that it reads.
+    /// Its operands.
     pub fn operands(self) -> impl Iterator<Item = Node> {
         let operands = match self {
             Self::Const(_) | Self::Input(_) => [None; 3],
@@ -126,7 +135,7 @@ impl Unary {
             Self::Log => a.ln(),
             Self::Sqrt => a.sqrt(),
             Self::Abs => a.abs(),
-            // Unlike the standard library's signum, zero stays zero: a joint at rest feels no dry friction.
+            // Unlike the standard library's signum, zero at zero: no dry friction acts on a joint at rest.
             Self::Sign if a == T::zero() => T::zero(),
             Self::Sign => a.signum(),
             Self::Tanh => a.tanh(),
@@ -143,7 +152,7 @@ impl Binary {
             Self::Div => a / b,
             Self::Pow => a.powf(b),
             Self::Atan2 => a.atan2(b),
-            // Comparisons, not the standard min and max, so that NaN spreads instead of vanishing.
+            // Comparisons, not the standard min and max, so that NaN propagates.
             Self::Min if a.is_nan() || a < b => a,
             Self::Max if a.is_nan() || a > b => a,
             Self::Min | Self::Max => b,

@@ -72,7 +72,7 @@ impl Term {
 /// Operators by rising precedence: `< > <= >=`, `+ -`, `* /`, unary `-`, `^` (to the right).
 ///
 /// # Errors
-/// A [`FormulaError`] that points at the first place that cannot be understood.
+/// A [`FormulaError`] that points at the first place that cannot be parsed.
 pub fn parse(text: &str) -> Result<Formula, FormulaError> {
     let mut parser = Parser { text, at: 0 };
     let root = parser.infix(0)?;

@@ -32,7 +32,7 @@ impl Places {
         }
     }
 
-    /// Rewrite steps from values to places, where every result is permanent.
+    /// Rewrite steps from values to places; every result gets a permanent place.
     pub fn settle(&mut self, steps: &mut [Step]) {
         for step in steps {
             for value in step.writes() {

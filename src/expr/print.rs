@@ -1,75 +1,23 @@
+//! Prints programs: assignments and formulas in any notation.
+
 use std::collections::{HashMap, HashSet};
 
-use super::op::{Binary, Op, Unary};
-use super::{Node, Program};
-
-/// How one language writes what a program can do. Strings come with the strength with which they
-/// bind, so that parentheses stand only where they must. What is not said otherwise is written as most
-/// programming languages do.
-pub trait Notation {
-    /// A constant; it may be negative.
-    fn number(&self, value: f64) -> String;
-    /// An input, an output or an intermediate.
-    fn name(&self, name: &str) -> String;
-    /// `a` to the power of `b`; squares and cubes come with a whole number for `b`.
-    fn power(&self, a: Part, b: Part) -> Part;
-    /// `a` where `condition` is positive, else `b`.
-    fn choice(&self, condition: &Part, a: &str, b: &str) -> String;
-
-    fn call(&self, function: &str, arguments: &[String]) -> String {
-        format!("{function}({})", arguments.join(", "))
-    }
-
-    fn parenthesis(&self, inner: &str) -> String {
-        format!("({inner})")
-    }
-
-    fn product(&self, a: &str, b: &str) -> String {
-        format!("{a} * {b}")
-    }
-
-    fn quotient(&self, a: Part, b: Part) -> Part {
-        let (a, b) = (a.binding(self, PRODUCT), b.binding(self, PRODUCT + 1));
-        Part {
-            text: format!("{a} / {b}"),
-            strength: PRODUCT,
-        }
-    }
-
-    fn absolute(&self, a: &str) -> String {
-        self.call("abs", &[a.to_owned()])
-    }
-
-    fn root(&self, a: &str) -> String {
-        self.call("sqrt", &[a.to_owned()])
-    }
-}
-
-/// A printed expression and the strength of its weakest operator.
-#[derive(Debug, Clone)]
-pub struct Part {
-    pub text: String,
-    strength: u8,
-}
-
-const COMPARE: u8 = 1;
-const SUM: u8 = 3;
-const PRODUCT: u8 = 5;
-const SIGN: u8 = 7;
-const POWER: u8 = 9;
-const ATOM: u8 = 11;
+use super::Program;
+use super::latex::Latex;
+use super::notation::{COMPARE, Notation, PRODUCT, Part, SIGN, SUM, Text, atom};
+use super::op::{Binary, Node, Op, Unary};
 
 impl Program {
-    /// The equations as formulas that the parser reads back: one line an intermediate that has a
-    /// name, then one line an output (`names` are theirs).
+    /// The equations as formulas that the parser reads back: one line for each labelled intermediate, then one for each
+    /// output, with these `names`.
     pub fn text(&self, names: &[&str]) -> String {
         self.lines(&Text, names)
             .map(|(l, r)| format!("{l} = {r}\n"))
             .collect()
     }
 
-    /// The equations as assignments, left side and right side, of a language in which every value that is used more
-    /// than once is worth a name; `names` are those of the outputs.
+    /// The equations as assignments, left side and right side, with a name for every value that is used more than once;
+    /// `names` are those of the outputs.
     pub fn assignments(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
         let shared = self.shared();
         self.lines_with(notation, &shared, names).collect()
@@ -189,7 +137,7 @@ impl Program {
         match op {
             Op::Const(value) if value < 0.0 => Part {
                 text: notation.number(value),
-                strength: SIGN,
+                precedence: SIGN,
             },
             Op::Const(value) => atom(notation.number(value)),
             Op::Input(k) => atom(notation.name(&self.inputs[k as usize])),
@@ -206,53 +154,12 @@ impl Program {
     }
 }
 
-impl Part {
-    /// Whether it is a comparison.
-    pub fn is_comparison(&self) -> bool {
-        self.strength == COMPARE
-    }
-
-    /// A product of factors that are already printed.
-    pub fn product(text: String) -> Self {
-        Self {
-            text,
-            strength: PRODUCT,
-        }
-    }
-
-    /// A call or another expression that needs no parentheses.
-    pub fn call(text: String) -> Self {
-        atom(text)
-    }
-
-    /// The text as a factor of a product, in parentheses if it needs them.
-    pub fn factor<N: Notation + ?Sized>(&self, notation: &N) -> String {
-        self.binding(notation, PRODUCT + 1)
-    }
-
-    /// The text, in parentheses if it binds weaker than `least`.
-    fn binding<N: Notation + ?Sized>(&self, notation: &N, least: u8) -> String {
-        if self.strength < least {
-            notation.parenthesis(&self.text)
-        } else {
-            self.text.clone()
-        }
-    }
-}
-
-fn atom(text: String) -> Part {
-    Part {
-        text,
-        strength: ATOM,
-    }
-}
-
 fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
     let name = match op {
         Unary::Neg => {
             return Part {
                 text: format!("-{}", a.binding(notation, PRODUCT + 1)),
-                strength: SIGN,
+                precedence: SIGN,
             };
         }
         Unary::Abs => return atom(notation.absolute(&a.text)),
@@ -269,13 +176,13 @@ fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
 }
 
 fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
-    let infix = |sign: &str, strength: u8| Part {
+    let infix = |sign: &str, precedence: u8| Part {
         text: format!(
             "{} {sign} {}",
-            a.binding(notation, strength),
-            b.binding(notation, strength + 1)
+            a.binding(notation, precedence),
+            b.binding(notation, precedence + 1)
         ),
-        strength,
+        precedence,
     };
     match op {
         Binary::Add => infix("+", SUM),
@@ -286,7 +193,7 @@ fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
                 &a.binding(notation, PRODUCT),
                 &b.binding(notation, PRODUCT + 1),
             ),
-            strength: PRODUCT,
+            precedence: PRODUCT,
         },
         Binary::Div => notation.quotient(a, b),
         Binary::Pow => notation.power(a, b),
@@ -296,159 +203,13 @@ fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
     }
 }
 
-/// The language of model files.
-struct Text;
-
-impl Notation for Text {
-    fn number(&self, value: f64) -> String {
-        format!("{value}")
-    }
-
-    fn name(&self, name: &str) -> String {
-        name.to_owned()
-    }
-
-    fn power(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!("{}^{}", a.binding(self, POWER + 1), b.binding(self, POWER)),
-            strength: POWER,
-        }
-    }
-
-    fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
-        format!("where({}, {a}, {b})", condition.text)
-    }
-}
-
-struct Latex;
-
-/// The name of an input, an output or an intermediate in LaTeX's mathematics.
-pub fn latex_name(name: &str) -> String {
-    Latex.name(name)
-}
-
-const GREEK: &[&str] = &[
-    "alpha", "beta", "gamma", "delta", "epsilon", "theta", "kappa", "lambda", "mu", "nu", "omega",
-    "phi", "psi", "rho", "sigma", "tau",
-];
-
-impl Latex {
-    fn symbol(word: &str) -> String {
-        match word {
-            _ if GREEK.contains(&word) => format!("\\{word}"),
-            _ if word.chars().count() > 1 => format!("\\mathrm{{{word}}}"),
-            _ => word.to_owned(),
-        }
-    }
-
-    /// `qdd12` is the second derivative of `q` with index 12.
-    fn split(name: &str) -> (String, String) {
-        let (stem, subscript) = match name.split_once('_') {
-            Some((stem, subscript)) => (stem, subscript.replace('_', ",")),
-            None => {
-                let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-                (stem, name[stem.len()..].to_owned())
-            }
-        };
-        let symbol = match stem {
-            "qd" => "\\dot{q}".to_owned(),
-            "qdd" => "\\ddot{q}".to_owned(),
-            _ => Self::symbol(stem),
-        };
-        (symbol, subscript)
-    }
-}
-
-impl Notation for Latex {
-    fn number(&self, value: f64) -> String {
-        match format!("{value:e}").split_once('e') {
-            Some((mantissa, exponent)) if value != 0.0 && !(1e-4..1e6).contains(&value.abs()) => {
-                format!("{mantissa} \\cdot 10^{{{exponent}}}")
-            }
-            _ => format!("{value}"),
-        }
-    }
-
-    fn name(&self, name: &str) -> String {
-        let (symbol, subscript) = Self::split(name);
-        if subscript.is_empty() {
-            symbol
-        } else if subscript.chars().all(|c| c.is_ascii_digit() || c == ',') || subscript.len() == 1
-        {
-            format!("{symbol}_{{{subscript}}}")
-        } else {
-            format!("{symbol}_{{\\mathrm{{{subscript}}}}}")
-        }
-    }
-
-    fn call(&self, function: &str, arguments: &[String]) -> String {
-        let name = match function {
-            "atan2" | "sign" => format!("\\operatorname{{{function}}}"),
-            _ => format!("\\{function}"),
-        };
-        format!("{name}\\left({}\\right)", arguments.join(", "))
-    }
-
-    fn parenthesis(&self, inner: &str) -> String {
-        format!("\\left({inner}\\right)")
-    }
-
-    fn product(&self, a: &str, b: &str) -> String {
-        let between = if b.starts_with(|c: char| c.is_ascii_digit()) {
-            "\\cdot "
-        } else {
-            "\\,"
-        };
-        format!("{a} {between}{b}")
-    }
-
-    fn quotient(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!("\\frac{{{}}}{{{}}}", a.text, b.text),
-            strength: PRODUCT,
-        }
-    }
-
-    fn power(&self, a: Part, b: Part) -> Part {
-        Part {
-            text: format!("{{{}}}^{{{}}}", a.binding(self, POWER + 1), b.text),
-            strength: POWER,
-        }
-    }
-
-    fn absolute(&self, a: &str) -> String {
-        format!("\\left|{a}\\right|")
-    }
-
-    fn root(&self, a: &str) -> String {
-        format!("\\sqrt{{{a}}}")
-    }
-
-    fn choice(&self, condition: &Part, a: &str, b: &str) -> String {
-        // Only a comparison reads as a condition by itself.
-        let sign = if condition.is_comparison() {
-            ""
-        } else {
-            " > 0"
-        };
-        let condition = format!("{}{sign}", condition.text);
-        format!("\\begin{{cases}} {a} & {condition} \\\\ {b} & \\text{{otherwise}} \\end{{cases}}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use crate::expr::{Graph, Program, Scope, SignForm, parse};
+    use crate::expr::{Program, parse};
 
     fn program(text: &str) -> Program {
-        let mut graph = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        for name in ["a", "b", "q1", "qd1", "F_c1", "C_g"] {
-            let node = graph.input(name);
-            scope.bind(name, node);
-        }
-        let node = scope.lower(&mut graph, &parse(text).unwrap()).unwrap();
-        graph.finish(&[node])
+        let names = ["a", "b", "q1", "qd1", "F_c1", "C_g"];
+        parse(text).unwrap().program(names).unwrap()
     }
 
     #[test]

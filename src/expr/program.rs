@@ -1,9 +1,8 @@
-use super::Node;
-use super::op::Op;
+use super::op::{Node, Op};
 use super::steps::{Steps, steps};
 
-/// A closed list of operations: inputs by name, then values each made from earlier ones, and the
-/// positions of the outputs. Made by [`Graph::finish`](super::Graph::finish); never changed afterwards.
+/// A finished list of operations: named inputs, then values computed from earlier ones, and the positions of the
+/// outputs. Built by [`Graph::finish`](super::Graph::finish); never changed afterwards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Program {
     pub(super) inputs: Vec<String>,
@@ -19,23 +18,23 @@ impl Program {
         &self.inputs
     }
 
-    /// The operations, in an order in which they can be carried out.
+    /// The operations in evaluation order.
     pub fn ops(&self) -> &[Op] {
         &self.ops
     }
 
-    /// The operations that make the values for the caller.
+    /// The operations whose values are the outputs.
     pub fn outputs(&self) -> &[Node] {
         &self.outputs
     }
 
-    /// How many values the program makes for its caller.
+    /// Number of outputs.
     pub fn output_count(&self) -> usize {
         self.outputs.len()
     }
 
-    /// Keep what the outputs need. All inputs stay, since callers count on their numbering; they come
-    /// first, then constants, then everything else, so that an evaluator can set the first two once.
+    /// Keep the operations that the outputs need, and all inputs, whose numbering callers rely on. Inputs come first, then
+    /// constants, then all other operations, so that an evaluator sets the first two once.
     pub(super) fn compact(
         ops: Vec<Op>,
         inputs: Vec<String>,

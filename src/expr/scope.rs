@@ -1,12 +1,12 @@
 use std::collections::HashMap;
 
-use super::FormulaError;
 use super::error::suggestion;
-use super::graph::{Graph, Node};
-use super::op::{Binary, Function, Unary};
+use super::graph::Graph;
+use super::op::{Binary, Function, Node, Unary};
 use super::parse::{Formula, Infix, Kind, Term};
+use super::{FormulaError, Program};
 
-/// How `sign` is written into a program.
+/// The form in which `sign` enters a program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SignForm {
     /// -1, 0, 1: for printing, and for simulations that handle the jump.
@@ -16,11 +16,27 @@ pub enum SignForm {
     Smooth { width: f64 },
 }
 
-/// The names that a formula may use, and what they stand for.
+/// The names that a formula may use, and their nodes.
 #[derive(Debug, Clone)]
 pub struct Scope {
     names: HashMap<String, Node>,
     sign: SignForm,
+}
+
+impl Formula {
+    /// The formula as a program of these inputs; `sign` is exact.
+    ///
+    /// # Errors
+    /// A name that is none of the inputs, with the nearest one.
+    pub fn program<'n>(
+        &self,
+        inputs: impl IntoIterator<Item = &'n str>,
+    ) -> Result<Program, FormulaError> {
+        let mut graph = Graph::new();
+        let scope = Scope::of_inputs(&mut graph, inputs);
+        let output = scope.lower(&mut graph, self)?;
+        Ok(graph.finish(&[output]))
+    }
 }
 
 impl Scope {
@@ -32,14 +48,19 @@ impl Scope {
         }
     }
 
-    /// Let `name` stand for `node` from now on.
+    /// Bind a name to a node.
     pub fn bind(&mut self, name: &str, node: Node) {
         self.names.insert(name.to_owned(), node);
     }
 
-    /// From now on `sign` is written like this.
-    pub fn set_sign(&mut self, sign: SignForm) {
-        self.sign = sign;
+    /// New inputs of a graph under their own names; `sign` is exact.
+    pub fn of_inputs<'n>(graph: &mut Graph, names: impl IntoIterator<Item = &'n str>) -> Self {
+        let mut scope = Self::new(SignForm::Exact);
+        for name in names {
+            let node = graph.input(name);
+            scope.bind(name, node);
+        }
+        scope
     }
 
     pub fn get(&self, name: &str) -> Option<Node> {

@@ -7,29 +7,13 @@ use super::op::{Binary, Op, Unary};
 /// The operation of a [`Step`] on the values at `a`, `b` and `c`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Kind {
-    Neg,
-    Sin,
-    Cos,
-    /// The cosine goes to `b`.
+    Unary(Unary),
+    /// The sine goes to `to`, the cosine to `b`.
     SinCos,
-    Tan,
-    Exp,
-    Log,
-    Sqrt,
-    Abs,
-    Sign,
-    Tanh,
     /// 1 / a
     Reciprocal,
-    Add,
-    Sub,
-    Mul,
-    Div,
-    Pow,
-    Atan2,
-    Min,
-    Max,
-    Less,
+    Binary(Binary),
+    /// `a` where `c` is positive, else `b`.
     Where,
     /// a b + c
     MulAdd,
@@ -38,6 +22,9 @@ pub(super) enum Kind {
     /// c - a b
     SubMul,
 }
+
+const NEGATION: Kind = Kind::Unary(Unary::Neg);
+const PRODUCT: Kind = Kind::Binary(Binary::Mul);
 
 /// One operation; operands and results are places. The first places are those of the program's operations, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,16 +121,16 @@ impl<'o> Writer<'o> {
     fn write(&mut self, place: usize, op: Op) {
         match op {
             Op::Const(_) | Op::Input(_) => {}
-            Op::Unary(Unary::Sin | Unary::Cos, angle) => self.wave(place, op, angle.0),
-            Op::Unary(op, a) => self.push(place, of_unary(op), [a.0, 0, 0]),
+            Op::Unary(op @ (Unary::Sin | Unary::Cos), angle) => self.wave(place, op, angle.0),
+            Op::Unary(op, a) => self.push(place, Kind::Unary(op), [a.0, 0, 0]),
             Op::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {
                 self.sum(place, op == Binary::Sub, a.0, b.0);
             }
             Op::Binary(Binary::Div, a, b) => match self.reciprocal(b.0) {
-                Some(reciprocal) => self.push(place, Kind::Mul, [a.0, reciprocal, 0]),
-                None => self.push(place, Kind::Div, [a.0, b.0, 0]),
+                Some(reciprocal) => self.push(place, PRODUCT, [a.0, reciprocal, 0]),
+                None => self.push(place, Kind::Binary(Binary::Div), [a.0, b.0, 0]),
             },
-            Op::Binary(op, a, b) => self.push(place, of_binary(op), [a.0, b.0, 0]),
+            Op::Binary(op, a, b) => self.push(place, Kind::Binary(op), [a.0, b.0, 0]),
             Op::Where(condition, a, b) => self.push(place, Kind::Where, [a.0, b.0, condition.0]),
         }
     }
@@ -161,7 +148,7 @@ impl<'o> Writer<'o> {
     }
 
     /// The first of a sine and a cosine of one angle computes both.
-    fn wave(&mut self, place: usize, op: Op, angle: u32) {
+    fn wave(&mut self, place: usize, op: Unary, angle: u32) {
         match self.waves[&angle] {
             [Some(sine), Some(cosine)] if place == sine.min(cosine) => {
                 self.push(place, Kind::SinCos, [angle, number(cosine), 0]);
@@ -169,31 +156,28 @@ impl<'o> Writer<'o> {
                 step.expect("it was pushed just now").to = number(sine);
             }
             [Some(_), Some(_)] => {}
-            _ if matches!(op, Op::Unary(Unary::Sin, _)) => {
-                self.push(place, Kind::Sin, [angle, 0, 0])
-            }
-            _ => self.push(place, Kind::Cos, [angle, 0, 0]),
+            _ => self.push(place, Kind::Unary(op), [angle, 0, 0]),
         }
     }
 
     fn sum(&mut self, place: usize, minus: bool, a: u32, b: u32) {
-        let (b, minus) = match self.take(b, Kind::Neg) {
+        let (b, minus) = match self.take(b, NEGATION) {
             Some(negated) => (negated.a, !minus),
             None => (b, minus),
         };
-        let (a, b, minus) = match (!minus).then(|| self.take(a, Kind::Neg)).flatten() {
+        let (a, b, minus) = match (!minus).then(|| self.take(a, NEGATION)).flatten() {
             Some(negated) => (b, negated.a, true),
             None => (a, b, minus),
         };
-        if let Some(product) = self.take(b, Kind::Mul) {
+        if let Some(product) = self.take(b, PRODUCT) {
             let kind = if minus { Kind::SubMul } else { Kind::MulAdd };
             self.push(place, kind, [product.a, product.b, a]);
-        } else if let Some(product) = self.take(a, Kind::Mul) {
+        } else if let Some(product) = self.take(a, PRODUCT) {
             let kind = if minus { Kind::MulSub } else { Kind::MulAdd };
             self.push(place, kind, [product.a, product.b, b]);
         } else {
-            let kind = if minus { Kind::Sub } else { Kind::Add };
-            self.push(place, kind, [a, b, 0]);
+            let op = if minus { Binary::Sub } else { Binary::Add };
+            self.push(place, Kind::Binary(op), [a, b, 0]);
         }
     }
 
@@ -235,10 +219,8 @@ impl Step {
     /// The places that it reads.
     pub fn reads(self) -> impl Iterator<Item = u32> {
         let count = match self.kind {
-            Kind::Neg | Kind::Sin | Kind::Cos | Kind::SinCos | Kind::Tan | Kind::Exp => 1,
-            Kind::Log | Kind::Sqrt | Kind::Abs | Kind::Sign | Kind::Tanh | Kind::Reciprocal => 1,
-            Kind::Add | Kind::Sub | Kind::Mul | Kind::Div | Kind::Pow => 2,
-            Kind::Atan2 | Kind::Min | Kind::Max | Kind::Less => 2,
+            Kind::Unary(_) | Kind::SinCos | Kind::Reciprocal => 1,
+            Kind::Binary(_) => 2,
             Kind::Where | Kind::MulAdd | Kind::MulSub | Kind::SubMul => 3,
         };
         [self.a, self.b, self.c].into_iter().take(count)
@@ -290,33 +272,4 @@ fn grouped(steps: &[Step]) -> Vec<Step> {
 
 fn number(place: usize) -> u32 {
     u32::try_from(place).expect("fewer than 2^32 operations")
-}
-
-fn of_unary(op: Unary) -> Kind {
-    match op {
-        Unary::Neg => Kind::Neg,
-        Unary::Sin => Kind::Sin,
-        Unary::Cos => Kind::Cos,
-        Unary::Tan => Kind::Tan,
-        Unary::Exp => Kind::Exp,
-        Unary::Log => Kind::Log,
-        Unary::Sqrt => Kind::Sqrt,
-        Unary::Abs => Kind::Abs,
-        Unary::Sign => Kind::Sign,
-        Unary::Tanh => Kind::Tanh,
-    }
-}
-
-fn of_binary(op: Binary) -> Kind {
-    match op {
-        Binary::Add => Kind::Add,
-        Binary::Sub => Kind::Sub,
-        Binary::Mul => Kind::Mul,
-        Binary::Div => Kind::Div,
-        Binary::Pow => Kind::Pow,
-        Binary::Atan2 => Kind::Atan2,
-        Binary::Min => Kind::Min,
-        Binary::Max => Kind::Max,
-        Binary::Less => Kind::Less,
-    }
 }

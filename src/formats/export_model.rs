@@ -4,6 +4,7 @@ use rand::Rng;
 use serde::Serialize;
 use serde_json::json;
 
+use super::ExportError;
 use super::verify::{Predictions, ReferenceModel, Samples, draw};
 use crate::data::Joint;
 use crate::expr::Op;
@@ -96,6 +97,15 @@ impl ExportModel {
         declared.with_values(self.equations.values())
     }
 
+    /// Why this model cannot be written in a format.
+    pub(super) fn refused(&self, format: &'static str, reason: String) -> ExportError {
+        ExportError::Model {
+            format,
+            system: self.name().to_owned(),
+            reason,
+        }
+    }
+
     /// Name of the system.
     pub fn name(&self) -> &str {
         &self.equations.name
@@ -176,10 +186,10 @@ impl ExportModel {
         self.equations.parameters.iter().map(note).collect()
     }
 
-    /// What no format carries of sensors: readings that differ from the joint's own position.
+    /// Properties of sensors that no format carries: measured positions that differ from the joint's own.
     pub(super) fn sensors_not_carried(&self) -> Vec<String> {
         let shown = self.equations.reading.as_ref().map(|_| {
-            "what the sensors show: positions are the rig's own, before play shifts them".to_owned()
+            "measured positions: they are the rig's own, without the play of the sensors".to_owned()
         });
         let parameters = self.equations.parameters.iter().filter(|p| p.per_log);
         let own = parameters.map(|p| {

@@ -18,7 +18,7 @@ pub struct Format {
     pub about: &'static str,
     /// The usual extension of its files, without a dot.
     pub extension: &'static str,
-    /// What of a model the format cannot carry, and what takes its place; known before anything is written.
+    /// Parts of a model that the format cannot represent, and what replaces them.
     pub not_carried: fn(&ExportModel) -> Vec<String>,
     /// The files for an output path, in memory.
     pub files: fn(&ExportModel, &Path) -> Result<Vec<File>, ExportError>,
@@ -62,6 +62,16 @@ pub enum ExportError {
     Write(#[from] OutputError),
     #[error(transparent)]
     Hybrid(#[from] NetworkError),
+}
+
+impl File {
+    pub(super) fn new(path: &Path, bytes: impl Into<Vec<u8>>, about: impl Into<String>) -> Self {
+        Self {
+            path: path.to_owned(),
+            bytes: bytes.into(),
+            about: about.into(),
+        }
+    }
 }
 
 impl Format {

@@ -27,11 +27,8 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
 }
 
 fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
-    Ok(vec![File {
-        path: path.to_owned(),
-        bytes: document(model).into_bytes(),
-        about: "document with equations, parameters and effects".to_owned(),
-    }])
+    let about = "document with equations, parameters and effects";
+    Ok(vec![File::new(path, document(model), about)])
 }
 
 fn document(model: &ExportModel) -> String {

@@ -14,8 +14,10 @@ mod mjcf;
 mod onnx;
 mod python;
 mod robot;
+mod template;
 mod urdf;
 mod verify;
+mod xml;
 
 pub use export_model::{ExportModel, ExportedEffect};
 pub use format::{ExportError, File, Format, RobotReader};

@@ -1,10 +1,11 @@
 use std::ops::Range;
 
-use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
-use super::filter::{CommandFilter, Filter};
+use super::dynamics::{Dynamics, OwnValue, Parameter};
+use super::effect::{Effect, Entry};
+use super::filter::Filter;
+use super::fitted::FittedEffect;
 use super::reader::Located;
-use super::system::{FittedEffect, Model, Motion, OwnValue};
-use super::{Dynamics, Parameter};
+use super::system::{Model, Motion};
 use crate::data::Joint;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
@@ -40,7 +41,7 @@ impl Model {
         for effect in &self.effects {
             let known = parameters.iter().map(|p| p.name.as_str());
             let taken: Vec<&str> = self.own_names().chain(known).collect();
-            let of_effect = effect_parameters(effect, &taken, self.prismatic[effect.joint]);
+            let of_effect = effect.parameters(&taken, self.prismatic[effect.joint]);
             parameters.extend(of_effect);
         }
         parameters
@@ -71,90 +72,7 @@ impl Model {
     }
 }
 
-impl FittedEffect {
-    /// The effect on a joint with all parameters zero.
-    pub fn absent(effect: &Effect, joint: Joint) -> Self {
-        Self {
-            effect: effect.clone(),
-            joint,
-            values: vec![(0.0, None); effect.parameters.len()],
-            own: Vec::new(),
-            fixed: false,
-        }
-    }
-
-    /// What tells this effect from others in one model.
-    pub fn label(&self) -> String {
-        format!("{} on joint {}", self.title(), self.joint)
-    }
-
-    /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
-    pub fn excludes(&self, other: &Self) -> bool {
-        let filter = matches!(self.effect.entry, Entry::Command(_));
-        let same_filter = filter && self.effect.entry == other.effect.entry;
-        self.label() == other.label() || same_filter && self.joint == other.joint
-    }
-
-    /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
-    pub fn expression(&self, names: &[String]) -> String {
-        match self.program(names) {
-            Ok(program) => program.formula(0),
-            Err(filter) => filter.expression(&self.joint.name("tau"), &names[0]),
-        }
-    }
-
-    /// The effect's formula as a program, or the filter that it is.
-    pub(super) fn program(&self, names: &[String]) -> Result<Program, CommandFilter> {
-        let formula = match &self.effect.entry {
-            Entry::Command(filter) => return Err(*filter),
-            Entry::Force(f)
-            | Entry::Torque(f)
-            | Entry::Angle(f)
-            | Entry::Inertia(f)
-            | Entry::Shift(_, f)
-            | Entry::Reading(f) => f,
-        };
-        let mut graph = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        for name in EFFECT_NAMES {
-            let of_joint = match name {
-                "t" => name.to_owned(),
-                stem => self.joint.name(stem),
-            };
-            let node = graph.input(&of_joint);
-            scope.bind(name, node);
-        }
-        for (parameter, name) in self.effect.parameters.iter().zip(names) {
-            let node = graph.input(name);
-            scope.bind(&parameter.name, node);
-        }
-        let node = scope
-            .lower(&mut graph, formula)
-            .expect("formulas were checked when the file was read");
-        Ok(graph.finish(&[node]))
-    }
-
-    /// The names of the effect's parameters on its joint, told apart from names already `taken`.
-    pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
-        let plain = |own: &str| match self.shifted() {
-            Some(_) => format!("{own}_shift"),
-            None => self.joint.name(own),
-        };
-        let name = |own: &str| match plain(own) {
-            plain if taken.contains(&plain.as_str()) => {
-                format!("{}_{plain}", self.effect.name)
-            }
-            plain => plain,
-        };
-        self.effect
-            .parameters
-            .iter()
-            .map(|p| name(&p.name))
-            .collect()
-    }
-}
-
-/// The graph while it grows.
+/// The program under construction.
 struct Assembly<'a> {
     system: &'a Model,
     effects: Vec<(&'a FittedEffect, Vec<Node>)>,
@@ -208,7 +126,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The state's angles are those that the sensors read: everything else sees the rig's own.
+    /// The angles of the state are those of the sensors; everything that follows uses the rig's own.
     fn apply_sensors(&mut self) {
         for (index, joint, formula) in self.entries(Effect::is_of_sensor) {
             self.q[joint] = self.effect_node(index, formula);
@@ -303,19 +221,19 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The angles of the declared equations: those of the rig as effects turn them.
+    /// The angles of the declared equations: those of the rig after effects on them.
     fn declared_angles(&mut self) -> Vec<Node> {
         self.turned(|effect| matches!(effect.entry, Entry::Angle(_)) && !effect.is_of_sensor())
     }
 
-    /// What sensors show where effects stand between them and the rig.
+    /// The measured angles, where effects change them.
     fn reading(&mut self) -> Option<Program> {
         let stands_between = |effect: &Effect| matches!(effect.entry, Entry::Reading(_));
         let shown = self.turned(stands_between);
         (shown != self.q).then(|| self.graph.clone().finish(&shown))
     }
 
-    /// The angles as some effects turn them, one after the other.
+    /// The angles after some effects, applied in order.
     fn turned(&mut self, by: impl Fn(&Effect) -> bool) -> Vec<Node> {
         let before = self.q.clone();
         for (index, joint, formula) in self.entries(by) {
@@ -324,7 +242,7 @@ impl<'a> Assembly<'a> {
         std::mem::replace(&mut self.q, before)
     }
 
-    /// The names of the declared equations: angles as effects turn them, torques as effects leave them.
+    /// The names of the declared equations: angles and torques after effects on them.
     fn declared_scope(&mut self) -> Scope {
         let angles = self.declared_angles();
         let mut scope = Scope::new(self.narrowest_sign());
@@ -357,7 +275,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// A declared formula may mix joints, so the narrowest of their widths is safe for all.
+    /// A declared formula may use several joints: the narrowest of their widths serves all.
     fn narrowest_sign(&self) -> SignForm {
         let width = |sign: &SignForm| match sign {
             SignForm::Exact => 0.0,
@@ -375,36 +293,4 @@ fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
     scope
         .lower(graph, &formula.value)
         .expect("formulas were checked when the file was read")
-}
-
-/// Effect files speak of turning joints; on a sliding one forces stand for torques and metres for radians.
-fn unit_on(prismatic: bool, unit: &str) -> String {
-    if prismatic {
-        unit.replace("kg m^2", "kg")
-            .replace("N m", "N")
-            .replace("rad", "m")
-    } else {
-        unit.to_owned()
-    }
-}
-
-fn effect_parameters(effect: &FittedEffect, taken: &[&str], prismatic: bool) -> Vec<Parameter> {
-    let names = effect.parameter_names(taken);
-    let declared = effect.effect.parameters.iter().zip(&effect.values);
-    declared
-        .zip(names)
-        .map(|((parameter, (value, ci95)), name)| Parameter {
-            name,
-            value: *value,
-            unit: unit_on(prismatic, &parameter.unit),
-            bounds: match parameter.measure {
-                Measure::One => parameter.bounds,
-                Measure::Speed | Measure::Torque => [0.0, f64::INFINITY],
-            },
-            fixed: effect.fixed || parameter.whole,
-            per_log: parameter.per_log,
-            ci95: *ci95,
-            scale: parameter.typical,
-        })
-        .collect()
 }

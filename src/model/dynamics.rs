@@ -1,9 +1,9 @@
 use std::borrow::Cow;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::filter::Filter;
-use super::system::OwnValue;
 use crate::data::Log;
 use crate::expr::Program;
 
@@ -36,6 +36,28 @@ impl Parameter {
             scale: if value == 0.0 { 1.0 } else { value.abs() },
             ..self.clone()
         }
+    }
+}
+
+/// The value of a parameter in one log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OwnValue {
+    /// The log's path or name.
+    pub log: String,
+    /// Index into the parameters of what carries it: an effect or a compiled model.
+    pub parameter: usize,
+    pub value: f64,
+    pub ci95: Option<[f64; 2]>,
+}
+
+impl OwnValue {
+    /// The log's file name.
+    pub fn log_name(&self) -> String {
+        let name = Path::new(&self.log).file_name();
+        name.map_or_else(
+            || self.log.clone(),
+            |name| name.to_string_lossy().into_owned(),
+        )
     }
 }
 

@@ -1,11 +1,11 @@
 //! The `[[effect]]` entries of a model file.
 
+use super::dynamics::OwnValue;
 use super::effect::{Effect, EffectParameter};
+use super::fitted::FittedEffect;
 use super::reader::{FileError, Section};
 use super::sections::interval;
-use super::system::{FittedEffect, OwnValue};
 use crate::data::Joint;
-use crate::expr::suggestion;
 
 pub(super) fn read(
     top: &Section<'_>,
@@ -25,11 +25,8 @@ fn fitted(
     library: &[Effect],
 ) -> Result<FittedEffect, FileError> {
     let name = section.required_text("name")?.value;
-    let Some(effect) = library.iter().find(|effect| effect.name == name) else {
-        let near = suggestion(&name, library.iter().map(|effect| effect.name.as_str()));
-        let message = format!("unknown effect `{name}`{near}; `residyn list effects` shows all");
-        return Err(section.error_at("name", message));
-    };
+    let effect = Effect::find(library, &name);
+    let effect = effect.map_err(|message| section.error_at("name", message))?;
     let joint = section.whole("joint")?.and_then(Joint::numbered);
     let Some(joint) = joint.filter(|joint| joint.is_of(joints)) else {
         return Err(section.error_at("joint", format!("`joint` is a number from 1 to {joints}")));

@@ -7,7 +7,7 @@ use super::effect::Effect;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Equations, Model};
 use super::{effects_in_file, sections};
-use crate::expr::{Formula, Graph, Scope, SignForm};
+use crate::expr::{Formula, Graph, Scope};
 
 impl Model {
     /// Read a model file. `library` is where its `[[effect]]` entries are looked up.
@@ -23,11 +23,7 @@ impl Model {
     /// # Errors
     /// As [`Model::read`].
     pub fn from_text(path: &Path, text: &str, library: &[Effect]) -> Result<Self, FileError> {
-        let document = Document {
-            path: path.to_owned(),
-            text: text.to_owned(),
-        };
-        Self::from_document(&document, library)
+        Self::from_document(&Document::new(path, text), library)
     }
 
     fn from_document(document: &Document, library: &[Effect]) -> Result<Self, FileError> {
@@ -98,11 +94,8 @@ impl Model {
     /// Lower every formula once, so that a wrong name is met here, with its place.
     fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
         let mut graph = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        for name in self.input_names() {
-            let node = graph.input(&name);
-            scope.bind(&name, node);
-        }
+        let names = self.input_names();
+        let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {
             scope
                 .lower(&mut graph, &formula.value)

@@ -5,11 +5,10 @@ use include_dir::{Dir, include_dir};
 use super::effect::Effect;
 use super::reader::FileError;
 use super::system::Model;
-use crate::expr::suggestion;
 
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/models");
 
-/// The effects and systems that are known by name: those embedded in the program, and a user's own.
+/// The effects and systems known by name: the embedded ones and a user's own.
 #[derive(Debug, Clone)]
 pub struct Library {
     effects: Vec<Effect>,
@@ -17,7 +16,7 @@ pub struct Library {
 }
 
 impl Library {
-    /// What the program carries.
+    /// The embedded effects and systems.
     ///
     /// # Panics
     /// Never: a test reads every embedded file.
@@ -59,7 +58,8 @@ impl Library {
         &self.effects
     }
 
-    /// Flexible shapes that name nothing: what is left over is asked whether it follows one of them.
+    /// Generic functions of one variable without a physical name. They are fitted to the residual, to test whether it
+    /// depends on that variable.
     pub fn probes(&self) -> &[Effect] {
         &self.probes
     }
@@ -69,13 +69,7 @@ impl Library {
     /// # Errors
     /// Unknown name, with the nearest known one.
     pub fn effect(&self, name: &str) -> Result<&Effect, String> {
-        self.effects
-            .iter()
-            .find(|effect| effect.name == name)
-            .ok_or_else(|| {
-                let near = suggestion(name, self.effects.iter().map(|effect| effect.name.as_str()));
-                format!("unknown effect `{name}`{near}; `residyn list effects` shows all")
-            })
+        Effect::find(&self.effects, name)
     }
 
     /// Names of the embedded systems.
@@ -97,7 +91,7 @@ impl Library {
     /// A system from a file or, where there is no such file, an embedded one of that name.
     ///
     /// # Errors
-    /// As [`Model::read`]; for a path that is neither, the names that exist.
+    /// As [`Model::read`]; for a path that is neither, with the names of all embedded systems.
     pub fn model(&self, path: impl AsRef<Path>) -> Result<Model, FileError> {
         let path = path.as_ref();
         let embedded = path
@@ -147,7 +141,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn every_embedded_file_is_sound() {
+    fn every_embedded_file_is_valid() {
         let library = Library::built_in();
         assert!(library.effects().len() >= 13);
         for name in Library::system_names() {

@@ -1,16 +1,18 @@
-//! Dynamics models: the file format, the assembly of equations and effects into one program, and the
-//! integrators that run it.
+//! Dynamics models: the file format, the library of effects, and the assembly of equations and effects into one program.
 
 mod assemble;
 pub mod chain;
 mod dynamics;
 mod effect;
+mod effect_file;
 mod effects_in_file;
 mod file;
 mod filter;
+mod fitted;
 mod library;
 mod network;
 mod reader;
+mod residual;
 mod saved;
 mod sections;
 mod shift;
@@ -19,15 +21,18 @@ mod typeset;
 pub(crate) mod weights;
 mod written;
 
-pub use dynamics::{Dynamics, Parameter};
+pub use dynamics::{Dynamics, OwnValue, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use filter::{CommandFilter, Filter};
+pub use fitted::FittedEffect;
 pub use library::Library;
+pub(crate) use network::to_f32;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,
-    ResidualOn, with_residual,
+    ResidualOn,
 };
-pub(crate) use network::{nothing_but, to_f32};
 pub use reader::FileError;
+pub(crate) use residual::nothing_but;
+pub use residual::with_residual;
 pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
-pub use system::{FittedEffect, Model, OwnValue};
+pub use system::Model;

@@ -1,5 +1,4 @@
-//! Reading hand-written TOML so that every complaint names file, line and column, and an unknown key
-//! is met with the nearest known one.
+//! Reads hand-written TOML. Errors name file, line and column; for an unknown key they suggest a similar known one.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -9,11 +8,11 @@ use toml::de::{DeTable, DeValue};
 
 use crate::expr::{Formula, FormulaError, parse, suggestion};
 
-/// What is wrong with a model or effect file.
+/// An error in a model or effect file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileError {
     pub path: PathBuf,
-    /// Line and column, counted from 1; `None` where the file as a whole is meant.
+    /// Line and column, counted from 1; `None` where the error concerns the whole file.
     pub place: Option<(usize, usize)>,
     pub message: String,
 }
@@ -36,7 +35,7 @@ pub(super) struct Document {
     pub text: String,
 }
 
-/// A value and where in the text it stands.
+/// A value and its position in the text, in bytes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Located<T> {
     pub value: T,
@@ -44,16 +43,20 @@ pub(super) struct Located<T> {
 }
 
 impl Document {
+    pub fn new(path: &Path, text: &str) -> Self {
+        Self {
+            path: path.to_owned(),
+            text: text.to_owned(),
+        }
+    }
+
     pub fn open(path: &Path) -> Result<Self, FileError> {
         let text = std::fs::read_to_string(path).map_err(|error| FileError {
             path: path.to_owned(),
             place: None,
             message: format!("cannot be read: {error}"),
         })?;
-        Ok(Self {
-            path: path.to_owned(),
-            text,
-        })
+        Ok(Self::new(path, &text))
     }
 
     pub fn parse(&self) -> Result<Section<'_>, FileError> {
@@ -219,6 +222,37 @@ impl<'a> Section<'a> {
             .transpose()
     }
 
+    /// The admissible range that `positive` and `bounds` declare.
+    pub fn bounds(&self) -> Result<[f64; 2], FileError> {
+        let lowest = if self.flag("positive")? {
+            0.0
+        } else {
+            f64::NEG_INFINITY
+        };
+        match self.numbers("bounds")?.as_deref() {
+            None => Ok([lowest, f64::INFINITY]),
+            Some(&[low, high]) if low < high => Ok([low.max(lowest), high]),
+            Some(_) => Err(self.error_at(
+                "bounds",
+                "`bounds` is a list of two rising numbers, such as [0, 2]",
+            )),
+        }
+    }
+
+    /// The value that stands for a text; an absent text is empty. `allowed` is for the message.
+    pub fn choice<T: Copy>(
+        &self,
+        key: &str,
+        allowed: &str,
+        choices: &[(&str, T)],
+    ) -> Result<T, FileError> {
+        let text = self.text_or_empty(key)?;
+        let chosen = choices.iter().find(|(name, _)| *name == text);
+        chosen
+            .map(|(_, value)| *value)
+            .ok_or_else(|| self.error_at(key, format!("`{key}` is {allowed}, found {text:?}")))
+    }
+
     pub fn texts(&self, key: &str) -> Result<Option<Vec<Located<String>>>, FileError> {
         let items = self.items(key, "a list of texts")?;
         items
@@ -241,7 +275,7 @@ impl<'a> Section<'a> {
         rows.iter().map(row).collect::<Result<_, _>>().map(Some)
     }
 
-    /// Complain about the first key that is not one of `known`.
+    /// Refuse keys other than `known`.
     pub fn only(&self, known: &[&str]) -> Result<(), FileError> {
         let stranger = self
             .table
@@ -264,12 +298,12 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// A complaint about this table.
+    /// An error at this table.
     pub fn error(&self, message: impl Into<String>) -> FileError {
         self.document.error(self.at, message)
     }
 
-    /// A complaint about the value of `key`.
+    /// An error at the value of `key`.
     pub fn error_at(&self, key: &str, message: impl Into<String>) -> FileError {
         let at = self.get(key).map_or(self.at, |value| value.span().start);
         self.document.error(at, message)

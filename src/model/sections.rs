@@ -1,9 +1,8 @@
 //! The tables of a model file, read one by one.
 
-use super::Parameter;
-use super::effect;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Motion};
+use super::{MlpSettings, Parameter};
 use crate::data::Columns;
 use crate::expr::Formula;
 
@@ -95,7 +94,7 @@ pub(super) fn parameters(section: Option<Section<'_>>) -> Result<Vec<Parameter>,
 fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError> {
     section.only(PARAMETER_KEYS)?;
     let value = section.required_number("value")?;
-    let bounds = effect::bounds(section)?;
+    let bounds = section.bounds()?;
     if !(bounds[0]..=bounds[1]).contains(&value) {
         let message = format!(
             "`value` {value} lies outside of its bounds {} to {}",
@@ -127,9 +126,9 @@ pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 
     }
 }
 
-/// The paper's sizes: three layers of 16 for one joint, four for more.
+/// Widths of the hidden layers of the residual network; the published ones where the file gives none.
 pub(super) fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<usize>, FileError> {
-    let default = vec![16; if joints == 1 { 3 } else { 4 }];
+    let default = MlpSettings::for_joints(joints).hidden;
     let Some(section) = section else {
         return Ok(default);
     };

@@ -2,15 +2,16 @@
 
 use super::Parameter;
 use super::effect::{Effect, EffectParameter, Entry, Measure};
-use super::system::{FittedEffect, Model, Motion};
+use super::fitted::FittedEffect;
+use super::system::{Model, Motion};
 use crate::data::Joint;
 use crate::expr::{Formula, parse};
 
 /// The name of the effect.
 const NAME: &str = "parameter_shift";
-/// Gravity is the same on every rig: parameters in this unit are not asked about.
+/// Gravity is the same on every rig: parameters in this unit are not shifted.
 const UNIT_OF_GRAVITY: &str = "m/s^2";
-/// What is positive keeps at least this share of its declared value.
+/// A positive parameter keeps at least this share of its declared value.
 const LEAST: f64 = 1e-3;
 
 impl Model {

@@ -2,9 +2,10 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::dynamics::{Dynamics, OwnValue, Parameter};
 use super::effect::{Effect, Entry, Measure};
+use super::fitted::FittedEffect;
 use super::reader::Located;
-use super::{Dynamics, Parameter};
 use crate::data::{Columns, Joint, Log, LogError};
 use crate::expr::{Formula, Graph, Node, Scope, SignForm};
 
@@ -28,41 +29,6 @@ pub(super) enum Motion {
 pub(super) struct Energy {
     pub total: Located<Formula>,
     pub power: Located<Formula>,
-}
-
-/// An effect that a model file already carries.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FittedEffect {
-    pub effect: Effect,
-    pub joint: Joint,
-    /// One for each of the effect's parameters: value and 95 % interval.
-    pub values: Vec<(f64, Option<[f64; 2]>)>,
-    /// Values in single logs; in all other logs those of `values` hold.
-    pub own: Vec<OwnValue>,
-    /// Held at these values in every fit.
-    pub fixed: bool,
-}
-
-/// The value of a parameter in one log.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OwnValue {
-    /// The log's path or name.
-    pub log: String,
-    /// Index into the parameters of what carries it: an effect or a compiled model.
-    pub parameter: usize,
-    pub value: f64,
-    pub ci95: Option<[f64; 2]>,
-}
-
-impl OwnValue {
-    /// The log's file name.
-    pub fn log_name(&self) -> String {
-        let name = Path::new(&self.log).file_name();
-        name.map_or_else(
-            || self.log.clone(),
-            |name| name.to_string_lossy().into_owned(),
-        )
-    }
 }
 
 /// The declared equations of motion, checked. Models that differ in values or effects share them.
@@ -333,15 +299,10 @@ impl Model {
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
         let energy = self.equations.energy.as_ref()?;
         let mut graph = Graph::new();
-        let mut scope = Scope::new(SignForm::Exact);
-        let inputs: Vec<Node> = self
-            .input_names()
-            .iter()
-            .map(|name| graph.input(name))
-            .collect();
-        for (name, node) in self.input_names().iter().zip(&inputs) {
-            scope.bind(name, *node);
-        }
+        let names = self.input_names();
+        let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        let states = names[..2 * self.joints].iter();
+        let states: Vec<Node> = states.filter_map(|name| scope.get(name)).collect();
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {
             scope
                 .lower(&mut graph, &formula.value)
@@ -353,7 +314,7 @@ impl Model {
         }
         let (total, power) = (lower(&scope, &energy.total), lower(&scope, &energy.power));
         let one = graph.constant(1.0);
-        let slopes = graph.gradient(&[total], &[one], &inputs[..2 * self.joints]);
+        let slopes = graph.gradient(&[total], &[one], &states);
         Some(graph.finish(&[&[total, power], slopes.as_slice()].concat()))
     }
 }

@@ -1,10 +1,11 @@
+use super::fitted::FittedEffect;
 use super::reader::Located;
-use super::system::{FittedEffect, Model, Motion};
-use crate::expr::{Formula, Graph, Scope, SignForm, latex_name};
+use super::system::{Model, Motion};
+use crate::expr::{Formula, latex_name};
 
 impl Model {
     /// The declared equations as lines of a LaTeX `align` environment: intermediates, then the motion. Torques are
-    /// those that effects leave.
+    /// those after all effects.
     pub fn latex(&self) -> Vec<String> {
         let mut names = self.input_names();
         let mut lines = Vec::new();
@@ -68,14 +69,7 @@ fn matrix(rows: &[String]) -> String {
 }
 
 fn latex(names: &[String], formula: &Located<Formula>) -> String {
-    let mut graph = Graph::new();
-    let mut scope = Scope::new(SignForm::Exact);
-    for name in names {
-        let node = graph.input(name);
-        scope.bind(name, node);
-    }
-    let node = scope
-        .lower(&mut graph, &formula.value)
-        .expect("formulas were checked when the file was read");
-    graph.finish(&[node]).latex_formula(0)
+    let program = formula.value.program(names.iter().map(String::as_str));
+    let program = program.expect("formulas were checked when the file was read");
+    program.latex_formula(0)
 }

@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use super::system::{FittedEffect, Model, OwnValue};
+use super::dynamics::OwnValue;
+use super::fitted::FittedEffect;
+use super::system::Model;
 
 impl Model {
     /// The model as a model file. What the user declared stays as it is, comments included; only numbers of
@@ -59,7 +61,7 @@ fn value_and_interval(value: f64, ci95: Option<[f64; 2]>) -> String {
     format!("value = {value:?}{}", interval.unwrap_or_default())
 }
 
-/// What is known of single logs, each called by its file name, or by its path where that is not enough.
+/// Values in single logs, each named by its file name, or by its path where file names are equal.
 fn of_logs(effect: &FittedEffect, k: usize) -> String {
     let own: Vec<&OwnValue> = effect.own.iter().filter(|own| own.parameter == k).collect();
     if own.is_empty() {

@@ -105,13 +105,12 @@ impl Plant {
         let embedded = |name: &str| BUILT_IN.get_file(format!("{name}.toml"))?.contents_utf8();
         match text_or_embedded(path, embedded) {
             Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
-            // A model, or nothing that can be read: the library knows what to say of it.
+            // A model file, or one that cannot be read, for which the library has the error message.
             _ => Ok(Self::of_system(library.model(path)?)),
         }
     }
 
-    /// The model that a drawing of this rig declares: its equations with the rig's own parameters, without the effects
-    /// that the rig hides.
+    /// The model without the hidden effects: the equations with the rig's true parameters.
     pub fn declared(&self) -> Model {
         let mut system = self.system.clone();
         for (parameter, value) in system.parameters.iter_mut().zip(&self.parameters) {
@@ -193,7 +192,7 @@ impl Plant {
     /// Give declared parameters their true values.
     ///
     /// # Errors
-    /// Unknown parameter, with what is like it.
+    /// Unknown parameter, with a similar known one.
     pub fn set_parameters(&mut self, values: &BTreeMap<String, f64>) -> Result<(), String> {
         let known = &self.system.parameters;
         for (name, value) in values {

@@ -7,7 +7,7 @@ use crate::lanes::Row;
 use crate::model::{Dynamics, Model};
 use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
-/// Velocity over which dry friction reverses (rad/s): much sharper than in any fit.
+/// Velocity over which dry friction reverses (rad/s): much narrower than in any fit.
 const SIGN_WIDTH: f64 = 1e-3;
 
 impl Plant {
@@ -58,7 +58,7 @@ impl Plant {
         Ok(log)
     }
 
-    /// A true state as the sensors read it, which is what the equations are about.
+    /// A true state as the sensors read it: the state of the equations.
     pub fn as_read(&self, state: &[f64]) -> Vec<f64> {
         let mut start = state.to_vec();
         let sensors = self.effects.iter().filter(|e| e.effect.is_of_sensor());

@@ -196,21 +196,21 @@ fn everywhere<T: Element, const W: usize>(unit: f64) {
 }
 
 #[test]
-fn random_programs_in_f64_are_what_their_operations_say() {
+fn random_programs_in_f64_match_their_operations() {
     everywhere::<f64, 1>(f64::EPSILON);
     everywhere::<f64, 8>(f64::EPSILON);
     everywhere::<f64, 32>(f64::EPSILON);
 }
 
 #[test]
-fn random_programs_in_f32_are_what_their_operations_say() {
+fn random_programs_in_f32_match_their_operations() {
     everywhere::<f32, 1>(f64::from(f32::EPSILON));
     everywhere::<f32, 8>(f64::from(f32::EPSILON));
     everywhere::<f32, 32>(f64::from(f32::EPSILON));
 }
 
 #[test]
-fn what_is_held_is_found_anew_when_it_changes() {
+fn held_steps_are_evaluated_again_after_a_change() {
     let mut graph = Graph::new();
     let [x, p] = ["x", "p"].map(|name| graph.input(name));
     let square = graph.mul(p, p);

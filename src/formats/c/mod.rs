@@ -9,6 +9,7 @@ mod networks;
 pub(super) use compiler::{compile, compiler};
 pub(super) use names::Names;
 
+use super::template::filled;
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
 use crate::data::Joint;
@@ -22,11 +23,8 @@ pub(super) const FORMAT: Format = Format {
     extension: "h",
     not_carried: ExportModel::sensors_not_carried,
     files: |model, path| {
-        Ok(vec![File {
-            path: path.to_owned(),
-            bytes: header(model)?.into_bytes(),
-            about: "derivative, step and Jacobians in C".into(),
-        }])
+        let about = "derivative, step and Jacobians in C";
+        Ok(vec![File::new(path, header(model)?, about)])
     },
     client: Client::Own(client::predict),
     tolerance: 1e-9,
@@ -66,11 +64,15 @@ fn advance(scheme: &Scheme, names: &Names) -> String {
         let numbers = scheme.stages.iter().map(|stage| names.number(of(stage)));
         numbers.collect::<Vec<_>>().join(", ")
     };
-    include_str!("runge_kutta.h")
-        .replace("@TITLE@", scheme.title)
-        .replace("@STAGES@", &scheme.stages.len().to_string())
-        .replace("@WEIGHTS@", &list(|stage| stage.weight))
-        .replace("@REACHES@", &list(|stage| stage.reach))
+    filled(
+        include_str!("runge_kutta.h"),
+        &[
+            ("TITLE", &scheme.title),
+            ("STAGES", &scheme.stages.len()),
+            ("WEIGHTS", &list(|stage| stage.weight)),
+            ("REACHES", &list(|stage| stage.reach)),
+        ],
+    )
 }
 
 /// The comment at the head of the file.
@@ -89,9 +91,8 @@ fn head(model: &ExportModel, names: &Names) -> String {
             .iter()
             .map(|limit| format!("Not carried: {limit}.")),
     );
-    let usage = names
-        .fill(include_str!("usage.txt"))
-        .replace("@STEP@", &model.step_s.to_string());
+    let usage = filled(include_str!("usage.txt"), &[("STEP", &model.step_s)]);
+    let usage = names.fill(&usage);
     lines.extend(["".to_owned(), usage.trim_end().to_owned(), "".to_owned()]);
     let origin = serde_json::to_string_pretty(&model.provenance()).expect("JSON is text");
     lines.push(
@@ -108,7 +109,7 @@ fn head(model: &ExportModel, names: &Names) -> String {
     format!("/*\n{lines} */\n")
 }
 
-/// Text that can stand in a comment.
+/// Text that does not end a comment.
 fn comment(text: &str) -> String {
     let text = text
         .replace("*/", "* /")
@@ -176,8 +177,12 @@ fn memory(model: &ExportModel, names: &Names) -> String {
         Joint::all(model.joints()).filter_map(|joint| model.filter(joint, CommandFilter::Delay));
     let longest = delays.fold(0.0, f64::max);
     let past = (HEADROOM * longest / model.step_s).ceil() + 2.0;
-    include_str!("memory.h")
-        .replace("@PAST@", &past.to_string())
-        .replace("@DELAYS@", &of_joints(CommandFilter::Delay))
-        .replace("@LAGS@", &of_joints(CommandFilter::Lag))
+    filled(
+        include_str!("memory.h"),
+        &[
+            ("PAST", &past),
+            ("DELAYS", &of_joints(CommandFilter::Delay)),
+            ("LAGS", &of_joints(CommandFilter::Lag)),
+        ],
+    )
 }

@@ -1,10 +1,10 @@
 //! FMI: the model with its C code as a unit for other simulators, for model exchange and for co-simulation.
 
+mod description;
 pub(super) mod fmi2;
 pub(super) mod fmi3;
 mod unit;
 mod variables;
-mod xml;
 
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -14,22 +14,31 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use self::variables::Variable;
 use super::c::{Names, compile, compiler, header};
+use super::template::filled;
 use super::verify::{Client, ClientError, Predictions, PythonClient, Samples};
 use super::{ExportError, ExportModel, File, Format};
 use crate::data::Joint;
 use crate::model::CommandFilter;
 
-/// What is specific to one version of the standard.
+/// What is specific to one version of the standard. Templates are those of [`filled`].
 struct Standard {
     /// Name and contents of its source file.
     source: (&'static str, &'static str),
+    /// Template of the model description.
+    description: &'static str,
+    /// Template of the build description, which only some versions have.
+    build: Option<&'static str>,
+    /// Number of the first variable.
+    first: usize,
+    /// Template of the element of a variable.
+    variable: &'static str,
+    /// Templates of the elements for outputs, derivatives, and variables that are unknown at the start.
+    unknowns: [&'static str; 3],
     /// The folder of libraries for this platform.
     platform: fn() -> String,
-    /// Files that describe the unit.
-    descriptions: fn(&Fmu) -> Vec<(&'static str, String)>,
 }
 
-/// A model as all versions see it.
+/// What all versions share.
 struct Fmu<'m> {
     model: &'m ExportModel,
     identifier: String,
@@ -58,7 +67,7 @@ const CLIENT: PythonClient = PythonClient {
     packages: "fmpy",
 };
 
-/// What FMPy predicts, where the unit holds a library for this machine.
+/// The predictions of FMPy, where the unit holds a library for this machine.
 fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let refused =
         |error: &dyn std::error::Error| ClientError::Failed(format!("{}: {error}", path.display()));
@@ -109,11 +118,8 @@ fn delays(model: &ExportModel) -> bool {
 
 impl Standard {
     fn files(&self, model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
-        Ok(vec![File {
-            path: path.to_owned(),
-            bytes: self.archive(model)?,
-            about: "functional mock-up unit".into(),
-        }])
+        let archive = self.archive(model)?;
+        Ok(vec![File::new(path, archive, "functional mock-up unit")])
     }
 
     fn archive(&self, model: &ExportModel) -> Result<Vec<u8>, ExportError> {
@@ -127,14 +133,21 @@ impl Standard {
         };
         let sources = [
             (self.source.0, self.source.1.to_owned()),
+            ("functions.h", include_str!("functions.h").to_owned()),
             ("unit.h", code(model, &names, &fmu.token)),
             ("model.h", header),
         ];
         let library = library(model, &sources)?.map(|bytes| (self.library_path(&fmu), bytes));
-        let described = (self.descriptions)(&fmu).into_iter();
-        let files = described.map(|(path, text)| (path.to_owned(), text.into_bytes()));
-        let sources = sources.map(|(name, text)| (format!("sources/{name}"), text.into_bytes()));
-        Ok(zipped(files.chain(sources).chain(library)))
+        let build = self.build.map(|build| {
+            let text = filled(build, &[("IDENTIFIER", &fmu.identifier)]);
+            ("buildDescription.xml", text)
+        });
+        let described = ("modelDescription.xml".to_owned(), self.describe(&fmu));
+        let sources = build.into_iter().chain(sources);
+        let sources = sources.map(|(name, text)| (format!("sources/{name}"), text));
+        let texts = [described].into_iter().chain(sources);
+        let texts = texts.map(|(path, text)| (path, text.into_bytes()));
+        Ok(zipped(texts.chain(library)))
     }
 
     fn library_path(&self, fmu: &Fmu) -> String {
@@ -156,23 +169,23 @@ fn code(model: &ExportModel, names: &Names, token: &str) -> String {
         None => "-1".to_owned(),
     };
     let each = |of: &dyn Fn(Joint) -> String| Joint::all(n).map(of).collect::<Vec<_>>().join(", ");
-    let filled = include_str!("unit.h")
-        .replace("@TOKEN@", token)
-        .replace("@LAGS@", &lags.len().to_string())
-        .replace("@PARAMETERS@", &parameters.len().to_string())
-        .replace("@POINTS@", if delays(model) { "4096" } else { "2" })
-        .replace("@LAG_STATE@", &each(&lag_state))
-        .replace("@ADDRESSES@", &addresses.join(", "))
-        .replace(
-            "@DELAYS@",
-            &each(&|joint| names.filter(model, joint, CommandFilter::Delay)),
-        )
-        .replace(
-            "@FILTER_LAGS@",
-            &each(&|joint| names.filter(model, joint, CommandFilter::Lag)),
-        )
-        .replace("@STEP@", &format!("{:?}", model.step_s));
-    names.fill(&filled)
+    let delays = each(&|joint| names.filter(model, joint, CommandFilter::Delay));
+    let time_constants = each(&|joint| names.filter(model, joint, CommandFilter::Lag));
+    let points = if self::delays(model) { 4096 } else { 2 };
+    names.fill(&filled(
+        include_str!("unit.h"),
+        &[
+            ("TOKEN", &token),
+            ("LAGS", &lags.len()),
+            ("PARAMETERS", &parameters.len()),
+            ("POINTS", &points),
+            ("LAG_STATE", &each(&lag_state)),
+            ("ADDRESSES", &addresses.join(", ")),
+            ("DELAYS", &delays),
+            ("FILTER_LAGS", &time_constants),
+            ("STEP", &format!("{:?}", model.step_s)),
+        ],
+    ))
 }
 
 /// The shared library, compiled from the first source, which includes the others; none without a compiler.
@@ -180,11 +193,7 @@ fn library(
     model: &ExportModel,
     sources: &[(&str, String)],
 ) -> Result<Option<Vec<u8>>, ExportError> {
-    let refused = |reason: String| ExportError::Model {
-        format: "FMU",
-        system: model.name().to_owned(),
-        reason,
-    };
+    let refused = |reason| model.refused("FMU", reason);
     let io =
         |error: std::io::Error| refused(format!("no temporary folder to compile it in: {error}"));
     let folder = tempfile::tempdir().map_err(io)?;

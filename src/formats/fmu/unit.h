@@ -1,4 +1,4 @@
-/* The model in model.h as a unit of no standard in particular. What can fail returns what is wrong, or NULL. */
+/* The model in model.h as a unit, independent of the version of FMI. Functions that can fail return a message, or NULL. */
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -18,14 +18,10 @@
 #define EXPORT
 #endif
 
-/* Where the code of several FMUs is linked together, names begin with that of the model. */
-#define JOIN_(a, b) a##b
-#define JOIN(a, b) JOIN_(a, b)
-
 /* Torques that follow their command with a lag. */
 #define LAGS @LAGS@
 
-/* What an importer must know of the unit that its description belongs to. */
+/* Identifies the model description of this unit. */
 #define TOKEN "@TOKEN@"
 
 enum {
@@ -94,7 +90,7 @@ static bool same_torque(const Data *data, int age)
     return memcmp(data->point_torque[place(data, age)], data->torque, sizeof data->torque) == 0;
 }
 
-/* Put an accepted point among those of the past; while the torque is held, two are enough. */
+/* Store an accepted point; while the torque is held, two are enough. */
 static void accept_point(Data *data)
 {
     const bool held = data->points > 1 && same_torque(data, 0) && same_torque(data, 1);
@@ -106,7 +102,7 @@ static void accept_point(Data *data)
     memcpy(data->point_torque[data->newest], data->torque, sizeof data->torque);
 }
 
-/* The torque commanded `delay` s ago, on straight lines through accepted points; none before the first. */
+/* The torque commanded `delay` s ago, interpolated linearly between accepted points; zero before the first. */
 static double delayed(const Data *data, int joint, double delay)
 {
     const double when = data->time - delay;
@@ -125,7 +121,7 @@ static double delayed(const Data *data, int joint, double delay)
     return data->points < POINTS ? 0 : torque;
 }
 
-/* How much of the torque that is set now the delay lets through: what lies between the last accepted point and now. */
+/* Derivative of the delayed torque by the present one: its weight in the interpolation. */
 static double share_of_now(const Data *data, double delay)
 {
     const double last = data->point_time[data->newest], when = data->time - delay;
@@ -251,7 +247,7 @@ static const char *get_rates(const Data *data, double derivatives[], size_t coun
 
 /* ---- derivatives ---- */
 
-/* d unknown / d known, where the standard lets one ask. */
+/* d unknown / d known, for the pairs that the standard allows. */
 static bool partial(double of_rates[STATES][STATES + JOINTS], uint32_t unknown, uint32_t known, double *value)
 {
     const bool of_state = unknown >= STATE && unknown < RATE, of_rate = unknown >= RATE && unknown < PARAMETER;
@@ -291,7 +287,7 @@ static const char *keep(const void *bytes, void **kept)
     if (!*kept)
         *kept = malloc(sizeof(Data));
     if (!*kept)
-        return "there is no memory for a state";
+        return "no memory for a copy of the state";
     memcpy(*kept, bytes, sizeof(Data));
     return NULL;
 }
@@ -350,6 +346,6 @@ static const char *advance(Data *data, double from, double length)
     data->time = from + length;
     for (i = 0; i < STATES; i++)
         if (!isfinite(data->state[i]))
-            return "the motion has left all bounds";
+            return "the state is not finite: the motion diverges";
     return NULL;
 }

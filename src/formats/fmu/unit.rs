@@ -81,7 +81,7 @@ mod tests {
     use super::exponents;
 
     #[test]
-    fn units_come_down_to_base_units() {
+    fn units_reduce_to_base_units() {
         for (unit, [kg, m, s, rad]) in [
             ("1/s^2", [0, 0, -2, 0]),
             ("N m s^2/rad^2", [1, 2, 0, -2]),
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_si_unit_has_none() {
+    fn other_units_have_no_exponents() {
         for unit in ["furlong", "N m)", "m^x", "(m", ""] {
             assert_eq!(exponents(unit), None, "{unit}");
         }

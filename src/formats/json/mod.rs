@@ -42,14 +42,11 @@ const WEIGHTS: &str = "safetensors";
 
 fn pair(model: &ExportModel, description: &Path, weights: &Path) -> Result<Vec<File>, ExportError> {
     if description == weights {
-        return Err(ExportError::Model {
-            format: "a pair of files",
-            system: model.name().to_owned(),
-            reason: format!(
-                "both would be {}; choose a file name that ends in .{DESCRIPTION} or .{WEIGHTS}",
-                description.display()
-            ),
-        });
+        let reason = format!(
+            "both would be {}; choose a file name that ends in .{DESCRIPTION} or .{WEIGHTS}",
+            description.display()
+        );
+        return Err(model.refused("a pair of files", reason));
     }
     let numbers = model.weights();
     let shape = ModelShape::of(
@@ -64,15 +61,7 @@ fn pair(model: &ExportModel, description: &Path, weights: &Path) -> Result<Vec<F
     let mut json = serde_json::to_vec_pretty(&text).expect("a description is numbers and text");
     json.push(b'\n');
     Ok(vec![
-        File {
-            path: description.to_owned(),
-            bytes: json,
-            about: "description of the whole model".into(),
-        },
-        File {
-            path: weights.to_owned(),
-            bytes,
-            about: "parameters and weights".into(),
-        },
+        File::new(description, json, "description of the whole model"),
+        File::new(weights, bytes, "parameters and weights"),
     ])
 }

@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use roxmltree::Node;
 
-use super::element::{Classes, Element};
-use crate::formats::robot::xml::{Source, elements, named};
+use super::classes::Classes;
+use crate::formats::robot::element::Element;
+use crate::formats::xml::{Source, elements, named};
 use crate::model::FileError;
 
 /// The effort limit (N m or N) of each joint whose drive has one.
@@ -33,7 +34,10 @@ pub(super) fn efforts<'s, 'x>(
             continue;
         }
         driven.push(joint);
-        let gear = drive.list("gear")?.first().copied().unwrap_or(1.0);
+        let gear = drive
+            .list("gear")?
+            .and_then(|gears| gears.first().copied())
+            .unwrap_or(1.0);
         #[allow(clippy::float_cmp)] // as written
         if gear != 1.0 {
             drive.note(format!("`{name}` has the gear {gear}: tau is the torque or force at `{joint}`, {gear} times the control"));

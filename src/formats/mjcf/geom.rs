@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::element::Element;
 use super::orientation::{Angles, from_z_to};
+use crate::formats::robot::element::Element;
 use crate::model::FileError;
 use crate::model::chain::{Inertia, Pose};
 
@@ -39,7 +39,7 @@ pub(super) fn inertia(
             (pose, None)
         }
     };
-    let size = geom.list("size")?;
+    let size = geom.list("size")?.unwrap_or_default();
     let side = |k: usize| {
         let given = size.get(k).copied().filter(|side| *side > 0.0);
         given.ok_or_else(|| {

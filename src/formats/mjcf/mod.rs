@@ -1,10 +1,10 @@
 //! MJCF, the format of MuJoCo: read and written.
 
 mod actuator;
-mod element;
+mod classes;
 mod geom;
 mod orientation;
 mod read;
 mod write;
 
-pub(super) use write::{DRY_FRICTION, FORMAT, option};
+pub(super) use write::FORMAT;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::element::Element;
+use crate::formats::robot::element::Element;
 use crate::model::FileError;
 use crate::model::chain::turn;
 
@@ -92,21 +92,15 @@ impl Angles {
         element: &Element<'_, '_>,
         key: &str,
     ) -> Result<[f64; N], FileError> {
-        let first = if N == 4 { 3 } else { 0 };
-        if !self.in_degrees {
-            let meant = element.angles::<N>(key)?.unwrap_or([0.0; N]);
-            let given = element.numbers::<N>(key)?.unwrap_or([0.0; N]);
-            return Ok(std::array::from_fn(|k| {
-                if k < first { given[k] } else { meant[k] }
-            }));
-        }
         let given = element.numbers::<N>(key)?.unwrap_or([0.0; N]);
+        let angles = if self.in_degrees {
+            given.map(f64::to_radians)
+        } else {
+            element.angles::<N>(key)?.unwrap_or(given)
+        };
+        let first = if N == 4 { 3 } else { 0 };
         Ok(std::array::from_fn(|k| {
-            if k < first {
-                given[k]
-            } else {
-                given[k].to_radians()
-            }
+            if k < first { given[k] } else { angles[k] }
         }))
     }
 

@@ -6,11 +6,12 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
-use super::element::{Classes, Element};
+use super::classes::Classes;
 use super::orientation::Angles;
 use super::{actuator, geom};
+use crate::formats::robot::element::Element;
 use crate::formats::robot::tree::{self, Body, Hinge};
-use crate::formats::robot::xml::{self, Source, elements, named};
+use crate::formats::xml::{self, Source, elements, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, Spring};
 
@@ -39,65 +40,17 @@ pub fn read_mjcf(path: &Path) -> Result<Chain, FileError> {
 }
 
 /// Attributes of the compiler section without influence on what is read here.
-const COMPILER: &[&str] = &[
-    "angle",
-    "eulerseq",
-    "autolimits",
-    "coordinate",
-    "inertiafromgeom",
-    "strippath",
-    "meshdir",
-    "texturedir",
-    "assetdir",
-    "discardvisual",
-    "usethread",
-    "fusestatic",
-    "exactmeshinertia",
-    "convexhull",
-    "fitaabb",
-    "alignfree",
-    "saveinertial",
-];
+const COMPILER: &str = "\
+    angle eulerseq autolimits coordinate inertiafromgeom strippath meshdir texturedir assetdir \
+    discardvisual usethread fusestatic exactmeshinertia convexhull fitaabb alignfree saveinertial \
+    balanceinertia";
 /// Attributes of a joint that are read here or have no influence within its range.
-const JOINT: &[&str] = &[
-    "name",
-    "class",
-    "type",
-    "group",
-    "pos",
-    "axis",
-    "springdamper",
-    "limited",
-    "range",
-    "actuatorfrclimited",
-    "actuatorfrcrange",
-    "solreflimit",
-    "solimplimit",
-    "solreffriction",
-    "solimpfriction",
-    "stiffness",
-    "margin",
-    "ref",
-    "springref",
-    "armature",
-    "damping",
-    "frictionloss",
-    "user",
-];
+const JOINT: &str = "\
+    name class type group pos axis springdamper limited range actuatorfrclimited actuatorfrcrange \
+    solreflimit solimplimit solreffriction solimpfriction stiffness margin ref springref armature \
+    damping frictionloss user";
 /// Attributes of a body that are read here or have no influence.
-const BODY: &[&str] = &[
-    "name",
-    "childclass",
-    "pos",
-    "quat",
-    "axisangle",
-    "euler",
-    "xyaxes",
-    "zaxis",
-    "mocap",
-    "user",
-    "sleep",
-];
+const BODY: &str = "name childclass pos quat axisangle euler xyaxes zaxis mocap user sleep";
 /// Flags that switch forces of the joints off.
 const FORCES: &[&str] = &["passive", "spring", "damper", "frictionloss"];
 
@@ -135,7 +88,7 @@ impl<'s, 'x> Reader<'s, 'x> {
                 "local coordinates are the only ones; convert the file with MuJoCo 2.3.3",
             )?;
         }
-        compiler.note_others(&[COMPILER, &["balanceinertia"]].concat());
+        compiler.note_others(COMPILER);
         let classes = Classes::new(source, root);
         let autolimits = compiler.text("autolimits") != Some("false");
         Ok(Self {
@@ -204,7 +157,7 @@ impl<'s, 'x> Reader<'s, 'x> {
     fn body(&self, node: Node<'s, 'x>, class: &str) -> Result<Body, FileError> {
         let class = node.attribute("childclass").unwrap_or(class);
         self.check_parts(node)?;
-        let own = Element::alone(self.source, node);
+        let own = self.source.element(node);
         own.note_others(BODY);
         let name = node.attribute("name").unwrap_or("body").to_owned();
         let joints = named(node, "joint").enumerate().map(|(k, joint)| {
@@ -303,7 +256,7 @@ impl<'s, 'x> Reader<'s, 'x> {
         match (self.inertia_from_geom.as_str(), given) {
             ("true", _) | ("auto", None) => of_geoms(),
             (_, None) => Ok(Inertia::none()),
-            (_, Some(inertial)) => self.inertial(&Element::alone(self.source, inertial), name),
+            (_, Some(inertial)) => self.inertial(&self.source.element(inertial), name),
         }
     }
 
@@ -359,7 +312,7 @@ fn is_of_body(node: Node<'_, '_>) -> bool {
 
 /// A linear coefficient; higher ones, of a polynomial, must be zero.
 fn linear(joint: &Element<'_, '_>, key: &str) -> Result<f64, FileError> {
-    let all = joint.list(key)?;
+    let all = joint.list(key)?.unwrap_or_default();
     if all.iter().skip(1).any(|higher| *higher != 0.0)
         || all.first().is_some_and(|first| *first < 0.0)
     {

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use super::read::read_mjcf;
 use crate::formats::robot::mechanism::{
-    Drive, Link, Mechanism, escaped, file, friction_widths, head, numbers,
+    Drive, Link, Mechanism, file, friction_widths, head, numbers, option,
 };
 use crate::formats::verify::{Client, PythonClient};
+use crate::formats::xml::escaped;
 use crate::formats::{ExportError, ExportModel, File, Format, RobotReader};
 use crate::model::chain::Joint;
 
@@ -34,13 +35,6 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         return Vec::new();
     };
     let mut lost = mechanism.not_carried;
-    if mechanism
-        .joints
-        .iter()
-        .any(|joint| joint.drivetrain.friction > 0.0)
-    {
-        lost.push(DRY_FRICTION.into());
-    }
     if mechanism.drives.iter().any(|drive| drive.lag.is_some()) {
         lost.push(
             "the lag within a step: MuJoCo holds the lagged torque over each step; only the derivative is compared"
@@ -49,8 +43,6 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     }
     lost
 }
-
-pub(in crate::formats) const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
 
 fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     file(model, path, "MJCF", text)
@@ -79,16 +71,6 @@ fn text(model: &ExportModel, mechanism: &Mechanism) -> String {
         text += &actuator(joint, drive);
     }
     text + "  </actuator>\n</mujoco>\n"
-}
-
-/// Gravity, step and integrator of the model.
-pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
-    format!(
-        "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
-        numbers([0.0, 0.0, -mechanism.gravity]),
-        model.step_s / model.integrator.substeps() as f64,
-        mechanism.integrator
-    )
 }
 
 /// A body, its element left open for the next.

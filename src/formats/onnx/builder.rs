@@ -55,25 +55,24 @@ impl Builder {
         values: &[f64],
         about: &str,
     ) -> Value {
-        if !self
-            .graph
-            .initializer
-            .iter()
-            .any(|known| known.name == name)
-        {
-            self.graph.initializer.push(Tensor {
-                dims: dims.iter().map(|d| *d as i64).collect(),
-                data_type: FLOAT,
-                name: name.to_owned(),
-                raw_data: (values.iter())
-                    .flat_map(|value| (*value as f32).to_le_bytes())
-                    .collect(),
-                doc_string: about.to_owned(),
-            });
-        }
+        let bytes = values.iter().flat_map(|x| (*x as f32).to_le_bytes());
+        self.store(Tensor {
+            dims: dims.iter().map(|d| *d as i64).collect(),
+            data_type: FLOAT,
+            name: name.to_owned(),
+            raw_data: bytes.collect(),
+            doc_string: about.to_owned(),
+        });
         Value {
             name: name.to_owned(),
             batched: false,
+        }
+    }
+
+    fn store(&mut self, tensor: Tensor) {
+        let mut stored = self.graph.initializer.iter();
+        if !stored.any(|known| known.name == tensor.name) {
+            self.graph.initializer.push(tensor);
         }
     }
 
@@ -103,20 +102,13 @@ impl Builder {
             return vec![matrix.clone()];
         }
         let sizes = format!("{width} columns");
-        if !self
-            .graph
-            .initializer
-            .iter()
-            .any(|known| known.name == sizes)
-        {
-            self.graph.initializer.push(Tensor {
-                dims: vec![width as i64],
-                data_type: INT64,
-                name: sizes.clone(),
-                raw_data: [1_i64.to_le_bytes()].concat().repeat(width),
-                doc_string: String::new(),
-            });
-        }
+        self.store(Tensor {
+            dims: vec![width as i64],
+            data_type: INT64,
+            name: sizes.clone(),
+            raw_data: 1_i64.to_le_bytes().repeat(width),
+            doc_string: String::new(),
+        });
         let columns: Vec<Value> = (0..width).map(|_| self.fresh(true)).collect();
         let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
         self.graph.node.push(Node {

@@ -55,29 +55,15 @@ fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
     name.push("-derivative.");
     name.push(path.extension().unwrap_or("onnx".as_ref()));
     let derivative = path.with_file_name(name);
-    let file = |path: &Path, graph: Graph, about: &str| File {
-        path: path.to_owned(),
-        bytes: packed(model, graph),
-        about: about.to_owned(),
+    let file = |path: &Path, graph: Graph, about| File::new(path, packed(model, graph), about);
+    let step = match DiscreteFilter::all(model).is_empty() {
+        true => "state, torque -> next_state",
+        false => "state, torque, memory -> next_state, next_memory",
     };
-    let with = match DiscreteFilter::all(model).is_empty() {
-        true => "",
-        false => ", memory",
-    };
+    let rates = "state, torque -> derivative";
     Ok(vec![
-        file(
-            path,
-            step::graph(model),
-            &format!(
-                "state, torque{with} -> next_state{}",
-                with.replace(", ", ", next_")
-            ),
-        ),
-        file(
-            &derivative,
-            derivative_graph(model),
-            "state, torque -> derivative",
-        ),
+        file(path, step::graph(model), step),
+        file(&derivative, derivative_graph(model), rates),
     ])
 }
 

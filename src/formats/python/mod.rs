@@ -10,6 +10,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::discrete_filter::{Combination, DiscreteFilter};
+use super::template::filled;
 use super::verify::{Client, PythonClient};
 use super::{ExportError, ExportModel, File, Format};
 use crate::control::Task;
@@ -66,11 +67,8 @@ fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
         ),
         None => "module with step and derivative".to_owned(),
     };
-    Ok(vec![File {
-        path: path.to_owned(),
-        bytes: module(model, task.as_ref()).into_bytes(),
-        about,
-    }])
+    let module = module(model, task.as_ref());
+    Ok(vec![File::new(path, module, about)])
 }
 
 fn module(model: &ExportModel, task: Option<&Task>) -> String {
@@ -117,9 +115,11 @@ fn advance(scheme: &Scheme) -> String {
         let numbers = [stage.time, stage.reach, stage.weight].map(literal);
         format!("({})", numbers.join(", "))
     });
-    RUNGE_KUTTA
-        .replace("@TITLE@", scheme.title)
-        .replace("@STAGES@", &stages.collect::<Vec<_>>().join(", "))
+    let stages = stages.collect::<Vec<_>>().join(", ");
+    filled(
+        RUNGE_KUTTA,
+        &[("TITLE", &scheme.title), ("STAGES", &stages)],
+    )
 }
 
 fn constants(out: &mut String, model: &ExportModel) {
@@ -159,7 +159,7 @@ fn unit(unit: &str) -> String {
     plain(unit)
 }
 
-/// Text that can stand in a comment or docstring.
+/// Text without quotes, backslashes and line breaks, for comments and docstrings.
 fn plain(text: &str) -> String {
     text.replace(['"', '\\'], "'")
         .replace(char::is_control, " ")

@@ -9,47 +9,10 @@ pub struct Python {
 }
 
 /// Names that mean something else in the module.
-const TAKEN: &[&str] = &[
-    "and",
-    "as",
-    "assert",
-    "async",
-    "await",
-    "break",
-    "class",
-    "continue",
-    "def",
-    "del",
-    "elif",
-    "else",
-    "except",
-    "finally",
-    "for",
-    "from",
-    "global",
-    "if",
-    "import",
-    "in",
-    "is",
-    "json",
-    "lambda",
-    "nonlocal",
-    "not",
-    "np",
-    "or",
-    "p",
-    "parameters",
-    "parts",
-    "pass",
-    "raise",
-    "return",
-    "state",
-    "torque",
-    "try",
-    "while",
-    "with",
-    "yield",
-];
+const TAKEN: &str = "\
+    and as assert async await break class continue def del elif else except finally for from global \
+    if import in is json lambda nonlocal not np or p parameters parts pass raise return state torque \
+    try while with yield";
 
 /// A number as Python reads it back exactly.
 pub fn literal(value: f64) -> String {
@@ -70,7 +33,7 @@ impl Notation for Python {
             _ if self.parameters.contains(name) => format!("p[\"{name}\"]"),
             "t" => "time".to_owned(),
             "time" => "time_".to_owned(),
-            _ if TAKEN.contains(&name) => format!("{name}_"),
+            _ if TAKEN.split(' ').any(|taken| taken == name) => format!("{name}_"),
             _ => name.to_owned(),
         }
     }

@@ -46,6 +46,8 @@ pub(in crate::formats) struct Link {
     pub tensor: Matrix3<f64>,
 }
 
+const DRY_FRICTION: &str = "dry friction that reverses smoothly: MuJoCo's frictionloss lets joints stick, and the comparison has the smooth form in its place";
+
 /// The schemes that MuJoCo has, and its names for them.
 const INTEGRATORS: [(&Scheme, &str); 2] = [(SEMI_IMPLICIT_EULER, "Euler"), (RK4, "RK4")];
 
@@ -95,6 +97,10 @@ impl Mechanism {
                 .push("the network for what the equations lack".into());
         }
         mechanism.not_carried.extend(model.sensors_not_carried());
+        let mut joints = mechanism.joints.iter();
+        if joints.any(|joint| joint.drivetrain.friction > 0.0) {
+            mechanism.not_carried.push(DRY_FRICTION.into());
+        }
         Ok(mechanism)
     }
 
@@ -225,17 +231,14 @@ pub(in crate::formats) fn numbers(numbers: impl IntoIterator<Item = f64>) -> Str
     text
 }
 
-/// Text that can stand in an attribute.
-pub(in crate::formats) fn escaped(text: &str) -> String {
-    let pairs = [
-        ('&', "&amp;"),
-        ('<', "&lt;"),
-        ('>', "&gt;"),
-        ('"', "&quot;"),
-    ];
-    pairs
-        .iter()
-        .fold(text.to_owned(), |text, (from, to)| text.replace(*from, to))
+/// Gravity, step and integrator of the model, for MuJoCo.
+pub(in crate::formats) fn option(model: &ExportModel, mechanism: &Mechanism) -> String {
+    format!(
+        "<option gravity=\"{}\" timestep=\"{}\" integrator=\"{}\">\n    <flag eulerdamp=\"disable\"/>\n  </option>",
+        numbers([0.0, 0.0, -mechanism.gravity]),
+        model.step_s / model.integrator.substeps() as f64,
+        mechanism.integrator
+    )
 }
 
 /// XML declaration and provenance.
@@ -252,15 +255,7 @@ pub(in crate::formats) fn file(
     format: &'static str,
     text: fn(&ExportModel, &Mechanism) -> String,
 ) -> Result<Vec<File>, ExportError> {
-    let refused = |reason| ExportError::Model {
-        format,
-        system: model.name().to_owned(),
-        reason,
-    };
-    let mechanism = Mechanism::of(model).map_err(refused)?;
-    Ok(vec![File {
-        path: path.to_owned(),
-        bytes: text(model, &mechanism).into_bytes(),
-        about: "a mechanism with the same equations".to_owned(),
-    }])
+    let mechanism = Mechanism::of(model).map_err(|reason| model.refused(format, reason))?;
+    let about = "a mechanism with the same equations";
+    Ok(vec![File::new(path, text(model, &mechanism), about)])
 }

@@ -1,6 +1,6 @@
-//! Shared by the formats of robot descriptions: XML with positions in the file, the tree of bodies, and the mechanism
-//! with a model's equations.
+//! Shared by the formats of robot descriptions: elements of XML, the tree of bodies, and the mechanism with a model's
+//! equations.
 
+pub(super) mod element;
 pub(super) mod mechanism;
 pub(super) mod tree;
-pub(super) mod xml;

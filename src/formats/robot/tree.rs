@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::xml::Source;
+use crate::formats::xml::Source;
 use crate::model::FileError;
 use crate::model::chain::{
     Drivetrain, Inertia, Joint, MOST_JOINTS, Pose, fault, with_z_along, without_inertia,

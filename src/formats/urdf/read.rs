@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
 use crate::formats::robot::tree::{self, Body, Hinge};
-use crate::formats::robot::xml::{self, Source, named};
+use crate::formats::xml::{self, Source, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 
@@ -81,7 +81,7 @@ impl<'s, 'x> Robot<'s, 'x> {
                 .source
                 .error(joint, format!("<{which}> is missing in this joint")));
         };
-        let name = self.source.name(end, "link")?;
+        let name = self.source.element(end).required_text("link")?;
         let mut links = named(self.root, "link");
         links
             .find(|link| link.attribute("name") == Some(name))
@@ -104,7 +104,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             }
         }
         Ok(Body {
-            name: self.source.name(link, "name")?.to_owned(),
+            name: self.source.element(link).required_text("name")?.to_owned(),
             at: joint.unwrap_or(link).range().start,
             pose,
             joints: joints.into_iter().collect(),
@@ -130,12 +130,13 @@ impl<'s, 'x> Robot<'s, 'x> {
         let Some(origin) = named(of, "origin").next() else {
             return Ok(Pose::identity());
         };
-        let [roll, pitch, yaw] = self.source.angles(origin, "rpy")?.unwrap_or_default();
+        let origin = self.source.element(origin);
+        let [roll, pitch, yaw] = origin.angles("rpy")?.unwrap_or_default();
         Ok(Pose {
             rotation: turn(Vector3::z(), yaw)
                 * turn(Vector3::y(), pitch)
                 * turn(Vector3::x(), roll),
-            origin: self.source.vector(origin, "xyz")?,
+            origin: origin.vector("xyz")?,
         })
     }
 
@@ -148,11 +149,12 @@ impl<'s, 'x> Robot<'s, 'x> {
                 self.source
                     .error(inertial, format!("<{name}> is missing in <inertial>"))
             };
-            named(inertial, name).next().ok_or_else(missing)
+            let part = named(inertial, name).next().ok_or_else(missing)?;
+            Ok::<_, FileError>(self.source.element(part))
         };
-        let mass = self.source.required(part("mass")?, "value")?;
+        let mass = part("mass")?.required("value")?;
         let inertia = part("inertia")?;
-        let entry = |key| self.source.required(inertia, key);
+        let entry = |key| inertia.required(key);
         let (xy, xz, yz) = (entry("ixy")?, entry("ixz")?, entry("iyz")?);
         #[rustfmt::skip]
         let tensor = Matrix3::new(
@@ -161,14 +163,15 @@ impl<'s, 'x> Robot<'s, 'x> {
             xz, yz, entry("izz")?,
         );
         let name = link.attribute("name").unwrap_or_default();
-        tree::check_inertia(self.source, inertia.range().start, name, mass, &tensor)?;
+        tree::check_inertia(self.source, inertia.at(), name, mass, &tensor)?;
         Ok(Inertia::central(mass, tensor, &self.pose(inertial)?))
     }
 
     /// A joint that moves; none where it is fixed.
     fn hinge(&self, joint: Node<'s, 'x>) -> Result<Option<Hinge>, FileError> {
-        let (source, name) = (self.source, self.source.name(joint, "name")?);
-        let slides = match source.name(joint, "type")? {
+        let (source, element) = (self.source, self.source.element(joint));
+        let name = element.required_text("name")?;
+        let slides = match element.required_text("type")? {
             "fixed" => return Ok(None),
             "revolute" | "continuous" => false,
             "prismatic" => true,
@@ -176,7 +179,7 @@ impl<'s, 'x> Robot<'s, 'x> {
                 let message = format!(
                     "joint `{name}` is of type `{other}`; known are fixed, revolute, continuous and prismatic: fix the joint, or describe it by several"
                 );
-                return Err(source.attribute_error(joint, "type", message));
+                return Err(element.attribute_error("type", message));
             }
         };
         if let Some(mimic) = named(joint, "mimic").next() {
@@ -186,18 +189,19 @@ impl<'s, 'x> Robot<'s, 'x> {
             return Err(source.error(mimic, message));
         }
         let axis = match named(joint, "axis").next() {
-            Some(axis) => source.direction(axis, "xyz", Vector3::x())?,
+            Some(axis) => source.element(axis).direction("xyz", Vector3::x())?,
             None => Vector3::x(),
         };
         let mut drivetrain = Drivetrain::default();
         if let Some(dynamics) = named(joint, "dynamics").next() {
-            drivetrain.damping = source.not_negative(dynamics, "damping")?;
-            drivetrain.friction = source.not_negative(dynamics, "friction")?;
+            let dynamics = source.element(dynamics);
+            drivetrain.damping = dynamics.not_negative("damping")?;
+            drivetrain.friction = dynamics.not_negative("friction")?;
         }
         drivetrain.effort = self.effort(joint)?;
         Ok(Some(Hinge {
             name: name.to_owned(),
-            at: joint.range().start,
+            at: element.at(),
             slides,
             axis,
             anchor: Vector3::zeros(),
@@ -211,27 +215,25 @@ impl<'s, 'x> Robot<'s, 'x> {
         let Some(limit) = named(joint, "limit").next() else {
             return Ok(None);
         };
+        let limit = self.source.element(limit);
         let name = joint.attribute("name").unwrap_or_default();
-        let [low, high] = ["lower", "upper"].map(|key| self.source.number_or(limit, key, 0.0));
-        let (low, high) = (low?, high?);
+        let (low, high) = (
+            limit.number_or("lower", 0.0)?,
+            limit.number_or("upper", 0.0)?,
+        );
         if low < high && joint.attribute("type") != Some("continuous") {
-            self.source.note(
-                limit,
-                format!("the range of `{name}`, {low} to {high}, is not carried"),
-            );
+            limit.note(format!(
+                "the range of `{name}`, {low} to {high}, is not carried"
+            ));
         }
-        if limit.has_attribute("velocity") {
-            self.source.note(
-                limit,
-                format!("the velocity limit of `{name}` is not carried"),
-            );
+        if limit.text("velocity").is_some() {
+            limit.note(format!("the velocity limit of `{name}` is not carried"));
         }
-        let effort = self.source.not_negative(limit, "effort")?;
-        if limit.has_attribute("effort") && effort == 0.0 {
-            self.source.note(
-                limit,
-                format!("the effort limit of `{name}` is 0 and is not carried"),
-            );
+        let effort = limit.not_negative("effort")?;
+        if limit.text("effort").is_some() && effort == 0.0 {
+            limit.note(format!(
+                "the effort limit of `{name}` is 0 and is not carried"
+            ));
         }
         Ok((effort > 0.0).then_some(effort))
     }

@@ -6,11 +6,11 @@ use std::path::Path;
 use nalgebra::{Rotation3, Vector3};
 
 use super::read::read_urdf;
-use crate::formats::mjcf::{DRY_FRICTION, option};
 use crate::formats::robot::mechanism::{
-    Link, Mechanism, escaped, file, friction_widths, head, numbers,
+    Link, Mechanism, file, friction_widths, head, numbers, option,
 };
 use crate::formats::verify::{Client, PythonClient};
+use crate::formats::xml::escaped;
 use crate::formats::{ExportError, ExportModel, File, Format, RobotReader};
 use crate::model::chain::Joint;
 
@@ -62,13 +62,6 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         lost(drive.constant != 0.0, "the constant torque");
         #[allow(clippy::float_cmp)] // as set
         lost(drive.gain != 1.0 || drive.gear != 1.0, "the drive's gain");
-    }
-    if mechanism
-        .joints
-        .iter()
-        .any(|joint| joint.drivetrain.friction > 0.0)
-    {
-        lost.push(DRY_FRICTION.into());
     }
     lost
 }

@@ -122,7 +122,7 @@ fn floats_are_within_two_units_of_the_truth() {
 }
 
 #[test]
-fn what_is_no_number_or_beyond_all_is_as_in_the_standard_library() {
+fn nan_and_infinity_give_what_the_standard_library_gives() {
     let x = [
         f64::NAN,
         f64::INFINITY,

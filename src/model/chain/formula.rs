@@ -112,7 +112,7 @@ mod tests {
     use super::{factors, number, sum};
 
     #[test]
-    fn sums_read_as_one_would_write_them() {
+    fn sums_print_in_conventional_form() {
         let (c1, c2, s2) = (Series::cos(0), Series::cos(1), Series::sin(1));
         let folded = &(&c1 * &c2) * -0.5;
         let mixed = &(&Series::coordinate(2) * &s2) - &Series::constant(3.0);

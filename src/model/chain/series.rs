@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cancels_is_gone() {
+    fn terms_that_cancel_are_removed() {
         let (c1, s1) = (Series::cos(0), Series::sin(0));
         let (c2, s2) = (Series::cos(1), Series::sin(1));
         assert_eq!(&(&c1 * &c1) + &(&s1 * &s1), Series::constant(1.0));
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_is_cleaned_away() {
+    fn rounding_errors_are_removed() {
         let dirty = &Series::constant(0.1 + 0.2) + &(&Series::cos(0) * 1e-17);
         assert_eq!(dirty.cleaned(|_| 1.0), Series::constant(0.3));
     }

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn tensors_of_no_body_are_told() {
+    fn impossible_inertia_tensors_are_reported() {
         let tensor = |x, y, z| Matrix3::from_diagonal(&Vector3::new(x, y, z));
         assert_eq!(fault(&tensor(0.1, 0.2, 0.3)), None);
         assert!(fault(&tensor(0.1, 0.2, 0.31)).unwrap().contains("sum"));

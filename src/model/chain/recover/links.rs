@@ -1,10 +1,14 @@
 //! Masses, lengths and inertias of links with the fitted equations.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Complex, Matrix3, Vector3};
 
-use super::{Planar, ROUNDING, SAME};
+use super::shape::{ROUNDING, SAME};
 use crate::model::chain::spatial::with_z_along;
 use crate::model::chain::{Drivetrain, Inertia, Joint, Pose};
+
+/// A point or vector of the plane in which links turn, as z + i x with z up. A rotation by q about y multiplies it by
+/// exp(i q).
+pub(super) type Planar = Complex<f64>;
 
 /// Distance of a body's mass from its axis where the motion does not determine the mass, m.
 const GYRATION: f64 = 0.1;
@@ -12,13 +16,13 @@ const GYRATION: f64 = 0.1;
 /// Joints in the world frame, and gravity (m/s^2) as a vector of the plane.
 pub(super) type Links = (Vec<Joint>, Planar);
 
-/// Builds the links from the coefficients of [`Shape`](super::Shape) and gravity (m/s^2).
+/// Builds the links from the coefficients of [`Shape`](super::shape::Shape) and gravity (m/s^2).
 ///
 /// # Errors
 /// Coefficients that no bodies can have.
 pub(super) type Build = fn(&[f64], f64) -> Result<Links, String>;
 
-/// A link that turns. `found` are the coefficients of [`Shape`](super::Shape), `gravity` in m/s^2; so below.
+/// A link that turns. `found` are the coefficients of [`Shape`](super::shape::Shape), `gravity` in m/s^2; so below.
 pub(super) fn turning(found: &[f64], gravity: f64) -> Result<Links, String> {
     let [inertia, cos, sin, ..] = found[..] else {
         unreachable!("the shape has these")

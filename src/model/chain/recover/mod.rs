@@ -5,17 +5,13 @@
 mod links;
 mod shape;
 
-use nalgebra::{Complex, Vector3};
+use nalgebra::Vector3;
 
 use super::spatial::turn;
 use super::{Joint, Pose};
 use crate::model::Dynamics;
-use links::Build;
-use shape::Shape;
-
-/// A point or vector of the plane in which links turn, as z + i x with z up. A rotation by q about y multiplies it by
-/// exp(i q).
-type Planar = Complex<f64>;
+use links::{Build, Planar};
+use shape::{KNOWN, ROUNDING, Shape};
 
 /// A mechanism with the same equations of motion.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,10 +21,6 @@ pub(crate) struct Recovered {
     pub gravity: f64,
 }
 
-/// Largest deviation of the equations from those of a mechanism, relative to the largest value of each entry.
-const SAME: f64 = 1e-9;
-/// A number below this share of what it is added to is rounding.
-const ROUNDING: f64 = 1e-10;
 /// Gravity where the equations do not contain it, m/s^2.
 const GRAVITY: f64 = 9.81;
 
@@ -62,8 +54,6 @@ pub(crate) fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recover
     }
     Ok(upright(joints, downward))
 }
-
-const KNOWN: &str = "it is none of the mechanisms that are known: one joint, two that turn in one plane, one that turns on one that slides";
 
 /// The model's own gravity if it has one, m/s^2.
 fn gravity(declared: &Dynamics) -> f64 {
@@ -107,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn the_acrobots_elbow_is_a_link_away() {
+    fn the_acrobots_elbow_is_one_link_from_its_shoulder() {
         let acrobot = built_in("acrobot");
         let elbow = acrobot.joints[1].pose.origin;
         assert!((elbow.norm() - 1.0).abs() < 1e-12, "{elbow}");

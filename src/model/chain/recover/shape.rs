@@ -2,9 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{KNOWN, ROUNDING, SAME};
 use crate::model::Dynamics;
 use crate::model::chain::series::Series;
+
+/// Largest deviation of the equations from those of a mechanism, relative to the largest value of each entry.
+pub(super) const SAME: f64 = 1e-9;
+/// A number below this share of what it is added to is rounding.
+pub(super) const ROUNDING: f64 = 1e-10;
+pub(super) const KNOWN: &str = "it is none of the mechanisms that are known: one joint, two that turn in one plane, one that turns on one that slides";
 
 /// The terms whose weighted sum is the equations of one kind of mechanism.
 pub(super) struct Shape {

@@ -1,0 +1,138 @@
+//! XML whose every error names file, line and column.
+
+use std::cell::RefCell;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use roxmltree::{Document, Node};
+
+use super::robot::element::Element;
+use crate::model::FileError;
+
+/// An XML file, and notes about it.
+pub(in crate::formats) struct Source<'x> {
+    path: PathBuf,
+    document: Document<'x>,
+    notes: RefCell<Vec<(u32, String)>>,
+}
+
+/// The text of a file.
+pub(in crate::formats) fn text(path: &Path) -> Result<String, FileError> {
+    std::fs::read_to_string(path).map_err(|error| FileError {
+        path: path.to_owned(),
+        place: None,
+        message: format!("cannot be read: {error}; give an XML file"),
+    })
+}
+
+impl<'x> Source<'x> {
+    pub fn new(path: &Path, text: &'x str) -> Result<Self, FileError> {
+        let document = Document::parse(text).map_err(|error| FileError {
+            path: path.to_owned(),
+            place: Some((error.pos().row as usize, error.pos().col as usize)),
+            message: format!("this is not valid XML: {error}"),
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            document,
+            notes: RefCell::default(),
+        })
+    }
+
+    /// Note something about an element that is not an error.
+    pub fn note(&self, node: Node<'_, '_>, message: impl fmt::Display) {
+        let place = self.document.text_pos_at(node.range().start);
+        self.notes
+            .borrow_mut()
+            .push((place.row, message.to_string()));
+    }
+
+    /// All notes, in the order of the file.
+    pub fn into_notes(self) -> Vec<String> {
+        let mut notes = self.notes.into_inner();
+        notes.sort();
+        notes.dedup();
+        notes
+            .into_iter()
+            .map(|(line, note)| format!("line {line}: {note}"))
+            .collect()
+    }
+
+    /// The root element, which must have this name.
+    pub fn root(&self, name: &str) -> Result<Node<'_, 'x>, FileError> {
+        let root = self.document.root_element();
+        if root.has_tag_name(name) {
+            return Ok(root);
+        }
+        let found = root.tag_name().name();
+        let format = match found {
+            "robot" => "; this is URDF, read it as urdf",
+            "mujoco" => "; this is MJCF, read it as mjcf",
+            _ => "",
+        };
+        let message = format!("the root element is <{found}>, expected <{name}>{format}");
+        Err(self.error(root, message))
+    }
+
+    /// An element without defaults.
+    pub fn element<'s>(&'s self, node: Node<'s, 'x>) -> Element<'s, 'x> {
+        Element::new(self, vec![node])
+    }
+
+    /// The file name without folder and extension.
+    pub fn stem(&self) -> String {
+        let stem = self.path.file_stem().unwrap_or_default();
+        stem.to_string_lossy().into_owned()
+    }
+
+    /// An error at an element.
+    pub fn error(&self, node: Node<'_, '_>, message: impl Into<String>) -> FileError {
+        self.error_at(node.range().start, message)
+    }
+
+    /// An error at a position, in bytes from the beginning of the file.
+    pub fn error_at(&self, at: usize, message: impl Into<String>) -> FileError {
+        let place = self.document.text_pos_at(at);
+        FileError {
+            path: self.path.clone(),
+            place: Some((place.row as usize, place.col as usize)),
+            message: message.into(),
+        }
+    }
+
+    /// An error at an attribute of an element.
+    pub fn attribute_error(
+        &self,
+        node: Node<'_, '_>,
+        key: &str,
+        message: impl Into<String>,
+    ) -> FileError {
+        let attribute = node.attribute_node(key);
+        let at = attribute.map_or(node.range().start, |a| a.range_value().start);
+        self.error_at(at, message)
+    }
+}
+
+/// The child elements.
+pub(in crate::formats) fn elements<'a, 'x>(
+    node: Node<'a, 'x>,
+) -> impl Iterator<Item = Node<'a, 'x>> {
+    node.children().filter(Node::is_element)
+}
+
+/// The child elements of one name.
+pub(in crate::formats) fn named<'a, 'x>(
+    node: Node<'a, 'x>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a, 'x>> {
+    elements(node).filter(move |child| child.has_tag_name(name))
+}
+
+/// Text that can stand in an element or an attribute.
+pub(super) fn escaped(text: &str) -> String {
+    let text = text
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;");
+    text.replace('"', "&quot;").replace(['\n', '\r', '\t'], " ")
+}

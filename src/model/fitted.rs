@@ -1,0 +1,129 @@
+//! Effects as part of a model.
+
+use super::Parameter;
+use super::dynamics::OwnValue;
+use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
+use super::filter::CommandFilter;
+use crate::data::Joint;
+use crate::expr::{Graph, Program, Scope, SignForm};
+
+/// An effect on a joint of a model, with its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedEffect {
+    pub effect: Effect,
+    pub joint: Joint,
+    /// One for each of the effect's parameters: value and 95 % interval.
+    pub values: Vec<(f64, Option<[f64; 2]>)>,
+    /// Values in single logs; in all other logs those of `values` hold.
+    pub own: Vec<OwnValue>,
+    /// Held at these values in every fit.
+    pub fixed: bool,
+}
+
+impl FittedEffect {
+    /// The effect on a joint with all parameters zero.
+    pub fn absent(effect: &Effect, joint: Joint) -> Self {
+        Self {
+            effect: effect.clone(),
+            joint,
+            values: vec![(0.0, None); effect.parameters.len()],
+            own: Vec::new(),
+            fixed: false,
+        }
+    }
+
+    /// Identifies the effect within a model.
+    pub fn label(&self) -> String {
+        format!("{} on joint {}", self.title(), self.joint)
+    }
+
+    /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let filter = matches!(self.effect.entry, Entry::Command(_));
+        let same_filter = filter && self.effect.entry == other.effect.entry;
+        self.label() == other.label() || same_filter && self.joint == other.joint
+    }
+
+    /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
+    pub fn expression(&self, names: &[String]) -> String {
+        match self.program(names) {
+            Ok(program) => program.formula(0),
+            Err(filter) => filter.expression(&self.joint.name("tau"), &names[0]),
+        }
+    }
+
+    /// The effect's formula as a program, or the filter that it is.
+    pub(super) fn program(&self, names: &[String]) -> Result<Program, CommandFilter> {
+        let formula = self.effect.entry.formula_or_filter()?;
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(SignForm::Exact);
+        for name in EFFECT_NAMES {
+            let of_joint = match name {
+                "t" => name.to_owned(),
+                stem => self.joint.name(stem),
+            };
+            let node = graph.input(&of_joint);
+            scope.bind(name, node);
+        }
+        for (parameter, name) in self.effect.parameters.iter().zip(names) {
+            let node = graph.input(name);
+            scope.bind(&parameter.name, node);
+        }
+        let node = scope
+            .lower(&mut graph, formula)
+            .expect("formulas were checked when the file was read");
+        Ok(graph.finish(&[node]))
+    }
+
+    /// The names of the effect's parameters on its joint, told apart from names already `taken`.
+    pub fn parameter_names(&self, taken: &[&str]) -> Vec<String> {
+        let plain = |own: &str| match self.shifted() {
+            Some(_) => format!("{own}_shift"),
+            None => self.joint.name(own),
+        };
+        let name = |own: &str| match plain(own) {
+            plain if taken.contains(&plain.as_str()) => {
+                format!("{}_{plain}", self.effect.name)
+            }
+            plain => plain,
+        };
+        self.effect
+            .parameters
+            .iter()
+            .map(|p| name(&p.name))
+            .collect()
+    }
+
+    /// The effect's parameters as those of a model, with names that are not `taken`.
+    pub(super) fn parameters(&self, taken: &[&str], prismatic: bool) -> Vec<Parameter> {
+        let names = self.parameter_names(taken);
+        let declared = self.effect.parameters.iter().zip(&self.values);
+        declared
+            .zip(names)
+            .map(|((parameter, (value, ci95)), name)| Parameter {
+                name,
+                value: *value,
+                unit: unit_on(prismatic, &parameter.unit),
+                bounds: match parameter.measure {
+                    Measure::One => parameter.bounds,
+                    Measure::Speed | Measure::Torque => [0.0, f64::INFINITY],
+                },
+                fixed: self.fixed || parameter.whole,
+                per_log: parameter.per_log,
+                ci95: *ci95,
+                scale: parameter.typical,
+            })
+            .collect()
+    }
+}
+
+/// Effect files give units for joints that turn; on one that slides, N replaces N m and m replaces rad.
+fn unit_on(prismatic: bool, unit: &str) -> String {
+    if prismatic {
+        unit.replace("kg m^2", "kg")
+            .replace("N m", "N")
+            .replace("rad", "m")
+    } else {
+        unit.to_owned()
+    }
+}
