@@ -150,7 +150,7 @@ fn a_model_file_is_refused_with_line_column_and_the_near_name() {
 }
 
 #[test]
-fn an_unknown_effect_in_a_model_file_is_met_with_the_near_one() {
+fn an_unknown_effect_in_a_model_file_suggests_the_nearest_name() {
     let effect = "[[effect]]\nname = \"coulom_friction\"\njoint = 1\nF_c = 0.1\n\n[energy]";
     says(
         &model_message("[energy]", effect),
@@ -225,7 +225,7 @@ fn values_of_single_logs_are_for_parameters_that_have_them() {
 }
 
 #[test]
-fn a_model_that_is_not_there_is_met_with_what_is() {
+fn a_missing_model_lists_the_built_in_ones() {
     says(
         &scratch("log.csv", GOOD).closeloop("pendulun"),
         &["pendulun", "acrobot, cartpole, drive, pendulum"],
@@ -381,7 +381,7 @@ fn good_input_is_not_refused() {
 }
 
 #[test]
-fn a_cause_is_told_once() {
+fn the_cause_of_an_error_is_printed_once() {
     let folder = tempfile::tempdir().unwrap();
     let (missing, out) = (folder.path().join("none.toml"), folder.path().join("out"));
     let paths = ["--config", text(&missing), "--out", text(&out)];

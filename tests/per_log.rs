@@ -60,7 +60,7 @@ fn names(report: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn zeros_that_differ_by_log_are_a_sensors_offset() {
+fn zeros_that_differ_between_logs_are_named_as_sensor_offset() {
     let folder = tempfile::tempdir().unwrap();
     let logs = record(folder.path(), |k| format!("sensor_offset={}", OFFSETS[k]));
     let report = close(folder.path(), &logs);
@@ -108,7 +108,7 @@ fn zeros_that_differ_by_log_are_a_sensors_offset() {
 }
 
 #[test]
-fn a_zero_that_all_logs_share_is_a_tilt() {
+fn a_zero_common_to_all_logs_is_named_as_gravity_tilt() {
     let folder = tempfile::tempdir().unwrap();
     let logs = record(folder.path(), |_| "gravity_tilt=0.03".to_owned());
     let report = close(folder.path(), &logs);
@@ -119,7 +119,7 @@ fn a_zero_that_all_logs_share_is_a_tilt() {
 
 /// The plant file's start is where the rig is: hanging at rest it stays there, and the sensor reads its zero.
 #[test]
-fn a_simulated_rig_starts_where_it_is_not_where_its_sensor_reads() {
+fn a_simulated_rig_starts_at_its_true_angle() {
     let library = Library::built_in();
     let rig = RIG.replace("[1.6]", "[0.0]").replace("1e-3", "0.0");
     let mut plant = Plant::from_text(Path::new("rig.toml"), &rig, &library).unwrap();

@@ -103,7 +103,7 @@ fn read(text: &str) -> Model {
 }
 
 #[test]
-fn what_is_fixed_may_be_shifted_but_not_gravity() {
+fn fixed_parameters_but_not_gravity_may_be_shifted() {
     let acrobot = Library::system_text("acrobot").unwrap();
     let fixed = acrobot.replace("positive = true", "positive = true, fixed = true");
     let found: Vec<(String, usize)> = read(&fixed)
@@ -126,7 +126,7 @@ fn what_is_fixed_may_be_shifted_but_not_gravity() {
 }
 
 #[test]
-fn a_shift_is_what_the_file_with_another_value_is() {
+fn a_shift_equals_another_value_in_the_file() {
     let arm = read(ARM);
     let heavier = dynamics(
         &read(&ARM.replace("value = 1.0", "value = 1.25")),

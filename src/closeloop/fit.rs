@@ -17,9 +17,9 @@ impl Study<'_> {
     pub fn fit_declared(&mut self) -> Result<Fitted, StudyError> {
         let windows = cut(self.logs, self.settings.fit.short_window_s);
         let short = Shooting::new(self.logs, windows, &self.shooting.noise);
-        let (first, held) = self.fit_and_hold(&short, self.system)?;
+        let (first, held) = self.fit_and_hold(&short, self.declared)?;
         self.hold(held);
-        let (second, held) = self.fit_and_hold(&self.shooting, &first)?;
+        let (second, held) = self.fit_and_hold(&self.shooting, &first.model)?;
         self.hold(held);
         Ok(second)
     }

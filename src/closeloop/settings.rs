@@ -2,13 +2,18 @@
 
 use std::num::NonZeroUsize;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::sim::FINE_FIT_S;
+
 /// Declares a struct of settings, each default beside its reason.
 macro_rules! settings {
     ($(#[$about:meta])* $name:ident {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $default:expr,)*
     }) => {
         $(#[$about])*
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
         #[non_exhaustive]
         pub struct $name {
             $(
@@ -27,7 +32,7 @@ macro_rules! settings {
 }
 
 /// How the loop is closed.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct Settings {
     pub split: SplitSettings,
@@ -122,7 +127,7 @@ settings! {
         /// Where the loss changes by less than this share, the motion set aside does not show the effect.
         not_shown: f64 = 0.01,
         /// Where an unexplained remainder stays, effects that leave more than this share of the loss do not explain
-        /// it either: they would mask the real cause and are taken back.
+        /// it either: they would mask the real cause and are withdrawn.
         masking: f64 = 0.5,
     }
 }
@@ -223,8 +228,8 @@ settings! {
     /// Stage 7: the final estimate. Smoothing and steps shift dry friction by a few parts in a thousand, more than the
     /// noise of long logs does.
     RefineSettings {
-        /// Longest step of the integrator in s.
-        step_s: f64 = 5e-4,
+        /// Longest step of the integrator in s: half a millisecond.
+        step_s: f64 = FINE_FIT_S,
         /// Dry friction is smoothed over this share of the width that effects were selected with, unless the model
         /// file gives the width.
         narrower: f64 = 0.5,

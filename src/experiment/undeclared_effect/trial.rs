@@ -88,7 +88,7 @@ impl Closed {
             episodes,
             verdict: outcome.verdict,
             effects: outcome.effects.findings.iter().map(named).collect(),
-            parameters: (outcome.models.after.absorbed().parameters.iter())
+            parameters: (outcome.models.after.model.absorbed().parameters.iter())
                 .map(parameter)
                 .collect(),
         }
@@ -206,5 +206,5 @@ impl Lab {
 
 /// The model that closing the loop gives.
 fn fitted(outcome: &Outcome) -> Dynamics {
-    outcome.models.after.dynamics()
+    outcome.models.after.model.dynamics()
 }

@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_data_is_drawn() {
+    fn degenerate_data_are_drawn() {
         let cases = [
             vec![],
             vec![(0.0, 1.0)],
