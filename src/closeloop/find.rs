@@ -11,7 +11,7 @@ use super::study::Study;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Library};
 
-/// What the logs say about what the declared model lacks.
+/// The result of searching the logs for what the declared model lacks.
 pub struct Found {
     /// The declared model, fitted.
     pub before: Fitted,
@@ -21,7 +21,7 @@ pub struct Found {
 
 /// What was selected on a part of the logs and confirmed on the rest.
 pub struct Chosen {
-    /// The model with the effects that stood, fitted to all logs.
+    /// The model with the confirmed effects, fitted to all logs.
     pub after: Fitted,
     pub rounds: Vec<Round>,
     /// Effects that explain the logs as well as one that was selected.
@@ -33,8 +33,8 @@ pub struct Chosen {
     pub failure: Option<FitError>,
 }
 
-/// Stages 3 to 5: fit the declared model, choose effects on a part of the logs, confirm them on the rest, fit what
-/// stood to all of them and test what is left.
+/// Stages 3 to 5: fit the declared model, select effects on a part of the logs, confirm them on the rest, fit the model
+/// with the confirmed ones to all logs and test its residuals.
 ///
 /// # Errors
 /// As [`Study::fit_declared`].
@@ -66,7 +66,7 @@ pub fn find(
     })
 }
 
-/// Why effects are withdrawn that leave most of the loss beside an unexplained remainder.
+/// Why effects are withdrawn that leave most of the loss and an unexplained remainder.
 const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
 

@@ -35,7 +35,7 @@ impl Study<'_> {
         let locals = shooting.initial_locals(0);
         let (values, free) = fit(shooting, &dynamics, &active, locals, None)?;
         let mut verdict = identifiability(&dynamics, &values, &free);
-        // Only declared parameters are held: an effect that the file carries is asked about as it is.
+        // Only declared parameters are held: an effect that the file carries stays free.
         verdict.hold.retain(|&k| k < model.parameters.len());
         if verdict.hold.is_empty() {
             let fitted = Fitted::new(&model, &dynamics, (values, free), self.logs);

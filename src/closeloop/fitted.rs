@@ -8,7 +8,7 @@ use crate::sim::metric::{Trace, traces};
 pub struct Fitted {
     /// With the values found.
     pub model: Model,
-    /// What the fit says of them.
+    /// How the fit ended, and its normal equations there.
     pub fit: Fit,
 }
 

@@ -1,5 +1,5 @@
-//! Stage 8: train a small network on what the refined model leaves. Whoever carries out tensors trains it: see
-//! [`ResidualLearner`].
+//! Stage 8: train a small network on the residual of the refined model. The training itself is behind a trait, since it
+//! needs tensors: see [`ResidualLearner`].
 
 use std::error::Error;
 use std::fmt::Debug;
@@ -33,7 +33,7 @@ pub struct ResidualTask {
 /// Trains residual networks.
 pub trait ResidualLearner: Debug + Sync {
     /// Train a network on what the equations leave and keep the epoch that predicts the validation stretches best; the
-    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` is told the
+    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` receives the
     /// epoch.
     ///
     /// # Errors

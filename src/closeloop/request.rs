@@ -6,7 +6,7 @@ use crate::data::Log;
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
-/// What closing the loop is asked for.
+/// The inputs of closing the loop.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Request<'a> {

@@ -10,7 +10,7 @@ const MOST_STEPS: usize = 40;
 
 /// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `locals`, with every window's
 /// start state (and forces) free. `scale` fixes the scale of the residuals; without it, it is estimated by their median
-/// absolute deviation as the fit proceeds. Returns the values found and what the fit says of them.
+/// absolute deviation as the fit proceeds. Returns the values found and how the fit ended.
 ///
 /// # Errors
 /// No window, or a model that diverges at the starting values. A fit that does not converge is no error: its
@@ -38,7 +38,7 @@ pub fn fit(
     Ok(search.finish(termination))
 }
 
-/// A model as it stands, no value changed, and the normal equations of each window in the parameters `active` there.
+/// Evaluate a model without changing a value: the normal equations of each window in the parameters `active`.
 ///
 /// # Errors
 /// As [`fit`].

@@ -19,7 +19,7 @@ pub enum FitError {
     Diverged { diverged: usize, windows: usize },
 }
 
-/// What a fit says beside the values that it found.
+/// The result of a fit beside the values found: its cost, how it ended, and the normal equations there.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Which parameters were free.

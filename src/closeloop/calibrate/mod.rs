@@ -73,7 +73,7 @@ fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
         .then_some(hidden)
 }
 
-/// Where the work stands, for a progress display.
+/// Progress of the work, for a display.
 #[derive(Debug, Clone, Copy)]
 pub struct Repetition<'s> {
     pub number: usize,

@@ -28,8 +28,8 @@ pub enum NotSimulated {
     Diverged,
 }
 
-/// The sets of effects that do as well as the one that stood, the best first; those of which a part was withdrawn
-/// are none. For the best of them the experiment that tells them from it is simulated.
+/// The sets of effects that explain the logs as well as the confirmed one, the best first; sets that replace a
+/// withdrawn effect are left out. For the best of them the experiment that tells the two apart is simulated.
 pub(in crate::closeloop) fn discriminate(
     study: &Study<'_>,
     found: &Found,

@@ -25,7 +25,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// What it says of each parameter: its value or, where it has one per log, its values in single logs.
+    /// The value of each parameter or, where it has one per log, its values in single logs.
     pub fn rows(&self) -> Vec<(Parameter, Option<&OwnValue>)> {
         let of_parameter = |(k, parameter): (usize, &Parameter)| {
             if !parameter.per_log {

@@ -13,10 +13,10 @@ fn folds(study: &Study<'_>) -> Vec<usize> {
     }
 }
 
-/// The loss of a fit to a study's windows on each fold of them, of the parameters fitted without it. The fit is not repeated: each window's loss
-/// is taken as quadratic around the joint optimum, where leaving out a fold moves the parameters by
-/// (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own: no other log
-/// could tell them.
+/// The loss on each fold of a study's windows, with the parameters that a fit to the other folds would give. The fit is not
+/// repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a fold moves the
+/// parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since no other
+/// log determines them.
 pub fn left_out_losses(study: &Study<'_>, fit: &Fit) -> Vec<f64> {
     let parts = fit.equations_by(&folds(study));
     let mut all = fit.zero_equations();

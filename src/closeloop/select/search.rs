@@ -66,7 +66,7 @@ pub struct Search<'a, 'p> {
 }
 
 impl<'a, 'p> Search<'a, 'p> {
-    /// `progress` hears what is being tried.
+    /// `progress` receives what is being tried.
     pub fn new(
         study: &'a Study<'a>,
         library: &'a [Effect],
@@ -197,8 +197,8 @@ impl<'a, 'p> Search<'a, 'p> {
         }
     }
 
-    /// Weigh every effect of the model again, beside all others: early ones were chosen without those that followed. The
-    /// first other model that the evidence supports.
+    /// Test each effect of the model again in the presence of all others, since early ones were selected without those
+    /// that followed. Returns the first other model that the evidence supports.
     fn exchanged(&mut self, fitted: &Fitted) -> Option<Fitted> {
         self.study.added(&fitted.model).find_map(|k| {
             let (present, without) = self.without(fitted, k)?;
