@@ -66,7 +66,7 @@ fn a_model_swings_up_its_own_plant_and_the_episode_is_written() {
 }
 
 #[test]
-fn options_reach_the_plant() {
+fn options_change_the_plant() {
     let dir = tempfile::tempdir().unwrap();
     let command = [
         "control",
@@ -94,7 +94,7 @@ fn options_reach_the_plant() {
 }
 
 #[test]
-fn what_cannot_be_controlled_is_told() {
+fn control_refuses_other_systems_tasks_and_settings() {
     let dir = tempfile::tempdir().unwrap();
     let message = |arguments: &[&str]| refused(dir.path(), &[&["control"], arguments].concat());
     let other = message(&["--model", "acrobot", "--plant", "pendulum-real"]);
@@ -160,7 +160,7 @@ fn error_of(checkpoint: &Checkpoint, recipe: &str) -> f64 {
     let training = checkpoint
         .training(&job_dynamics(&job), &Backend::NdArray.device())
         .unwrap();
-    let outcome = job.outcome(&training, Path::new("shipped")).unwrap();
+    let outcome = job.results(&training, Path::new("shipped")).unwrap();
     outcome.test_error.unwrap().after
 }
 
@@ -209,13 +209,13 @@ fn least_return(name: &str) -> f64 {
 }
 
 #[test]
-fn the_shipped_pendulum_comes_again_and_swings_up() {
+fn the_shipped_pendulum_checkpoint_is_reproduced_and_swings_up() {
     comes_again("pendulum-sim", "train-pendulum-sim.toml", 1e-6);
     assert!(least_return("pendulum-sim") > 290.0);
 }
 
 #[test]
-fn the_shipped_acrobot_comes_again_and_swings_up() {
+fn the_shipped_acrobot_checkpoint_is_reproduced_and_swings_up() {
     comes_again("acrobot-sim", "train-acrobot-sim.toml", 1e-4);
     assert!(least_return("acrobot-sim") > 3400.0);
 }
@@ -259,7 +259,7 @@ fn every_experiment_is_sound() {
 }
 
 #[test]
-fn a_killed_experiment_goes_on_to_the_same_numbers() {
+fn a_killed_experiment_resumes_to_the_same_numbers() {
     let config = config("smoke/physics-prior-pendulum.toml");
     let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let command = experiment("physics-prior", &config, "x");
@@ -311,7 +311,7 @@ fn a_killed_experiment_goes_on_to_the_same_numbers() {
 }
 
 #[test]
-fn a_folder_keeps_to_its_experiment() {
+fn a_folder_of_another_experiment_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(configs().join("smoke/receding-horizon-pendulum.toml")).unwrap();
     let text = text
@@ -352,7 +352,7 @@ fn a_folder_keeps_to_its_experiment() {
 }
 
 #[test]
-fn an_offline_prior_is_what_its_checkpoint_is() {
+fn a_checkpoint_serves_as_prior_in_its_own_experiment_alone() {
     let dir = tempfile::tempdir().unwrap();
     let config = config("smoke/offline-prior-pendulum.toml");
     let found = json(dir.path(), &experiment("offline-prior", &config, "x"));
@@ -371,7 +371,7 @@ fn an_offline_prior_is_what_its_checkpoint_is() {
 }
 
 #[test]
-fn one_run_tells_of_its_rounds() {
+fn a_single_run_reports_its_rounds() {
     let dir = tempfile::tempdir().unwrap();
     let config = config("smoke/physics-prior-pendulum.toml");
     let command = [

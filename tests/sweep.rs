@@ -22,7 +22,7 @@ fn numbers(result: &Value, key: &str) -> Vec<f64> {
 }
 
 #[test]
-fn seeds_give_models_of_their_own_whichever_are_trained_together() {
+fn a_model_depends_on_its_seed_and_not_on_the_batch() {
     let dir = tempfile::tempdir().unwrap();
     let run = |together| {
         let more = ["--seeds", "5", "--seed", "3", "--together", together];
@@ -45,7 +45,7 @@ fn seeds_give_models_of_their_own_whichever_are_trained_together() {
 }
 
 #[test]
-fn a_heavier_penalty_leaves_a_smaller_residual() {
+fn a_larger_penalty_leaves_a_smaller_residual() {
     let dir = tempfile::tempdir().unwrap();
     let more = ["--seeds", "3", "--one-seed", "--alpha", "1e-6-1"];
     let found = sweep("smoke/train-pendulum.toml", dir.path(), &more);
@@ -57,7 +57,7 @@ fn a_heavier_penalty_leaves_a_smaller_residual() {
 }
 
 #[test]
-fn people_read_quartiles() {
+fn the_text_lists_quartiles() {
     let dir = tempfile::tempdir().unwrap();
     let config = configs().join("smoke/train-pendulum-offline.toml");
     let out = ["--out", text(dir.path())];
@@ -74,7 +74,7 @@ fn people_read_quartiles() {
 }
 
 #[test]
-fn what_diverges_is_said_and_is_null() {
+fn diverged_models_are_counted_and_null_in_json() {
     let dir = tempfile::tempdir().unwrap();
     let smoke = std::fs::read_to_string(configs().join("smoke/train-pendulum.toml")).unwrap();
     let recipe = smoke
@@ -93,7 +93,7 @@ fn what_diverges_is_said_and_is_null() {
 }
 
 #[test]
-fn what_cannot_be_swept_is_refused_with_a_remedy() {
+fn contradictory_sweeps_are_refused_with_a_remedy() {
     let dir = tempfile::tempdir().unwrap();
     let smoke = std::fs::read_to_string(configs().join("smoke/train-pendulum.toml")).unwrap();
     let smoke = smoke.replace("../plants", text(&configs().join("plants")));

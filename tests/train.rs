@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use residyn::model::Library;
 use residyn::runs::RunFolder;
-use residyn::train::recipe::{Job, Outcome, Recipe};
+use residyn::train::recipe::{Job, Recipe, TrainingResults};
 use residyn::train::{Backend, Penalty};
 use serde_json::Value;
 
@@ -46,16 +46,16 @@ pub fn refused(dir: &Path, arguments: &[&str]) -> String {
 }
 
 /// A recipe carried out in this process.
-fn train(recipe: Recipe, backend: Backend) -> Outcome {
+fn train(recipe: Recipe, backend: Backend) -> TrainingResults {
     let job = Job::train(recipe, &Library::built_in(), backend, 0).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let folder = RunFolder::open(dir.path()).unwrap();
     let mut training = job.begin(&folder).unwrap();
     let mut observer = |_: &residyn::train::Progress| ControlFlow::Continue(());
     training
-        .run(&job.material.training, None, &mut observer)
+        .run(&job.data.training, None, &mut observer)
         .unwrap();
-    job.outcome(&training, dir.path()).unwrap()
+    job.results(&training, dir.path()).unwrap()
 }
 
 fn recipe(name: &str) -> Recipe {
@@ -63,8 +63,8 @@ fn recipe(name: &str) -> Recipe {
 }
 
 /// How far the worst parameter is from the truth, as a share of it.
-fn worst(outcome: &Outcome) -> f64 {
-    let off = |p: &residyn::train::recipe::Learnt| {
+fn worst(outcome: &TrainingResults) -> f64 {
+    let off = |p: &residyn::train::recipe::FittedParameter| {
         let truth = p.truth.unwrap();
         ((p.found - truth) / truth).abs()
     };
@@ -88,7 +88,7 @@ fn kill_midway(dir: &Path, arguments: &[&str], checkpoint: &Path) {
 }
 
 #[test]
-fn a_killed_run_goes_on_to_the_same_numbers() {
+fn a_killed_run_resumes_to_the_same_numbers() {
     let config = config("train-pendulum.toml");
     let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let command = [
@@ -125,7 +125,7 @@ fn a_killed_run_goes_on_to_the_same_numbers() {
 }
 
 #[test]
-fn a_checkpoint_of_another_run_is_left_alone() {
+fn a_checkpoint_of_another_run_is_not_overwritten() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let config = config("smoke/train-pendulum.toml");
@@ -236,7 +236,7 @@ fn tuning_on_logs_needs_no_recipe() {
 }
 
 #[test]
-fn tuning_refuses_what_does_not_fit() {
+fn tuning_refuses_other_systems_start_values_and_missing_checkpoints() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let acrobot = config("smoke/train-acrobot.toml");
@@ -262,7 +262,7 @@ fn tuning_refuses_what_does_not_fit() {
 }
 
 #[test]
-fn the_published_settings_find_the_pendulum() {
+fn the_published_settings_recover_the_pendulum_parameters() {
     for backend in Backend::ALL {
         let outcome = train(recipe("train-pendulum.toml"), *backend);
         assert!(worst(&outcome) < 0.01, "{backend}: {outcome:?}");
@@ -287,10 +287,10 @@ fn the_published_settings_find_the_pendulum() {
 /// | 1e-3  | 14.999 | 3.000 | 6.3e-4           | 1.10        |
 /// | 1e-2  | 15.000 | 3.000 | 2.2e-3           | 0.001       |
 ///
-/// Without the penalty a network takes over what the physics can express; with too much of it, the residual is
-/// squeezed out and friction is left unlearnt.
+/// Without the penalty a network takes over what the physics can express; with too much of it, the residual
+/// vanishes and friction is not learnt.
 #[test]
-fn only_the_penalty_makes_the_split_unique() {
+fn without_the_penalty_the_parameters_are_not_unique() {
     let with = |alpha| {
         let mut recipe = recipe("train-pendulum.toml");
         recipe.fit.penalty = Penalty::Fixed { alpha };
@@ -304,7 +304,7 @@ fn only_the_penalty_makes_the_split_unique() {
 }
 
 #[test]
-fn the_acrobot_is_found() {
+fn the_published_settings_recover_the_acrobot_parameters() {
     let outcome = train(recipe("train-acrobot.toml"), Backend::NdArray);
     assert!(worst(&outcome) < 0.01, "{outcome:?}");
     assert!(

@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use residyn::experiment::undeclared_effect::{Contestant, Experiment, Lab};
+use residyn::experiment::undeclared_effect::{Experiment, PlanningModel, Session};
 use residyn::model::Library;
 use residyn::runs::RunFolder;
 use residyn::train::Backend;
 
 use crate::train::configs;
 
-fn lab(path: &Path) -> Lab {
+fn session(path: &Path) -> Session {
     let experiment = Experiment::read(path).unwrap();
-    Lab::new(experiment, Library::built_in(), Backend::NdArray, 0).unwrap()
+    Session::new(experiment, Library::built_in(), Backend::NdArray, 0).unwrap()
 }
 
 fn smoke() -> PathBuf {
@@ -23,17 +23,17 @@ fn smoke() -> PathBuf {
 fn every_experiment_is_sound() {
     for name in ["pendulum", "acrobot"] {
         let path = configs().join(format!("undeclared-effect/{name}.toml"));
-        assert!(lab(&path).experiment.seeds >= 10);
+        assert!(session(&path).experiment.seeds >= 10);
     }
 }
 
 #[test]
-fn friction_is_named_after_an_episode_and_the_return_comes_back() {
+fn friction_is_named_after_an_episode_and_the_return_recovered() {
     let dir = tempfile::tempdir().unwrap();
-    let mut lab = lab(&smoke());
+    let mut session = session(&smoke());
     let count = AtomicUsize::new(0);
     let folder = RunFolder::open(dir.path()).unwrap();
-    let outcome = lab
+    let outcome = session
         .run(&folder, &|_| {
             count.fetch_add(1, Ordering::Relaxed);
         })
@@ -44,25 +44,25 @@ fn friction_is_named_after_an_episode_and_the_return_comes_back() {
     assert_eq!(found.len(), 1);
     assert_eq!(found[0].name, "coulomb_friction");
     assert!((found[0].parameters[0].1 - 0.7).abs() < 0.05, "{found:?}");
-    let won = |model: Contestant| {
+    let won = |model: PlanningModel| {
         let mut models = case.models.iter().filter(|m| m.model == model);
         models.next().unwrap().won_back.unwrap().share
     };
     assert!(case.is_lost && case.loss > 50.0, "{}", case.loss);
-    assert!(won(Contestant::Closed) > 0.9);
+    assert!(won(PlanningModel::Closed) > 0.9);
     assert!(outcome.reached);
     assert!(outcome.text().contains("coulomb_friction@1"));
 
     // What is done is not done again, and what another experiment left is not taken for it.
     let kept = dir.path().join("runs/coulomb_friction-0.json");
     let written = std::fs::metadata(&kept).unwrap().modified().unwrap();
-    assert_eq!(lab.run(&folder, &|_| {}).unwrap(), outcome);
+    assert_eq!(session.run(&folder, &|_| {}).unwrap(), outcome);
     assert_eq!(
         std::fs::metadata(&kept).unwrap().modified().unwrap(),
         written
     );
-    lab.experiment.fit.epochs += 1;
-    let refused = lab.run(&folder, &|_| {}).unwrap_err().to_string();
+    session.experiment.fit.epochs += 1;
+    let refused = session.run(&folder, &|_| {}).unwrap_err().to_string();
     assert!(refused.contains("holds another run: its `fit.epochs` is 20, here it is 21"));
 }
 
@@ -75,8 +75,8 @@ fn bad_experiments_are_refused_with_their_remedy() {
         assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
         let read = Experiment::read(&path);
-        let lab = read.and_then(|e| Lab::new(e, Library::built_in(), Backend::NdArray, 0));
-        lab.err().unwrap().to_string()
+        let session = read.and_then(|e| Session::new(e, Library::built_in(), Backend::NdArray, 0));
+        session.err().unwrap().to_string()
     };
     let cases = [
         (

@@ -5,8 +5,8 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 
 use super::{Answer, Common, command_line, inputs, progress};
-use crate::experiment::undeclared_effect::{self, Lab, Trial};
-use crate::experiment::{Config, Experiment, Session, Step, picture};
+use crate::experiment::undeclared_effect::{self, Trial};
+use crate::experiment::{Config, Experiment, FinishedRound, Session, picture};
 use crate::model::Library;
 use crate::runs::RunFolder;
 
@@ -80,7 +80,7 @@ fn published(
     let config = Config::read(&arguments.config)?;
     let session = Session::open(config, library, device, seed)?;
     let bar = progress::bar(session.rounds());
-    let results = session.carry_out(experiment, clock.folder, &|step: &Step<'_>| {
+    let results = session.carry_out(experiment, clock.folder, &|step: &FinishedRound<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
         if !step.found {
@@ -110,10 +110,10 @@ fn undeclared_effect(
 ) -> Result<Finished> {
     let Common { device, seed, .. } = arguments.common;
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
-    let lab = Lab::new(experiment, library, device, seed)?;
-    let trials = lab.experiment.seeds * lab.plants.len() as u64;
+    let session = undeclared_effect::Session::new(experiment, library, device, seed)?;
+    let trials = session.experiment.seeds * session.plants.len() as u64;
     let bar = progress::bar(usize::try_from(trials)?);
-    let outcome = lab.run(clock.folder, &|trial: &Trial| {
+    let outcome = session.run(clock.folder, &|trial: &Trial| {
         bar.inc(1);
         bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
         clock.save();
@@ -147,14 +147,14 @@ fn files(out: &Path, names: &[&str]) -> String {
 }
 
 /// The text of the progress bar.
-pub(super) fn message(step: &Step<'_>) -> String {
-    let Step {
+pub(super) fn message(step: &FinishedRound<'_>) -> String {
+    let FinishedRound {
         method,
         seed,
         round,
         ..
     } = step;
-    let (transitions, total) = (round.transitions, round.judged.total);
+    let (transitions, total) = (round.transitions, round.score.total);
     format!("rounds; {method} seed {seed}: {transitions} transitions, return {total:.1}")
 }
 

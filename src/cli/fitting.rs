@@ -41,7 +41,7 @@ impl Saving {
 /// Runs a job to its end and prints the results.
 pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common) -> Result<Answer> {
     let folder = RunFolder::open(dir)?;
-    for note in &job.material.notes {
+    for note in &job.data.notes {
         eprintln!("note: {note}");
     }
     let mut training = job.begin(&folder)?;
@@ -53,11 +53,11 @@ pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common)
         );
     }
     run(job, &mut training, dir, saving)?;
-    let outcome = job.outcome(&training, dir)?;
+    let results = job.results(&training, dir)?;
     if common.json {
-        inputs::print(&(serde_json::to_string_pretty(&outcome)? + "\n"))?;
+        inputs::print(&(serde_json::to_string_pretty(&results)? + "\n"))?;
     } else {
-        inputs::print(&outcome.text())?;
+        inputs::print(&results.text())?;
     }
     Ok(Answer::Yes)
 }
@@ -81,7 +81,7 @@ fn run(job: &Job, training: &mut Training, dir: &Path, saving: &Saving) -> Resul
         }
         ControlFlow::Continue(())
     };
-    let ended = training.run(&job.material.training, None, &mut observer);
+    let ended = training.run(&job.data.training, None, &mut observer);
     bar.finish_and_clear();
     ended?;
     match failed {

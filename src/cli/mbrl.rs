@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::experiment::message;
 use super::{Answer, Common, inputs, progress};
-use crate::experiment::{Config, Session, Step};
+use crate::experiment::{Config, FinishedRound, Session};
 use crate::mbrl::Round;
 use crate::report::EventFile;
 use crate::runs::RunFolder;
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let rounds = Mutex::new(Vec::new());
     let failed = Mutex::new(None);
     let bar = progress::bar(session.rounds_of(method));
-    let ended = session.run_alone(method, &folder, &|step: &Step<'_>| {
+    let ended = session.run_alone(method, &folder, &|step: &FinishedRound<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
         locked(&rounds).push(step.round.clone());
@@ -99,8 +99,8 @@ fn now_s() -> f64 {
 fn tell(events: &mut EventFile, round: &Round) -> Result<()> {
     let step = i64::try_from(round.transitions)?;
     let mut scalar = |tag: &str, value: f64| events.scalar(tag, step, now_s(), value);
-    scalar("return", round.judged.total)?;
-    scalar("success", f64::from(u8::from(round.judged.success)))?;
+    scalar("return", round.score.total)?;
+    scalar("success", f64::from(u8::from(round.score.success)))?;
     scalar("prediction error", round.error)?;
     scalar("residual norm", round.residual_norm)?;
     for (name, value) in &round.parameters {
@@ -112,10 +112,10 @@ fn tell(events: &mut EventFile, round: &Round) -> Result<()> {
 fn table(rounds: &[Round], checkpoint: &Path) -> String {
     let mut text = String::from("transitions      return  success  prediction error   ||F_r||\n");
     for round in rounds {
-        let success = if round.judged.success { "yes" } else { "no" };
+        let success = if round.score.success { "yes" } else { "no" };
         text += &format!(
             "{:>11}  {:>10.2}  {success:>7}  {:>16.3e}  {:>8.4}\n",
-            round.transitions, round.judged.total, round.error, round.residual_norm
+            round.transitions, round.score.total, round.error, round.residual_norm
         );
     }
     text + &format!("checkpoint: {}\n", checkpoint.display())

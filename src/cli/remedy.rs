@@ -49,7 +49,7 @@ fn of_recipe(error: &RecipeError) -> Option<&'static str> {
 }
 
 fn of_experiment(error: &ExperimentError) -> Option<&'static str> {
-    let cannot_open = matches!(error, ExperimentError::Open { .. });
+    let cannot_open = matches!(error, ExperimentError::Recipe(RecipeError::Open { .. }));
     cannot_open.then_some("give a file with --config")
 }
 

@@ -8,12 +8,13 @@ use clap::Args;
 
 use super::{Answer, Common, command_line, inputs, progress};
 use crate::runs::RunFolder;
-use crate::train::recipe::{Job, Member, Recipe, Swept};
+use crate::train::recipe::{Job, Member, Recipe, SweepResults};
 use crate::train::{SweepProgress, Trained};
 
 /// Train many models by one recipe at once, with different initial weights or different weights of the penalty
 ///
-/// All models are trained on the data of --seed. They form one batch, which keeps a graphics card (--device cuda) busy.
+/// All models are trained on the data of --seed: on the processor one after the other, on a graphics card (--device cuda)
+/// as one batch, which keeps it busy.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         residyn sweep --config configs/train-pendulum.toml --seeds 100\n  \
@@ -31,7 +32,7 @@ pub(super) struct Arguments {
     /// Give all models the initial weights of --seed, so that they differ in alpha alone
     #[arg(long, requires = "alpha")]
     one_seed: bool,
-    /// Number of models that are trained at once; fewer need less memory
+    /// Number of models that a graphics card trains at once; fewer need less memory
     #[arg(long, default_value = "1000", value_name = "COUNT")]
     together: NonZeroUsize,
     /// Folder of the result, sweep.json
@@ -98,7 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let members = arguments.members();
     let begun = Instant::now();
     let trained = train(&job, &members, arguments)?;
-    let swept = Swept::new(&job, &members, trained, begun.elapsed().as_secs_f64());
+    let swept = SweepResults::new(&job, &members, trained, begun.elapsed().as_secs_f64());
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;
     inputs::print(&if common.json { json } else { swept.text() })?;
@@ -127,19 +128,20 @@ impl Arguments {
 }
 
 fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
-    for note in &job.material.notes {
+    for note in &job.data.notes {
         eprintln!("note: {note}");
     }
-    let epochs = job.recipe.fit.epochs;
     let parts = members.chunks(arguments.together.get());
-    let bar = progress::bar(parts.len() * epochs);
+    let bar = progress::bar(0);
     let mut diverged = 0;
     let mut train_part = |part: &[Member]| {
         let mut observer = |at: SweepProgress| {
             bar.inc(1);
             bar.set_message(format!("epochs, {} diverged", diverged + at.diverged));
         };
-        let trained = (job.sweep(part)?).run(&job.material.training, &mut observer)?;
+        let sweep = job.sweep(part)?;
+        bar.inc_length(sweep.rounds() as u64);
+        let trained = sweep.run(&job.data.training, &mut observer)?;
         diverged += trained.iter().filter(|model| model.diverged).count();
         Ok::<_, anyhow::Error>(trained)
     };

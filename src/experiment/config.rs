@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::ExperimentError;
 use crate::model::MlpSettings;
 use crate::train::FitSettings;
+use crate::train::recipe::RecipeError;
 
 /// The configuration of an experiment: methods, task and plant.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -63,10 +64,7 @@ impl Config {
     }
 
     pub(super) fn wrong(&self, message: String) -> ExperimentError {
-        ExperimentError::File {
-            path: self.path.clone(),
-            message,
-        }
+        ExperimentError::file(&self.path, message)
     }
 
     fn check(&self) -> Result<(), String> {
@@ -110,12 +108,9 @@ impl Config {
 
 /// Reads a configuration in TOML.
 pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ExperimentError::Open {
+    let text = std::fs::read_to_string(path).map_err(|source| RecipeError::Open {
         path: path.to_owned(),
         source,
     })?;
-    toml::from_str(&text).map_err(|error| ExperimentError::File {
-        path: path.to_owned(),
-        message: error.to_string(),
-    })
+    toml::from_str(&text).map_err(|error| ExperimentError::file(path, error.to_string()))
 }

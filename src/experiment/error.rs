@@ -1,26 +1,20 @@
-use std::path::PathBuf;
+use std::path::Path;
 
 use thiserror::Error;
 
 use crate::closeloop::StudyError;
 use crate::control::TaskError;
 use crate::mbrl::RunError;
-use crate::model::FileError;
 use crate::plant::PlantError;
 use crate::report::plot::PlotError;
-use crate::runs::RunFolderError;
-use crate::train::{CheckpointError, HybridError};
+use crate::train::recipe::RecipeError;
 
 /// Why an experiment cannot be carried out.
 #[derive(Debug, Error)]
 pub enum ExperimentError {
-    #[error("{path}: cannot be read: {source}", path = .path.display())]
-    Open {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    #[error("{path}: {message}", path = .path.display())]
-    File { path: PathBuf, message: String },
+    /// A configuration, model, checkpoint or run folder that cannot be used.
+    #[error(transparent)]
+    Recipe(RecipeError),
     #[error("{method}, seed {seed}: {source}")]
     Run {
         method: String,
@@ -40,13 +34,22 @@ pub enum ExperimentError {
     #[error(transparent)]
     Plant(#[from] PlantError),
     #[error(transparent)]
-    Model(#[from] FileError),
-    #[error(transparent)]
-    Hybrid(#[from] HybridError),
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    #[error("{0}")]
-    Folder(#[from] RunFolderError),
-    #[error(transparent)]
     Plot(#[from] PlotError),
+}
+
+/// From whatever a [`RecipeError`] can be made of.
+impl<E: Into<RecipeError>> From<E> for ExperimentError {
+    fn from(error: E) -> Self {
+        Self::Recipe(error.into())
+    }
+}
+
+impl ExperimentError {
+    /// A configuration that is contradictory or does not match what it names.
+    pub(super) fn file(path: &Path, message: String) -> Self {
+        Self::Recipe(RecipeError::File {
+            path: path.to_owned(),
+            message,
+        })
+    }
 }

@@ -2,7 +2,6 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use super::session::{Observer, equations};
 use super::{Config, ExperimentError, MethodConfig};
 use crate::control::Predictor;
 use crate::files::{beside, beside_or_named, content_id};
@@ -24,7 +23,7 @@ pub(super) struct Method {
 }
 
 /// The result of a method with one seed.
-pub(super) struct Learnt {
+pub(super) struct TrainedMethod {
     pub rounds: Vec<Round>,
     /// After the last round.
     pub model: HybridModel,
@@ -34,13 +33,16 @@ pub(super) struct Learnt {
 
 /// A finished round.
 #[derive(Debug, Clone, Copy)]
-pub struct Step<'s> {
+pub struct FinishedRound<'s> {
     pub method: &'s str,
     pub seed: u64,
     pub round: &'s Round,
     /// Whether it was carried out before, by a run that was interrupted.
     pub found: bool,
 }
+
+/// Called after every round, including those that were carried out before.
+pub type Observer<'o> = &'o (dyn Fn(&FinishedRound<'_>) + Sync);
 
 impl Method {
     pub(super) fn read(
@@ -52,11 +54,11 @@ impl Method {
     ) -> Result<Self, ExperimentError> {
         let mut model_toml = plant.declaration.clone();
         let mut inputs = Vec::new();
-        let mut dynamics = equations(plant);
+        let mut dynamics = plant.dynamics();
         let prior = if let Some(file) = &method.model {
-            let system = library.model(beside_or_named(&config.path, file))?;
-            dynamics = equations(&system);
-            model_toml.clone_from(&system.declaration);
+            let model = library.model(beside_or_named(&config.path, file))?;
+            dynamics = model.dynamics();
+            model_toml.clone_from(&model.declaration);
             inputs.push((file.clone(), content_id(model_toml.as_bytes())));
             Prior::Equations(Box::new(dynamics.clone()))
         } else if let Some(dir) = &method.checkpoint {
@@ -107,10 +109,10 @@ impl Method {
         run: &Run<'_>,
         folder: RunFolder,
         observer: Observer<'_>,
-    ) -> Result<Learnt, RunError> {
+    ) -> Result<TrainedMethod, RunError> {
         let mut folder = Folder::open(folder)?;
-        let told = |round: &Round, found: bool| {
-            observer(&Step {
+        let report = |round: &Round, found: bool| {
+            observer(&FinishedRound {
                 method: &self.config.name,
                 seed: run.seed,
                 round,
@@ -118,11 +120,11 @@ impl Method {
             });
         };
         for round in folder.rounds() {
-            told(round, true);
+            report(round, true);
         }
-        let mut progress = folder.progress(run, &self.dynamics)?;
-        while progress.rounds < self.config.rounds {
-            let (round, training) = run.round(&mut progress)?;
+        let mut state = folder.state(run, &self.dynamics)?;
+        while state.rounds < self.config.rounds {
+            let (round, training) = run.round(&mut state)?;
             let origin = Origin {
                 config: json!({
                     "command": "mbrl",
@@ -134,13 +136,13 @@ impl Method {
                 seed: run.seed,
                 model_toml: self.model_toml.clone(),
             };
-            folder.keep(round.clone(), &progress, &training, &origin)?;
-            told(&round, false);
+            folder.keep(round.clone(), &state, &training, &origin)?;
+            report(&round, false);
         }
-        Ok(Learnt {
+        Ok(TrainedMethod {
             rounds: folder.rounds().to_vec(),
             checkpoint: folder.checkpoint(),
-            model: progress.model.expect("there is a round"),
+            model: state.model.expect("there is a round"),
         })
     }
 }

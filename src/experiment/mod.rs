@@ -7,6 +7,7 @@ mod learning;
 mod offline_prior;
 mod physics_prior;
 mod picture;
+mod published;
 mod receding_horizon;
 mod results;
 mod session;
@@ -14,7 +15,8 @@ pub mod undeclared_effect;
 
 pub use config::{Config, MethodConfig};
 pub use error::ExperimentError;
-pub use learning::Step;
+pub use learning::{FinishedRound, Observer};
 pub use picture::picture;
+pub use published::Experiment;
 pub use results::{Course, PERFECT, PRIOR, Reached, Results};
-pub use session::{Experiment, Observer, Session};
+pub use session::Session;

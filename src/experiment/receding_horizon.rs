@@ -1,6 +1,6 @@
 //! The ablation: models trained on the same plant, evaluated with increasing receding horizons.
 
-use super::learning::Learnt;
+use super::learning::TrainedMethod;
 use super::results::{Course, Results};
 use super::{ExperimentError, Session};
 use crate::control::Predictor;
@@ -23,13 +23,13 @@ pub(super) fn check(session: &Session) -> Result<(), String> {
 /// Evaluates the trained models with every receding horizon.
 pub(super) fn compare(
     session: &Session,
-    learnt: &[Vec<Learnt>],
+    learnt: &[Vec<TrainedMethod>],
     results: &mut Results,
 ) -> Result<(), ExperimentError> {
     results.receding_horizon = Some(session.config.replan.clone());
     let over_horizons = |predictor: &(dyn Fn(usize) -> Predictor + Sync), seen, name: &str| {
         let each = session.config.replan.iter();
-        each.map(|replan| Ok((seen, session.judge_all(predictor, *replan, name)?)))
+        each.map(|replan| Ok((seen, session.score_all(predictor, *replan, name)?)))
             .collect::<Result<Course, ExperimentError>>()
     };
     for (method, runs) in session.methods.iter().zip(learnt) {

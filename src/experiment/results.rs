@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::data::statistics::{mean, sample_deviation};
-use crate::mbrl::Judged;
+use crate::mbrl::EpisodeScore;
 
 /// The method that plans with the plant's own equations.
 pub const PERFECT: &str = "perfect";
@@ -175,18 +175,18 @@ impl Course {
 }
 
 /// Collects entries: the number of transitions and the result of each seed.
-impl FromIterator<(usize, Vec<Judged>)> for Course {
-    fn from_iter<I: IntoIterator<Item = (usize, Vec<Judged>)>>(entries: I) -> Self {
+impl FromIterator<(usize, Vec<EpisodeScore>)> for Course {
+    fn from_iter<I: IntoIterator<Item = (usize, Vec<EpisodeScore>)>>(entries: I) -> Self {
         let mut course = Self::default();
-        for (transitions, judged) in entries {
-            let returns: Vec<f64> = judged.iter().map(|judged| judged.total).collect();
+        for (transitions, score) in entries {
+            let returns: Vec<f64> = score.iter().map(|score| score.total).collect();
             course.transitions.push(transitions);
             course.return_mean.push(mean(&returns));
             course.return_std.push(sample_deviation(&returns));
             course.returns.push(returns);
             course
                 .success
-                .push(judged.iter().map(|judged| judged.success).collect());
+                .push(score.iter().map(|score| score.success).collect());
         }
         course
     }

@@ -3,24 +3,16 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::learning::{Learnt, Method, Step};
-use super::results::{Course, PERFECT, PRIOR, Results};
-use super::{Config, ExperimentError, offline_prior, physics_prior, receding_horizon};
+use super::learning::{Method, Observer, TrainedMethod};
+use super::results::{PERFECT, PRIOR};
+use super::{Config, ExperimentError};
 use crate::control::{Predictor, Task};
 use crate::files::beside_or_named;
-use crate::mbrl::{Judge, Judged, Prior, Run, Schedule};
-use crate::model::{FittedEffect, Library, Model};
+use crate::mbrl::{EpisodeScore, Evaluator, Prior, Run, Schedule};
+use crate::model::{FittedEffect, Library};
 use crate::plant::Plant;
 use crate::runs::{Identity, RunFolder};
 use crate::train::Backend;
-
-/// The published experiments.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Experiment {
-    PhysicsPrior,
-    OfflinePrior,
-    RecedingHorizon,
-}
 
 /// A configuration with everything it refers to read.
 pub struct Session {
@@ -30,28 +22,6 @@ pub struct Session {
     pub(super) methods: Vec<Method>,
     backend: Backend,
     first_seed: u64,
-}
-
-/// Called after every round, including those that were carried out before.
-pub type Observer<'o> = &'o (dyn Fn(&Step<'_>) + Sync);
-
-impl Experiment {
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::PhysicsPrior => physics_prior::NAME,
-            Self::OfflinePrior => offline_prior::NAME,
-            Self::RecedingHorizon => receding_horizon::NAME,
-        }
-    }
-
-    fn check(self, session: &Session) -> Result<(), String> {
-        match self {
-            Self::PhysicsPrior => physics_prior::check(session),
-            Self::OfflinePrior => offline_prior::check(session),
-            Self::RecedingHorizon => receding_horizon::check(session),
-        }
-    }
 }
 
 impl Session {
@@ -107,34 +77,6 @@ impl Session {
         self.method(method).map_or(0, |known| known.config.rounds)
     }
 
-    /// Carries out an experiment in its folder, or the rest of one that was interrupted.
-    ///
-    /// # Errors
-    /// A configuration of another experiment, the folder of another run, a run that diverges, or files that cannot be read
-    /// or written.
-    pub fn carry_out(
-        &self,
-        experiment: Experiment,
-        folder: &RunFolder,
-        observer: Observer<'_>,
-    ) -> Result<Results, ExperimentError> {
-        experiment
-            .check(self)
-            .map_err(|message| self.config.wrong(message))?;
-        let run = self.identity(experiment.name(), self.resolved());
-        folder.claim(&run)?;
-        let learnt = self.learn(folder, observer)?;
-        let (name, task) = (experiment.name(), self.task.name());
-        let mut results = Results::new(name, &task, self.seeds(), run.config);
-        match experiment {
-            Experiment::PhysicsPrior | Experiment::OfflinePrior => {
-                self.learning_curves(&learnt, &mut results)?;
-            }
-            Experiment::RecedingHorizon => receding_horizon::compare(self, &learnt, &mut results)?,
-        }
-        Ok(results)
-    }
-
     /// Carries out one run of the loop, with the method of this name and the first seed, or the rest of one that was
     /// interrupted. Returns the path of the last model's checkpoint.
     ///
@@ -176,7 +118,7 @@ impl Session {
         methods.any(|method| is_such(&method.learner.prior))
     }
 
-    fn identity(&self, command: &str, config: Value) -> Identity {
+    pub(super) fn identity(&self, command: &str, config: Value) -> Identity {
         let inputs = self.methods.iter().flat_map(|method| &method.inputs);
         Identity {
             command: command.to_owned(),
@@ -188,7 +130,8 @@ impl Session {
         }
     }
 
-    fn resolved(&self) -> Value {
+    /// The configuration with everything that it names.
+    pub(super) fn resolved(&self) -> Value {
         json!({
             "config": self.config,
             "task": self.task,
@@ -201,40 +144,12 @@ impl Session {
         })
     }
 
-    /// Evaluates the return of every method against the number of real transitions.
-    fn learning_curves(
-        &self,
-        learnt: &[Vec<Learnt>],
-        results: &mut Results,
-    ) -> Result<(), ExperimentError> {
-        for (method, runs) in self.methods.iter().zip(learnt) {
-            let rounds = (0..method.config.rounds).map(|round| {
-                let judged = runs
-                    .iter()
-                    .map(|run| run.rounds[round].judged.clone())
-                    .collect();
-                (runs[0].rounds[round].transitions, judged)
-            });
-            results
-                .methods
-                .insert(method.config.name.clone(), rounds.collect());
-        }
-        let replan = self.task.replan;
-        for (name, predictor) in self.fixed()? {
-            let judged = self.judge_all(|_| predictor.clone(), replan, name)?;
-            results
-                .methods
-                .insert(name.to_owned(), Course::from_iter([(0, judged)]));
-        }
-        Ok(())
-    }
-
     /// Trains every method with every seed: `[method][seed]`.
-    fn learn(
+    pub(super) fn learn(
         &self,
         folder: &RunFolder,
         observer: Observer<'_>,
-    ) -> Result<Vec<Vec<Learnt>>, ExperimentError> {
+    ) -> Result<Vec<Vec<TrainedMethod>>, ExperimentError> {
         let seeds = self.seeds().into_iter();
         let units: Vec<(&Method, u64)> = seeds
             .flat_map(|seed| self.methods.iter().map(move |method| (method, seed)))
@@ -243,12 +158,13 @@ impl Session {
             let own = folder.within(format!("runs/{}-{seed:02}", method.config.name));
             self.learn_one(method, seed, own, observer)
         };
-        let learnt: Vec<Learnt> = units
+        let learnt: Vec<TrainedMethod> = units
             .into_par_iter()
             .with_max_len(1)
             .map(learn)
             .collect::<Result<_, _>>()?;
-        let mut by_method: Vec<Vec<Learnt>> = self.methods.iter().map(|_| Vec::new()).collect();
+        let mut by_method: Vec<Vec<TrainedMethod>> =
+            self.methods.iter().map(|_| Vec::new()).collect();
         for (unit, run) in learnt.into_iter().enumerate() {
             by_method[unit % self.methods.len()].push(run);
         }
@@ -261,7 +177,7 @@ impl Session {
         seed: u64,
         folder: RunFolder,
         observer: Observer<'_>,
-    ) -> Result<Learnt, ExperimentError> {
+    ) -> Result<TrainedMethod, ExperimentError> {
         let learnt = method.learn(&self.run_of(method, seed), folder, observer);
         learnt.map_err(|source| ExperimentError::Run {
             method: method.config.name.clone(),
@@ -271,20 +187,20 @@ impl Session {
     }
 
     /// Evaluates a model for each seed; `predictor` is given the seed's position, from 0.
-    pub(super) fn judge_all(
+    pub(super) fn score_all(
         &self,
         predictor: impl Fn(usize) -> Predictor + Sync,
         replan: usize,
         method: &str,
-    ) -> Result<Vec<Judged>, ExperimentError> {
-        let judge = |(k, seed): (usize, u64)| {
-            let judge = Judge {
+    ) -> Result<Vec<EpisodeScore>, ExperimentError> {
+        let score = |(k, seed): (usize, u64)| {
+            let evaluator = Evaluator {
                 task: &self.task,
                 plant: &self.plant,
                 seed,
             };
-            let judged = judge.judge(&predictor(k), replan);
-            judged.map_err(|source| ExperimentError::Run {
+            let score = evaluator.score(&predictor(k), replan);
+            score.map_err(|source| ExperimentError::Run {
                 method: method.to_owned(),
                 seed,
                 source,
@@ -294,7 +210,7 @@ impl Session {
             .into_par_iter()
             .enumerate()
             .with_max_len(1)
-            .map(judge)
+            .map(score)
             .collect()
     }
 
@@ -315,7 +231,7 @@ impl Session {
         Predictor::of_equations(self.plant.dynamics(), self.task.integrator)
     }
 
-    fn seeds(&self) -> Vec<u64> {
+    pub(super) fn seeds(&self) -> Vec<u64> {
         (self.first_seed..)
             .zip(0..self.config.seeds)
             .map(|(seed, _)| seed)
@@ -341,9 +257,4 @@ impl Session {
 fn effect(effect: &FittedEffect) -> Value {
     let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
     json!([effect.effect.name, effect.joint, values])
-}
-
-/// The equations of a system with the declared values.
-pub(super) fn equations(system: &Model) -> crate::model::Dynamics {
-    system.dynamics()
 }

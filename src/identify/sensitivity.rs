@@ -1,7 +1,7 @@
 use crate::expr::{Graph, Node, Program, Tape};
 use crate::lanes::{Row, Simd, WithSimd};
 use crate::model::Dynamics;
-use crate::sim::{Hold, Scheme, Stage, StepTorque};
+use crate::sim::{Hold, Scheme, StepTorque};
 
 /// Windows that are integrated side by side: two AVX-512 registers or four AVX2 registers of f64.
 pub(super) const LANES: usize = 16;
@@ -251,19 +251,29 @@ impl<'t> TangentStepper<'t> {
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, time: &Lane, h: &Lane) {
         let n = self.tangent.joints;
+        let last = self.scheme.stages.len() - 1;
         for (k, stage) in self.scheme.stages.iter().enumerate() {
             let inner = if k == 0 { &self.now } else { &self.inner };
             let inputs = self.tape.moving();
             inputs[..2 * n].copy_from_slice(&inner[..2 * n]);
+            let (mut weighed, mut reached) = (*h, *h);
             for part in 0..Lane::parts::<S>() {
                 let h = h.get(simd, part);
                 inputs[3 * n].set(part, h.mul_add(h.like(stage.time), time.get(simd, part)));
+                weighed.set(part, h * h.like(stage.weight));
+                reached.set(part, h * h.like(stage.reach));
             }
             self.tape.run_on(simd);
             for (k, slope) in self.by_state.iter_mut().enumerate() {
                 *slope = *self.tape.output(n + k);
             }
-            self.stage(simd, h, k == 0, stage);
+            // Known at compile time in each call: the loops over rows have no branches.
+            match (k == 0, k == last) {
+                (true, true) => self.stage(simd, true, true, &weighed, &reached),
+                (true, false) => self.stage(simd, true, false, &weighed, &reached),
+                (false, true) => self.stage(simd, false, true, &weighed, &reached),
+                (false, false) => self.stage(simd, false, false, &weighed, &reached),
+            }
             std::mem::swap(&mut self.inner, &mut self.next);
         }
         if self.scheme.semi_implicit {
@@ -291,19 +301,34 @@ impl<'t> TangentStepper<'t> {
         }
     }
 
-    /// Accumulate the weighted slopes of a stage, and compute the states of the next.
+    /// Accumulate the slopes of a stage times their share of the step, and compute the states of the next.
     #[inline(always)]
-    fn stage<S: Simd>(&mut self, simd: S, h: &Lane, is_first: bool, stage: &Stage) {
+    fn stage<S: Simd>(
+        &mut self,
+        simd: S,
+        is_first: bool,
+        is_last: bool,
+        weighed: &Lane,
+        reached: &Lane,
+    ) {
         // With the number of joints known at compile time, the loops over rows are unrolled.
         match self.tangent.joints {
-            1 => self.stage_of(simd, 1, h, is_first, stage),
-            2 => self.stage_of(simd, 2, h, is_first, stage),
-            n => self.stage_of(simd, n, h, is_first, stage),
+            1 => self.stage_of(simd, 1, is_first, is_last, weighed, reached),
+            2 => self.stage_of(simd, 2, is_first, is_last, weighed, reached),
+            n => self.stage_of(simd, n, is_first, is_last, weighed, reached),
         }
     }
 
     #[inline(always)]
-    fn stage_of<S: Simd>(&mut self, simd: S, n: usize, h: &Lane, is_first: bool, stage: &Stage) {
+    fn stage_of<S: Simd>(
+        &mut self,
+        simd: S,
+        n: usize,
+        is_first: bool,
+        is_last: bool,
+        weighed: &Lane,
+        reached: &Lane,
+    ) {
         let rows = 2 * n;
         let inner = if is_first { &self.now } else { &self.inner };
         let columns = (self.now.chunks_exact(rows))
@@ -314,15 +339,14 @@ impl<'t> TangentStepper<'t> {
         for (column, (((now, inner), next), sum)) in columns.enumerate() {
             let direct = self.tangent.direct(column);
             for part in 0..Lane::parts::<S>() {
-                let h = h.get(simd, part);
-                let (weighed, reached) = (h * h.like(stage.weight), h * h.like(stage.reach));
+                let (weighed, reached) = (weighed.get(simd, part), reached.get(simd, part));
                 for row in 0..rows {
                     let slope = if row < n {
                         inner[n + row].get(simd, part)
                     } else {
                         let mut slope = match direct {
                             Some(first) => self.tape.output(first + row - n).get(simd, part),
-                            None => h.like(0.0),
+                            None => weighed.like(0.0),
                         };
                         if column > 0 {
                             for state in 0..rows {
@@ -339,7 +363,9 @@ impl<'t> TangentStepper<'t> {
                         sum[row].get(simd, part)
                     };
                     sum[row].set(part, slope.mul_add(weighed, before));
-                    next[row].set(part, slope.mul_add(reached, now));
+                    if !is_last {
+                        next[row].set(part, slope.mul_add(reached, now));
+                    }
                 }
             }
         }

@@ -3,7 +3,7 @@ use thiserror::Error;
 use crate::data::LogError;
 use crate::plant::PlantError;
 use crate::runs::RunFolderError;
-use crate::train::{CheckpointError, HybridError, SegmentsError, TrainError};
+use crate::train::{CheckpointError, TrainError};
 
 /// Why a run of the loop cannot begin or be resumed.
 #[derive(Debug, Error)]
@@ -11,15 +11,18 @@ pub enum RunError {
     #[error(transparent)]
     Plant(#[from] PlantError),
     #[error(transparent)]
-    Train(#[from] TrainError),
-    #[error(transparent)]
-    Model(#[from] HybridError),
-    #[error(transparent)]
-    Segments(#[from] SegmentsError),
+    Train(TrainError),
     #[error("{0}")]
     Log(#[from] LogError),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     #[error("{0}")]
     Folder(#[from] RunFolderError),
+}
+
+/// From whatever a [`TrainError`] can be made of.
+impl<E: Into<TrainError>> From<E> for RunError {
+    fn from(error: E) -> Self {
+        Self::Train(error.into())
+    }
 }

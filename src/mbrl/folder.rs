@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use super::{Experience, Progress, Round, Run, RunError};
+use super::{Round, Run, RunError, RunState};
 use crate::data::{Columns, Log};
 use crate::model::{Dynamics, Origin};
 use crate::runs::{RunFolder, RunFolderError};
@@ -18,7 +18,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Read the rounds in `folder`, which is made where it is missing.
+    /// Reads the rounds in `folder`, which is created if missing.
     ///
     /// # Errors
     /// A folder that cannot be made, or a damaged file.
@@ -50,25 +50,23 @@ impl Folder {
         self.folder.path().join(format!("checkpoint-{rounds:03}"))
     }
 
-    /// The progress of the run so far; a run without rounds is started. `dynamics` are the equations of its model file.
+    /// The state of the run so far; a run without rounds is started. `dynamics` are the equations of its model file.
     ///
     /// # Errors
     /// A damaged file, or a plant that diverges.
-    pub fn progress(&self, run: &Run<'_>, dynamics: &Dynamics) -> Result<Progress, RunError> {
+    pub fn state(&self, run: &Run<'_>, dynamics: &Dynamics) -> Result<RunState, RunError> {
         let done = self.rounds.len();
         if done == 0 {
-            let progress = run.begin()?;
-            self.write_stretch(&progress.experience.logs[0], 0)?;
-            return Ok(progress);
+            let state = run.begin()?;
+            self.write_stretch(&state.logs[0], 0)?;
+            return Ok(state);
         }
         let columns = Columns::default();
         let read = |number| Log::read(self.stretch(number), run.task.joints(), &columns);
         let device = run.learner.backend.device();
         let checkpoint = Checkpoint::load(&self.checkpoint())?;
-        Ok(Progress {
-            experience: Experience {
-                logs: (0..=done).map(read).collect::<Result<_, _>>()?,
-            },
+        Ok(RunState {
+            logs: (0..=done).map(read).collect::<Result<_, _>>()?,
             model: Some(checkpoint.model(dynamics, &device)?),
             rounds: done,
         })
@@ -82,11 +80,11 @@ impl Folder {
     pub fn keep(
         &mut self,
         round: Round,
-        progress: &Progress,
+        state: &RunState,
         training: &Training,
         origin: &Origin,
     ) -> Result<(), RunError> {
-        let logs = &progress.experience.logs;
+        let logs = &state.logs;
         self.write_stretch(&logs[logs.len() - 1], logs.len() - 1)?;
         self.rounds.push(round);
         save(&self.checkpoint(), training, origin)?;

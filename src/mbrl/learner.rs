@@ -57,10 +57,9 @@ impl Learner {
         seed: u64,
         round: usize,
     ) -> Result<Training, RunError> {
-        let scaling = segments.scaling(self.network.angles);
         let model = match previous {
-            Some(model) => self.rescaled(model, scaling)?,
-            None => self.first(scaling, seed, round)?,
+            Some(model) => self.rescaled(model, segments.scaling(self.network.angles))?,
+            None => self.first(segments, seed, round)?,
         };
         let order = stream(seed, Purpose::Order(round));
         let mut training = Training::new(model, self.fit.clone(), order)?;
@@ -68,15 +67,9 @@ impl Learner {
         Ok(training)
     }
 
-    fn first(
-        &self,
-        scaling: InputScaling,
-        seed: u64,
-        round: usize,
-    ) -> Result<HybridModel, RunError> {
+    fn first(&self, segments: &Segments, seed: u64, round: usize) -> Result<HybridModel, RunError> {
         let mut rng = stream(seed, Purpose::Network(round));
-        let mut network =
-            |last| MlpWeights::new(self.joints, &self.network, scaling.clone(), last, &mut rng);
+        let mut network = |last| segments.network(&self.network, last, &mut rng);
         match self.untrained()? {
             Some(prior) => Ok(prior.with_residual(&network(LastLayer::Zero))?),
             None => self.alone(&network(LastLayer::Random)),

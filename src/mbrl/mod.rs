@@ -2,18 +2,18 @@
 //! the new motion to the data, and repeat.
 
 mod error;
-mod experience;
+mod evaluator;
 mod folder;
-mod judge;
 mod learner;
 mod run;
+mod transitions;
 
 #[cfg(test)]
 mod tests;
 
 pub use error::RunError;
-pub use experience::Experience;
+pub use evaluator::{EpisodeScore, Evaluator};
 pub use folder::Folder;
-pub use judge::{Judge, Judged};
 pub use learner::{Learner, Prior};
-pub use run::{Progress, Round, Run, Schedule};
+pub use run::{Round, Run, RunState, Schedule};
+pub use transitions::transitions;

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Experience, Judge, Judged, Learner, RunError};
+use super::{EpisodeScore, Evaluator, Learner, RunError, transitions};
 use crate::control::{Predictor, RandomTorque, Task, drive, with_controller};
 use crate::data::Log;
 use crate::model::Dynamics;
@@ -31,8 +31,9 @@ pub struct Run<'a> {
 
 /// The state of a run between two rounds.
 #[derive(Debug, Clone, Default)]
-pub struct Progress {
-    pub experience: Experience,
+pub struct RunState {
+    /// The recorded motion: one log for each stretch, the first one under random torques.
+    pub logs: Vec<Log>,
     /// The model after the last round; none before the first.
     pub model: Option<HybridModel>,
     /// Rounds done.
@@ -47,7 +48,7 @@ pub struct Round {
     /// Number of real transitions that the model was trained on.
     pub transitions: usize,
     #[serde(flatten)]
-    pub judged: Judged,
+    pub score: EpisodeScore,
     /// Prediction error on these transitions after training: mean of ||s' - s_hat'||^2.
     pub error: f64,
     /// ||F_r||
@@ -61,61 +62,58 @@ impl Run<'_> {
     ///
     /// # Errors
     /// A plant that diverges.
-    pub fn begin(&self) -> Result<Progress, RunError> {
+    pub fn begin(&self) -> Result<RunState, RunError> {
         let dynamics = self.plant.dynamics();
         let mut rig = self.rig(&dynamics, 0);
         let mut random = RandomTorque::new(self.task, stream(self.seed, Purpose::Random(0)));
         let mut noise = stream(self.seed, Purpose::Gather(0));
         let stretch = drive(&mut rig, &mut random, self.schedule.random, &mut noise)?;
-        Ok(Progress {
-            experience: Experience {
-                logs: vec![stretch.log],
-            },
-            ..Progress::default()
+        Ok(RunState {
+            logs: vec![stretch.log],
+            ..RunState::default()
         })
     }
 
-    /// Carries out a round: train, judge, gather.
+    /// Carries out a round: train, evaluate, gather.
     ///
     /// # Errors
     /// A loss that is not finite, or a plant that diverges.
-    pub fn round(&self, progress: &mut Progress) -> Result<(Round, Training), RunError> {
-        let (round, seed) = (progress.rounds, self.seed);
-        let segments = progress.experience.segments(self.task.joints())?;
-        let previous = progress.model.as_ref();
+    pub fn round(&self, state: &mut RunState) -> Result<(Round, Training), RunError> {
+        let (round, seed) = (state.rounds, self.seed);
+        let segments = transitions(&state.logs, self.task.joints())?;
+        let previous = state.model.as_ref();
         let training = self.learner.learn(&segments, previous, seed, round)?;
         let model = training.result()?;
         let predictor = model.predictor(self.learner.fit.integrator);
-        let judged = self.judge().judge(&predictor, self.task.replan)?;
+        let score = self.evaluator().score(&predictor, self.task.replan)?;
         let last = training.history().last().expect("a run records its end");
         let record = Round {
             round,
             transitions: segments.len(),
-            judged,
+            score,
             error: last.error,
             residual_norm: last.residual_norm,
             parameters: model.parameters(),
         };
-        let gathered = self.gather(&predictor, progress)?;
-        progress.experience.logs.push(gathered);
-        progress.model = Some(model);
-        progress.rounds += 1;
+        let gathered = self.gather(&predictor, state)?;
+        state.logs.push(gathered);
+        state.model = Some(model);
+        state.rounds += 1;
         Ok((record, training))
     }
 
-    fn judge(&self) -> Judge<'_> {
-        Judge {
+    fn evaluator(&self) -> Evaluator<'_> {
+        Evaluator {
             task: self.task,
             plant: self.plant,
             seed: self.seed,
         }
     }
 
-    fn gather(&self, predictor: &Predictor, progress: &Progress) -> Result<Log, RunError> {
+    fn gather(&self, predictor: &Predictor, state: &RunState) -> Result<Log, RunError> {
         let dynamics = self.plant.dynamics();
-        let mut rig = self.rig_now(&dynamics, progress)?;
-        let of_round =
-            |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(progress.rounds + 1));
+        let mut rig = self.rig_now(&dynamics, state)?;
+        let of_round = |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(state.rounds + 1));
         let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
         let steps = self.schedule.gather;
         let stretch = with_controller(predictor, self.task, self.task.replan, &draws, |policy| {
@@ -126,15 +124,11 @@ impl Run<'_> {
 
     /// The plant in the state at the end of the last stretch under control, restored by replaying the torques of the
     /// episode so far. After the end of an episode, the plant in a new initial state.
-    fn rig_now<'d>(
-        &self,
-        dynamics: &'d Dynamics,
-        progress: &Progress,
-    ) -> Result<Rig<'d>, RunError> {
+    fn rig_now<'d>(&self, dynamics: &'d Dynamics, state: &RunState) -> Result<Rig<'d>, RunError> {
         let of_episode = self.task.steps / self.schedule.gather;
-        let (episode, begun) = (progress.rounds / of_episode, progress.rounds % of_episode);
+        let (episode, begun) = (state.rounds / of_episode, state.rounds % of_episode);
         let mut rig = self.rig(dynamics, 1 + episode);
-        let controlled = &progress.experience.logs[1..];
+        let controlled = &state.logs[1..];
         for log in &controlled[controlled.len() - begun..] {
             for row in 0..log.rows() - 1 {
                 let held: Vec<f64> = log.tau.iter().map(|tau| tau[row]).collect();

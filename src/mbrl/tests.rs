@@ -4,7 +4,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::{Folder, Learner, Prior, Progress, Round, Run, Schedule};
+use super::{Folder, Learner, Prior, Round, Run, RunState, Schedule, transitions};
 use crate::control::Task;
 use crate::data::Joint;
 use crate::model::{Angles, Dynamics, Library, MlpSettings, Origin};
@@ -87,16 +87,16 @@ impl Setting {
         }
     }
 
-    fn rounds(&self, progress: &mut Progress, folder: &mut Folder, until: usize) {
+    fn rounds(&self, state: &mut RunState, folder: &mut Folder, until: usize) {
         let run = self.run();
         let origin = Origin {
             config: json!({}),
             seed: 4,
             model_toml: self.plant.system.declaration.clone(),
         };
-        while progress.rounds < until {
-            let (round, training) = run.round(progress).unwrap();
-            folder.keep(round, progress, &training, &origin).unwrap();
+        while state.rounds < until {
+            let (round, training) = run.round(state).unwrap();
+            folder.keep(round, state, &training, &origin).unwrap();
         }
     }
 
@@ -104,12 +104,12 @@ impl Setting {
         let dir = tempfile::tempdir().unwrap();
         for end in ends {
             let mut folder = folder(dir.path());
-            let mut progress = folder.progress(&self.run(), &self.dynamics).unwrap();
-            self.rounds(&mut progress, &mut folder, *end);
+            let mut state = folder.state(&self.run(), &self.dynamics).unwrap();
+            self.rounds(&mut state, &mut folder, *end);
         }
         let folder = folder(dir.path());
-        let progress = folder.progress(&self.run(), &self.dynamics).unwrap();
-        let logs = progress.experience.logs;
+        let state = folder.state(&self.run(), &self.dynamics).unwrap();
+        let logs = state.logs;
         (
             folder.rounds().to_vec(),
             logs.into_iter().flat_map(|log| log.q[0].clone()).collect(),
@@ -118,7 +118,7 @@ impl Setting {
 }
 
 #[test]
-fn a_run_in_sessions_is_the_run_in_one() {
+fn an_interrupted_run_equals_an_uninterrupted_one() {
     let setting = setting();
     let (rounds, angles) = setting.in_sessions(&[5]);
     // The run is interrupted within an episode of three stretches and at its end.
@@ -132,13 +132,13 @@ fn a_run_in_sessions_is_the_run_in_one() {
 }
 
 #[test]
-fn a_round_without_its_line_is_done_again_from_the_model_before_it() {
+fn a_round_that_was_not_recorded_is_repeated_from_the_previous_model() {
     let setting = setting();
     let (killed, further) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let go_on = |dir: &Path, until| {
         let mut folder = folder(dir);
-        let mut progress = folder.progress(&setting.run(), &setting.dynamics).unwrap();
-        setting.rounds(&mut progress, &mut folder, until);
+        let mut state = folder.state(&setting.run(), &setting.dynamics).unwrap();
+        setting.rounds(&mut state, &mut folder, until);
         folder
     };
     // The state after a kill between writing the third model and writing its line.
@@ -170,7 +170,7 @@ fn a_stretch_begins_where_the_last_one_ended() {
 fn runs_of_one_trained_prior_do_not_block_each_other() {
     let mut setting = setting();
     let begun = setting.run().begin().unwrap();
-    let segments = begun.experience.segments(1).unwrap();
+    let segments = transitions(&begun.logs, 1).unwrap();
     let trained = setting.learner.learn(&segments, None, 0, 0).unwrap();
     setting.learner.prior = Prior::Trained(Box::new(trained.result().unwrap()));
     setting.learner.fit.epochs = 500;

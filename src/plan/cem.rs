@@ -1,9 +1,9 @@
 use serde::{Deserialize, Serialize};
 
+use super::limits::check_elite;
 use super::method::Search;
 use super::population::Population;
 use super::proposal::Proposal;
-use super::settings::check_elite;
 
 /// The cross-entropy method (Rubinstein 1999): draw sequences from normal distributions, refit mean and standard
 /// deviation to the elite, and repeat. The mean is the plan.

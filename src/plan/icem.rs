@@ -1,10 +1,10 @@
 use serde::{Deserialize, Serialize};
 
+use super::limits::{check_elite, within};
 use super::method::Search;
 use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
-use super::settings::{check_elite, within};
 
 /// The improved cross-entropy method (Pinneri et al. 2020, arXiv 2008.06389): candidates have coloured noise, which
 /// moves the rig instead of shaking it; the best ones are kept, within a search and for the next; distributions
@@ -42,7 +42,7 @@ fn momentum() -> f64 {
 }
 
 impl Icem {
-    /// With so many elite, and the published numbers beside.
+    /// With this elite, and the published values otherwise.
     pub fn new(elite: usize) -> Self {
         Self {
             elite,

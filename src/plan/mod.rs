@@ -4,6 +4,7 @@
 mod cem;
 mod gaussian;
 mod icem;
+mod limits;
 mod method;
 mod model;
 mod mppi;

@@ -1,9 +1,9 @@
 use serde::{Deserialize, Serialize};
 
+use super::limits::within;
 use super::method::Search;
 use super::population::Population;
 use super::proposal::Proposal;
-use super::settings::within;
 
 /// Model-predictive path-integral control (Williams et al. 2017): the next mean is that of all candidates, each with
 /// the weight exp((return - best) / scale). The standard deviation stays. The mean is the plan.

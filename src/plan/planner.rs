@@ -144,7 +144,8 @@ impl<E: Evaluate> Planner<E> {
             let blocks: Vec<_> = self.blocks.iter().map(lock).collect();
             let evaluated = blocks.iter().map(|b| (b.inputs.as_slice(), &b.returns));
             let population = Population::new(evaluated, population);
-            write(&self.proposal).learn(&population, method.search());
+            let mut proposal = write(&self.proposal);
+            method.search().learn(&population, &mut proposal);
             best = population.best();
             diverged += population.diverged();
         }

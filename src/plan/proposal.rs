@@ -1,4 +1,3 @@
-use super::method::Search;
 use super::population::Population;
 use crate::lanes::{Arch, Element, Simd, Vector, WithSimd};
 use crate::sim::batch::{Rows, W};
@@ -49,12 +48,6 @@ impl Proposal {
         }
     }
 
-    /// Update the distribution from an evaluated population.
-    pub fn learn(&mut self, population: &Population<'_>, search: &dyn Search) {
-        self.first = false;
-        search.learn(population, self);
-    }
-
     pub fn forget(&mut self) {
         self.mean.copy_from_slice(&self.middle);
         self.kept.clear();
@@ -74,6 +67,7 @@ impl Proposal {
     /// Fit mean and standard deviation to the elite; `momentum` is the share of the old values. Unchanged where all
     /// candidates diverged.
     pub fn fit(&mut self, population: &Population<'_>, elite: &[(f32, usize)], momentum: f32) {
+        self.first = false;
         if elite.is_empty() {
             return;
         }
@@ -96,6 +90,7 @@ impl Proposal {
 
     /// Set the mean to the weighted mean of all candidates. Unchanged where all diverged.
     pub fn average(&mut self, population: &Population<'_>, weight: impl Fn(f32) -> f32) {
+        self.first = false;
         if let Some(mean) = population.mean(weight) {
             self.mean = mean;
         }

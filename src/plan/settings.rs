@@ -1,8 +1,6 @@
-use std::fmt::Display;
-use std::ops::RangeBounds;
-
 use serde::{Deserialize, Serialize};
 
+use super::limits::whole;
 use super::method::Search;
 use super::{Cem, Icem, Mppi};
 
@@ -76,32 +74,4 @@ impl Method {
             Self::Mppi(mppi) => mppi,
         }
     }
-}
-
-/// Refuse an elite that is none of the population.
-pub(super) fn check_elite(elite: usize, population: usize) -> Result<(), String> {
-    let remedy = format!("a whole number from 1 to {population}, the population");
-    within("elite", elite, 1..=population, &remedy)
-}
-
-fn whole(key: &str, value: usize, most: usize) -> Result<(), String> {
-    within(
-        key,
-        value,
-        1..=most,
-        &format!("a whole number from 1 to {most}"),
-    )
-}
-
-/// Refuse the value of `key` outside of `range`, which `remedy` puts into words.
-pub(super) fn within<T: PartialOrd + Display>(
-    key: &str,
-    value: T,
-    range: impl RangeBounds<T>,
-    remedy: &str,
-) -> Result<(), String> {
-    if range.contains(&value) {
-        return Ok(());
-    }
-    Err(format!("`{key}` is {value}; it must be {remedy}"))
 }

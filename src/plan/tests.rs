@@ -82,7 +82,7 @@ fn the_search_finds_the_best_sequence() {
 }
 
 #[test]
-fn mppi_finds_the_best_sequence_as_closely_as_it_scatters() {
+fn mppi_finds_the_best_sequence_within_its_standard_deviation() {
     let settings = |temperature: f64| Settings {
         method: Method::Mppi(Mppi {
             temperature,
@@ -105,7 +105,7 @@ fn mppi_finds_the_best_sequence_as_closely_as_it_scatters() {
 }
 
 #[test]
-fn inputs_keep_to_their_bounds() {
+fn inputs_stay_within_their_bounds() {
     for settings in all() {
         let plan = near(&settings, &[[-3.0, 3.0], [-0.5, 0.1]], 2).plan(1.0);
         for step in plan.inputs {
@@ -119,7 +119,7 @@ fn inputs_keep_to_their_bounds() {
 }
 
 #[test]
-fn candidates_that_diverge_are_the_worst() {
+fn diverging_candidates_rank_last() {
     for settings in all() {
         // The best known sequences border on those that nobody knows.
         let plan = near(&settings, &[[-3.0, 3.0]], 3).plan(2.5);
@@ -137,7 +137,7 @@ fn candidates_that_diverge_are_the_worst() {
 }
 
 #[test]
-fn what_is_left_of_a_plan_starts_the_next_search() {
+fn the_rest_of_a_plan_starts_the_next_search() {
     let [cem, _, mppi] = all();
     for settings in [cem, mppi] {
         let short = Settings {
@@ -217,7 +217,7 @@ fn icem_keeps_its_best_candidates_from_one_search_to_the_next() {
 }
 
 #[test]
-fn what_was_kept_and_not_carried_out_is_a_candidate() {
+fn the_unexecuted_part_of_a_kept_sequence_is_a_candidate() {
     let mut proposal = Proposal::new(&[[-3.0, 3.0]; 2], 3);
     proposal.begin(0.5);
     proposal.keep(vec![vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]);
@@ -251,7 +251,7 @@ impl Evaluate for Scaled {
 }
 
 #[test]
-fn mppi_does_not_know_the_unit_of_returns() {
+fn mppi_is_invariant_to_scale_and_offset_of_returns() {
     let settings = Settings {
         method: Method::Mppi(Mppi::default()),
         ..SETTINGS
@@ -262,7 +262,7 @@ fn mppi_does_not_know_the_unit_of_returns() {
 }
 
 #[test]
-fn a_file_names_the_method_and_its_numbers() {
+fn settings_are_read_from_a_file_and_written_back() {
     let read = |rest: &str| -> Result<Settings, toml::de::Error> {
         let text = format!("population = 300\niterations = 10\nhorizon = 6\n{rest}");
         toml::from_str(&text)

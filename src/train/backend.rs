@@ -5,7 +5,7 @@ use burn::tensor::Device;
 
 use super::TrainError;
 
-/// What carries out the tensor operations.
+/// The device of tensor operations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Backend {
     /// The processor: Burn's backend on the crate `ndarray`.
@@ -36,8 +36,8 @@ impl Backend {
     /// The device, with gradients switched on.
     pub fn device(self) -> Device {
         let device = match self {
-            // Deprecated upstream in favour of burn-flex, which takes as long again to build and trains no faster:
-            // the fused operation does the work on either.
+            // Deprecated upstream in favour of burn-flex, which doubles the build time and trains no faster: the
+            // fused operation does the work on either.
             #[allow(deprecated)]
             Self::NdArray => Device::ndarray(),
             #[cfg(feature = "cuda")]

@@ -13,7 +13,7 @@ const MANIFEST: &str = "checkpoint.json";
 const MODEL: &str = "model.toml";
 /// The model to use.
 const WEIGHTS: &str = "weights.safetensors";
-/// The model to go on from, which differs where an earlier one was the best.
+/// The model to continue from, which differs where an earlier one was the best.
 const LAST: &str = "last.safetensors";
 const OPTIMIZER: &str = "optimizer.safetensors";
 
@@ -26,11 +26,11 @@ pub struct Checkpoint {
     /// The model to use.
     pub weights: ModelWeights,
     last: ModelWeights,
-    optimizer: [Option<Moments>; 2],
+    moments: [Moments; 2],
     dir: PathBuf,
 }
 
-/// Write a run to `dir`, whole or not at all, in place of any checkpoint that is there.
+/// Writes a run to `dir`, completely or not at all, in place of any checkpoint that is there.
 ///
 /// The files are written to a new directory beside `dir`, which then takes its name. The old one is
 /// meanwhile called `dir.previous`; should the program die between the two renamings, [`Checkpoint::load`]
@@ -41,8 +41,8 @@ pub struct Checkpoint {
 pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
     let dir = &end_of_links(dir);
     refuse_other_contents(dir)?;
-    let moments = training.optimizer.moments();
-    let steps = [0, 1].map(|k| moments[k].as_ref().map_or(0, |moments| moments.steps));
+    let moments = &training.optimizer.moments;
+    let steps = moments.each_ref().map(|moments| moments.steps);
     let manifest = Manifest::of(training, &origin.config, origin.seed, steps);
     let last = training.model.weights();
     let used = training.best.as_ref().map_or(&last, |best| &best.weights);
@@ -51,7 +51,7 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     let files: [(&str, &[u8]); 5] = [
         (WEIGHTS, &weights::to_bytes(&manifest.shape, used)),
         (LAST, &weights::to_bytes(&manifest.shape, &last)),
-        (OPTIMIZER, &moments::to_bytes(&manifest, &moments)),
+        (OPTIMIZER, &moments::to_bytes(&manifest, moments)),
         (MODEL, origin.model_toml.as_bytes()),
         (MANIFEST, &json),
     ];
@@ -65,8 +65,8 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     replace(dir, fresh)
 }
 
-/// A directory that vanishes unless it is kept; as readable as any other, where temporary ones are private.
-/// It has one name for each `dir`, so that what a killed program left is met and removed.
+/// A temporary directory, deleted unless it is kept; with the usual permissions, where temporary ones are private. Its
+/// name depends on `dir` alone, so that the remains of a killed program are found and removed.
 fn fresh_beside(dir: &Path, parent: &Path) -> std::io::Result<tempfile::TempDir> {
     let mut name = std::ffi::OsString::from(".");
     name.push(dir.file_name().unwrap_or_default());
@@ -108,7 +108,7 @@ fn replace(dir: &Path, fresh: tempfile::TempDir) -> Result<(), CheckpointError> 
         }
         return Err(io("move the checkpoint to", dir)(error));
     }
-    // The directory has moved: there is nothing left to clean up under its first name.
+    // The directory has been renamed: nothing is left to delete under its temporary name.
     let _ = fresh.keep();
     if previous.exists() {
         fs::remove_dir_all(&previous).map_err(io("remove", &previous))?;
@@ -116,7 +116,7 @@ fn replace(dir: &Path, fresh: tempfile::TempDir) -> Result<(), CheckpointError> 
     Ok(())
 }
 
-/// Where the older checkpoint waits while a new one takes its place.
+/// Where the older checkpoint is while a new one takes its place.
 fn previous(dir: &Path) -> PathBuf {
     let mut name = dir.as_os_str().to_owned();
     name.push(".previous");
@@ -132,7 +132,7 @@ fn io<'a>(action: &'static str, path: &'a Path) -> impl Fn(std::io::Error) -> Ch
 }
 
 impl Checkpoint {
-    /// Read a checkpoint and check that its files belong together.
+    /// Reads a checkpoint and checks that its files belong together.
     ///
     /// # Errors
     /// A missing or damaged file, or another format.
@@ -154,7 +154,7 @@ impl Checkpoint {
         let (weights, last) = (numbers(WEIGHTS)?, numbers(LAST)?);
         let bytes = read(&dir, OPTIMIZER)?;
         Ok(Self {
-            optimizer: moments::from_bytes(&manifest, &last, &bytes, OPTIMIZER, &dir)?,
+            moments: moments::from_bytes(&manifest, &last, &bytes, OPTIMIZER, &dir)?,
             weights,
             last,
             model_toml,
@@ -193,7 +193,7 @@ impl Checkpoint {
         self.build(&self.weights, dynamics, device)
     }
 
-    /// The run, ready to go on.
+    /// The run, to be continued.
     ///
     /// # Errors
     /// When `dynamics` is another model.
@@ -205,7 +205,7 @@ impl Checkpoint {
         let model = self.build(&self.last, dynamics, device)?;
         let manifest = &self.manifest;
         let mut training = Training::new(model, manifest.settings.clone(), manifest.rng.clone())?;
-        training.optimizer.resume(self.optimizer.clone(), device);
+        training.optimizer.moments = self.moments.clone();
         training.epoch = manifest.epoch;
         training.penalty_weight = manifest.penalty_weight;
         training.history.clone_from(&manifest.history);
@@ -229,38 +229,33 @@ impl Checkpoint {
     }
 
     fn check(&self, dynamics: &Dynamics) -> Result<(), CheckpointError> {
-        let foreign = |what, saved: String, given: String| CheckpointError::Foreign {
-            what,
-            saved,
-            given,
-            dir: self.dir.clone(),
+        let same = |what, saved: String, given: String| match saved == given {
+            true => Ok(()),
+            false => Err(CheckpointError::Foreign {
+                what,
+                saved,
+                given,
+                dir: self.dir.clone(),
+            }),
         };
         let saved = &self.manifest.shape;
-        if saved.system != dynamics.name {
-            let (saved, given) = (saved.system.clone(), dynamics.name.clone());
-            return Err(foreign("system", saved, given));
+        same("system", saved.system.clone(), dynamics.name.clone())?;
+        let (joints, given) = (saved.joints.to_string(), dynamics.joints.to_string());
+        same("number of joints", joints, given)?;
+        if saved.prior.is_some() {
+            // A network needs no equations, so that those of the model file may be any.
+            return Ok(());
         }
-        if saved.joints != dynamics.joints {
-            let (saved, given) = (saved.joints.to_string(), dynamics.joints.to_string());
-            return Err(foreign("number of joints", saved, given));
-        }
-        let list = |names: Vec<&str>| match names.len() {
-            0 => "none".to_owned(),
-            _ => names.join(", "),
-        };
-        let known = list(saved.parameters.iter().map(|p| p.name.as_str()).collect());
-        let given = list(
-            dynamics
-                .parameters
-                .iter()
-                .map(|p| p.name.as_str())
-                .collect(),
-        );
-        // A network needs no equations, so those of the model file may be any.
-        if saved.prior.is_none() && known != given {
-            return Err(foreign("list of parameters", known, given));
-        }
-        Ok(())
+        let known = listed(saved.parameters.iter().map(|p| &p.name));
+        let given = listed(dynamics.parameters.iter().map(|p| &p.name));
+        same("list of parameters", known, given)
+    }
+}
+
+fn listed<'n>(names: impl Iterator<Item = &'n String>) -> String {
+    match names.map(String::as_str).collect::<Vec<_>>() {
+        names if names.is_empty() => "none".to_owned(),
+        names => names.join(", "),
     }
 }
 
@@ -278,7 +273,7 @@ fn read(dir: &Path, file: &str) -> Result<Vec<u8>, CheckpointError> {
     }
 }
 
-/// The format is looked at first: another one may describe anything else differently.
+/// The format is read first: in another one everything else may differ.
 fn read_manifest(dir: &Path) -> Result<Manifest, CheckpointError> {
     let damaged = |error: serde_json::Error| corrupt(MANIFEST, error.to_string(), dir);
     let json: serde_json::Value = serde_json::from_slice(&read(dir, MANIFEST)?).map_err(damaged)?;

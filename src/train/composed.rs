@@ -2,27 +2,17 @@
 
 use burn::tensor::Tensor;
 
-use super::loss::NORM_FLOOR;
-use super::{Columns, HybridModel, Prepared};
+use super::{Columns, Unpacked};
 use crate::sim::Integrator;
 
-/// E and ||F_r||, `[2]`.
-pub(super) fn loss(
-    model: &HybridModel,
-    batch: &Columns,
-    integrator: Integrator,
-    scale: &[f64],
-) -> Tensor<1> {
-    Tensor::cat(
-        of_each(&model.prepare(), 1, batch, integrator, scale).to_vec(),
-        0,
-    )
-}
+/// Below this size a residual counts as absent: it keeps the slope of the norm finite at zero, where every residual
+/// begins.
+pub(super) const NORM_FLOOR: f64 = 1e-6;
 
 /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
 /// after the other's.
 pub(super) fn of_each(
-    model: &Prepared,
+    model: &Unpacked,
     models: usize,
     batch: &Columns,
     integrator: Integrator,

@@ -1,10 +1,38 @@
 use std::path::PathBuf;
 
 use super::hybrid::HybridError;
-use super::segments::SegmentsError;
 use crate::model::SavedModelError;
 
-/// Why a training run cannot start or go on.
+/// Why a trajectory cannot be cut into segments.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SegmentsError {
+    #[error(
+        "{what} has {found} numbers, {expected} are needed for {rows} rows and {joints} joints"
+    )]
+    Length {
+        what: &'static str,
+        expected: usize,
+        found: usize,
+        rows: usize,
+        joints: usize,
+    },
+    #[error("{what} of row {row} is {value}; leave such rows out before training")]
+    NotFinite {
+        what: &'static str,
+        row: usize,
+        value: f64,
+    },
+    #[error("time goes from {before} s to {after} s at row {row}; it must grow")]
+    Time { row: usize, before: f64, after: f64 },
+    #[error(
+        "a trajectory of {rows} rows has no segment of {steps} steps; give longer logs or lower the number of steps"
+    )]
+    TooShort { rows: usize, steps: usize },
+    #[error("there is nothing to train on; give at least one trajectory")]
+    Empty,
+}
+
+/// Why a training run cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
     #[error(

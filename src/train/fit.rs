@@ -1,29 +1,29 @@
 use std::ops::ControlFlow;
 
-use burn::module::Module;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::optimizer::Stepper;
-use super::{Batch, Batching, Best, FitSettings, Loss, Objective, Record, Segments, TrainError};
+use super::loss::Gradient;
+use super::optimizer::Optimizer;
+use super::{Batch, Batching, Best, FitSettings, Objective, Record, Segments, TrainError};
 use crate::train::HybridModel;
 
-/// A training run: a value that can be held, saved ([`save`](super::save)), loaded and continued. Where
-/// it was interrupted does not change its result by a bit on the same backend and machine.
+/// A training run, which can be saved, loaded and continued. Interruptions do not change its
+/// result by a bit on the same backend and machine.
 #[derive(Clone)]
 pub struct Training {
     pub(super) model: HybridModel,
     pub(super) settings: FitSettings,
-    pub(super) optimizer: Stepper<1>,
+    pub(super) optimizer: Optimizer,
     pub(super) rng: ChaCha8Rng,
     pub(super) epoch: usize,
     pub(super) penalty_weight: f64,
     pub(super) history: Vec<Record>,
     pub(super) best: Option<Best>,
-    objective: Objective,
+    pub(super) objective: Objective,
 }
 
-/// What an observer sees after each epoch.
+/// The progress of a run, after each epoch.
 pub struct Progress<'a> {
     /// Epochs done.
     pub epoch: usize,
@@ -42,17 +42,17 @@ pub struct Progress<'a> {
 pub enum Ended {
     /// All epochs are done.
     Finished,
-    /// The observer asked to stop; the run can go on.
+    /// The observer asked to stop; the run can be continued.
     Stopped,
 }
 
-/// What a run is done with.
-struct Material<'a> {
+/// The data of a run.
+struct Batches<'a> {
     segments: &'a Segments,
-    /// All of them, with gradients.
-    trained: Batch,
-    /// The same without.
-    judged: Batch,
+    /// All segments, on a device with gradients.
+    training: Batch,
+    /// All segments, on a device without.
+    evaluation: Batch,
     validation: Option<Batch>,
 }
 
@@ -81,7 +81,7 @@ impl Training {
                 settings.error_scale.as_deref(),
                 model.joints(),
             )?,
-            optimizer: Stepper::new(model.frame(), &settings),
+            optimizer: Optimizer::new(model.structure(), &settings),
             epoch: 0,
             penalty_weight: settings.penalty.initial(),
             history: Vec::new(),
@@ -92,17 +92,8 @@ impl Training {
         })
     }
 
-    /// The same run with its losses composed of Burn's operations, see [`Objective::composed`].
-    #[must_use]
-    pub fn composed(self) -> Self {
-        Self {
-            objective: self.objective.composed(),
-            ..self
-        }
-    }
-
-    /// Train until all epochs are done or `observer`, called after each, breaks off. Call it again to
-    /// go on. With `validation` the best model by its error is kept, the one before training included.
+    /// Trains until all epochs are done or `observer`, called after each, asks to stop; called again, it
+    /// continues. With `validation` the best model by its error is kept, the one before training included.
     ///
     /// # Errors
     /// Segments that do not fit the model, or a loss that is no longer finite: numbers are never repaired.
@@ -112,38 +103,40 @@ impl Training {
         validation: Option<&Segments>,
         observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Ended, TrainError> {
-        segments.check_for(self.model.frame(), "training")?;
+        segments.check_for(self.model.structure(), "training")?;
         let device = self.model.device();
         let plain = device.clone().without_autodiff();
         if let Some(validation) = validation {
-            validation.check_for(self.model.frame(), "validation")?;
+            validation.check_for(self.model.structure(), "validation")?;
         }
-        let material = Material {
+        let batches = Batches {
             segments,
-            trained: self.objective.all(segments, &device),
-            judged: self.objective.all(segments, &plain),
+            training: self.objective.all(segments, &device),
+            evaluation: self.objective.all(segments, &plain),
             validation: validation.map(|segments| self.objective.all(segments, &plain)),
         };
         let workers = self.objective.workers();
-        workers.helped(|| self.run_epochs(&material, observer))
+        workers.with_workers(|| self.run_epochs(&batches, observer))
     }
 
     fn run_epochs(
         &mut self,
-        material: &Material,
+        batches: &Batches,
         observer: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<Ended, TrainError> {
         if self.history.is_empty() {
-            self.record(material)?;
+            self.record(batches)?;
         }
         while self.epoch < self.settings.epochs {
-            self.optimizer.anneal(self.settings.share_in(self.epoch));
-            let Epoch { loss, error } = self.run_epoch(material)?;
+            self.optimizer
+                .rates
+                .anneal(self.settings.share_in(self.epoch));
+            let Epoch { loss, error } = self.run_epoch(batches)?;
             self.epoch += 1;
             self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);
             let every = self.settings.record_every.get();
             if self.epoch.is_multiple_of(every) || self.epoch == self.settings.epochs {
-                self.record(material)?;
+                self.record(batches)?;
             }
             let progress = Progress {
                 epoch: self.epoch,
@@ -159,12 +152,12 @@ impl Training {
         Ok(Ended::Finished)
     }
 
-    /// The model as it is now.
+    /// The current model.
     pub fn model(&self) -> &HybridModel {
         &self.model
     }
 
-    /// The model to use: the best by validation error, or the present one where there is no validation.
+    /// The result: the best model by validation error, or the current one without validation.
     ///
     /// # Errors
     /// None for a run made or loaded by this module.
@@ -190,16 +183,11 @@ impl Training {
         &self.history
     }
 
-    /// The best model by validation error, where there is validation.
-    pub fn best(&self) -> Option<&Best> {
-        self.best.as_ref()
-    }
-
-    fn run_epoch(&mut self, material: &Material) -> Result<Epoch, TrainError> {
+    fn run_epoch(&mut self, batches: &Batches) -> Result<Epoch, TrainError> {
         let Batching::Mini { size } = self.settings.batching else {
-            return self.step(&material.trained);
+            return self.step(&batches.training);
         };
-        let segments = material.segments;
+        let segments = batches.segments;
         let mut order: Vec<usize> = (0..segments.len()).collect();
         order.shuffle(&mut self.rng);
         let device = self.model.device();
@@ -215,29 +203,30 @@ impl Training {
 
     /// One step of the optimiser on one batch.
     fn step(&mut self, batch: &Batch) -> Result<Epoch, TrainError> {
-        let loss = self.objective.loss(&self.model, batch);
-        let weights = self.weights();
-        let (total, [error, _]) = self.total(&loss, weights)?;
-        let gradients = loss.weighted(weights).backward();
-        let stepped = self.optimizer.step(self.model.tensors(), gradients);
-        self.model = self.model.with_tensors(stepped).project();
-        Ok(Epoch { loss: total, error })
+        let Gradient { loss, by_numbers } =
+            self.objective.gradient(&self.model, batch, self.weights());
+        let total = self.total(loss)?;
+        let step = |numbers: &mut _| self.optimizer.step(numbers, &by_numbers);
+        self.model.update(step);
+        Ok(Epoch {
+            loss: total,
+            error: loss[0],
+        })
     }
 
-    /// Judge the present model on all training segments and on validation.
-    fn record(&mut self, material: &Material) -> Result<(), TrainError> {
-        let model = self.model.clone().valid();
-        let judge = |batch| self.objective.loss(&model, batch);
-        let (loss, [error, residual_norm]) =
-            self.total(&judge(&material.judged), self.weights())?;
-        let validation =
-            material
-                .validation
-                .as_ref()
-                .map(|batch| match judge(batch).numbers()[0] {
-                    error if error.is_finite() => error,
-                    _ => f64::INFINITY,
-                });
+    /// Evaluates the current model on all training segments and on validation.
+    fn record(&mut self, batches: &Batches) -> Result<(), TrainError> {
+        let model = self.model.without_gradients();
+        let evaluate = |batch| self.objective.loss(&model, batch);
+        let parts = evaluate(&batches.evaluation);
+        let (loss, [error, residual_norm]) = (self.total(parts)?, parts);
+        let validation = batches
+            .validation
+            .as_ref()
+            .map(|batch| match evaluate(batch)[0] {
+                error if error.is_finite() => error,
+                _ => f64::INFINITY,
+            });
         let weights = self.model.weights();
         self.history.push(Record {
             epoch: self.epoch,
@@ -265,15 +254,15 @@ impl Training {
 
     fn weights(&self) -> [f64; 2] {
         let penalty = self.settings.penalty;
-        penalty.weights(self.penalty_weight, self.model.frame().has_residual)
+        penalty.weights(self.penalty_weight, self.model.structure().has_residual)
     }
 
-    /// What is minimised, and its parts before they are weighted.
-    fn total(&self, loss: &Loss, weights: [f64; 2]) -> Result<(f64, [f64; 2]), TrainError> {
-        let parts = loss.numbers();
-        let total = parts[0] * weights[0] + parts[1] * weights[1];
+    /// What is minimised.
+    fn total(&self, loss: [f64; 2]) -> Result<f64, TrainError> {
+        let weights = self.weights();
+        let total = loss[0] * weights[0] + loss[1] * weights[1];
         if total.is_finite() {
-            return Ok((total, parts));
+            return Ok(total);
         }
         let named = self.model.parameters().into_iter();
         let list: Vec<String> = named.map(|(name, v)| format!("{name} = {v:.6}")).collect();

@@ -7,21 +7,21 @@ use crate::model::ModelWeights;
 pub struct Record {
     /// Epochs done when it was taken; 0 is the start.
     pub epoch: usize,
-    /// What is minimised: error and penalty together.
+    /// The minimised sum of error and penalty.
     pub loss: f64,
     /// Mean squared error of the training segments.
     pub error: f64,
     /// Norm of the residual F_r; 0 in a model without one.
     pub residual_norm: f64,
     /// Mean squared error of the validation segments, if there are any. Infinite where the model
-    /// diverges: the worst there is, and never kept as the best.
+    /// diverges, which is never kept as the best.
     #[serde(
         default,
         skip_serializing_if = "Option::is_none",
         with = "null_if_infinite"
     )]
     pub validation: Option<f64>,
-    /// alpha, or the present lambda.
+    /// alpha, or the current lambda.
     pub penalty_weight: f64,
     /// Values of the physical parameters, in their order.
     pub parameters: Vec<f64>,
@@ -29,7 +29,7 @@ pub struct Record {
 
 /// The model with the lowest validation error so far.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Best {
+pub(super) struct Best {
     pub epoch: usize,
     pub validation: f64,
     pub weights: ModelWeights,

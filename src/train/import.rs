@@ -8,8 +8,8 @@ use super::{Backend, CheckpointError, FitSettings, HybridModel, Training, save};
 use crate::formats::Imported;
 use crate::model::Origin;
 
-/// Write an exported model as a checkpoint that has not been trained any further. `seed` orders the minibatches of a
-/// training that continues from it.
+/// Writes an exported model as an untrained checkpoint. `seed` orders the minibatches of a training that continues from
+/// it.
 ///
 /// # Errors
 /// A folder that cannot be written, or that holds something other than a checkpoint.
@@ -21,10 +21,10 @@ pub fn save_imported(
 ) -> Result<(), CheckpointError> {
     let Imported {
         description,
-        system,
+        system: declared,
         numbers,
     } = imported;
-    let dynamics = system.dynamics();
+    let dynamics = declared.dynamics();
     let device = backend.device();
     let model = HybridModel::restored(&description.shape, &numbers, &dynamics, &device)?;
     let settings = FitSettings {

@@ -1,15 +1,15 @@
 use std::sync::Arc;
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 
-use super::{Batch, Columns, HybridModel, Prepared, Segments, TrainError, composed, fused};
+use super::composed;
+use super::fused::{Evaluation, Problem, Workers};
+use super::hybrid::{Numbers, to_f32, to_f64, vector};
+use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, Unpacked};
+use crate::model;
 use crate::sim::Integrator;
 
-/// The number below which a residual counts as absent: it keeps the slope of the norm finite at zero,
-/// where every residual starts.
-pub(super) const NORM_FLOOR: f64 = 1e-6;
-
-/// What models are judged by: the way their predictions are made and the units of their errors.
+/// What a model is fitted to: the way its predictions are made, and the units of their errors.
 #[derive(Debug)]
 pub struct Objective {
     integrator: Integrator,
@@ -17,22 +17,36 @@ pub struct Objective {
     scale: Vec<f64>,
     /// 1 / scale.
     precision: Arc<[f32]>,
-    workers: Arc<fused::Workers>,
-    /// Whether losses are composed of Burn's operations on the processor, too.
-    is_composed: bool,
+    implementation: Implementation,
+    workers: Arc<Workers>,
 }
 
-/// The two parts of the loss, `[2]`.
-///
-/// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
-/// first state by the unrolled integrator.
-///
-/// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
-/// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean of
-/// the norms would be another choice; it treats rows one by one and pulls small residuals to zero as hard as large
-/// ones, so that an effect felt in few rows would vanish first.
+/// What evaluates losses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Implementation {
+    /// One operation for the whole loss, on the processor; devices without it compose the loss.
+    Fused,
+    /// Burn's operations on every device.
+    Composed,
+}
+
+/// Segments ready for a loss of an [`Objective`].
 #[derive(Debug, Clone)]
-pub struct Loss(Tensor<1>);
+pub enum Batch {
+    /// For Burn's operations.
+    Columns(Columns),
+    /// For the fused operation.
+    Blocks(Arc<Blocks>),
+}
+
+/// A loss with its gradient.
+#[derive(Debug, Clone)]
+pub(super) struct Gradient {
+    /// E and ||F_r||.
+    pub loss: [f64; 2],
+    /// Of their weighted sum, by the learnable numbers.
+    pub by_numbers: Numbers,
+}
 
 impl Objective {
     /// Errors in the units of `error_scale`, one for each of `2n` states, or 1 for each.
@@ -51,58 +65,103 @@ impl Objective {
                 scale,
             });
         }
-        #[allow(clippy::cast_possible_truncation)] // training runs in f32
-        let precision = scale.iter().map(|scale| (1.0 / scale) as f32);
+        let precision: Vec<f64> = scale.iter().map(|scale| 1.0 / scale).collect();
         Ok(Self {
             integrator,
-            precision: precision.collect(),
+            precision: model::to_f32(&precision).into(),
             scale,
+            implementation: Implementation::Fused,
             workers: Arc::default(),
-            is_composed: false,
         })
     }
 
-    /// The same with losses composed of Burn's operations wherever they are evaluated: the reference of the fused loss,
-    /// and many times slower.
+    /// The same with losses composed of Burn's operations on every device: the reference of the fused loss, and many
+    /// times slower.
     #[must_use]
     pub fn composed(self) -> Self {
         Self {
-            is_composed: true,
+            implementation: Implementation::Composed,
             ..self
         }
     }
 
-    /// The chosen segments, as [`Objective::loss`] takes them on a device.
-    pub(super) fn batch(&self, segments: &Segments, chosen: &[usize], device: &Device) -> Batch {
-        if self.is_composed {
-            Batch::Columns(segments.columns(chosen, device))
-        } else {
-            segments.batch(chosen, device)
+    /// The chosen segments for losses on a device.
+    pub fn batch(&self, segments: &Segments, chosen: &[usize], device: &Device) -> Batch {
+        match self.implementation {
+            Implementation::Fused if *device == Backend::NdArray.device() => {
+                Batch::Blocks(Arc::new(segments.blocks(chosen)))
+            }
+            _ => Batch::Columns(segments.columns(chosen, device)),
         }
     }
 
-    /// All segments, as [`Objective::loss`] takes them on a device.
-    pub(super) fn all(&self, segments: &Segments, device: &Device) -> Batch {
+    /// All segments for losses on a device.
+    pub fn all(&self, segments: &Segments, device: &Device) -> Batch {
         self.batch(segments, &(0..segments.len()).collect::<Vec<_>>(), device)
     }
 
-    /// The threads for its losses.
-    pub(super) fn workers(&self) -> Arc<fused::Workers> {
+    /// The threads of its losses.
+    pub(super) fn workers(&self) -> Arc<Workers> {
         self.workers.clone()
     }
 
-    /// The loss of a model on a batch, through the unrolled integrator.
-    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Loss {
-        Loss(match batch {
-            Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
-            Batch::Blocks(blocks) => fused::loss(
-                model,
-                blocks,
-                self.integrator,
-                &self.precision,
-                &self.workers,
-            ),
-        })
+    /// E and ||F_r|| of a model on a batch.
+    ///
+    /// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
+    /// first state by the unrolled integrator.
+    ///
+    /// ||F_r||: the root of the mean over all segments and steps of the squared Euclidean norm of F_r at the step's start; 0
+    /// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean
+    /// of the norms would treat rows one by one and pull small residuals to zero as hard as large ones, so that an effect
+    /// in few rows would vanish first.
+    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> [f64; 2] {
+        match batch {
+            Batch::Columns(columns) => numbers(self.composed_loss(&model.unpack(), columns)),
+            Batch::Blocks(blocks) => self.evaluation(model, blocks).loss.map(f64::from),
+        }
+    }
+
+    /// The loss, and the gradient of the sum of its parts times `weights`. The model must be on a device with gradients.
+    pub(super) fn gradient(
+        &self,
+        model: &HybridModel,
+        batch: &Batch,
+        weights: [f64; 2],
+    ) -> Gradient {
+        match batch {
+            Batch::Columns(columns) => {
+                let tensors = model.tensors();
+                let loss = self.composed_loss(&model.unpack_tensors(&tensors), columns);
+                let weights = vector(&weights, &loss.device());
+                let mut gradients = (loss.clone() * weights).backward();
+                let by_numbers = tensors.map(|tensor| {
+                    let gradient = tensor.grad_remove(&mut gradients);
+                    gradient.map_or_else(Vec::new, to_f32)
+                });
+                Gradient {
+                    loss: numbers(loss),
+                    by_numbers,
+                }
+            }
+            Batch::Blocks(blocks) => {
+                let evaluation = self.evaluation(model, blocks);
+                Gradient {
+                    loss: evaluation.loss.map(f64::from),
+                    by_numbers: evaluation.derivative(weights),
+                }
+            }
+        }
+    }
+
+    fn evaluation(&self, model: &HybridModel, blocks: &Arc<Blocks>) -> Evaluation {
+        let structure = model.structure();
+        let problem = Problem::new(structure, blocks, self.integrator, &self.precision);
+        Evaluation::new(problem, &self.workers, model.numbers())
+    }
+
+    /// E and ||F_r||, `[2]`.
+    fn composed_loss(&self, unpacked: &Unpacked, columns: &Columns) -> Tensor<1> {
+        Tensor::cat(self.of_each(1, unpacked, columns).to_vec(), 0)
     }
 
     /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
@@ -110,10 +169,10 @@ impl Objective {
     pub(super) fn of_each(
         &self,
         models: usize,
-        prepared: &Prepared,
+        unpacked: &Unpacked,
         batch: &Columns,
     ) -> [Tensor<1>; 2] {
-        composed::of_each(prepared, models, batch, self.integrator, &self.scale)
+        composed::of_each(unpacked, models, batch, self.integrator, &self.scale)
     }
 }
 
@@ -124,25 +183,13 @@ impl Clone for Objective {
             integrator: self.integrator,
             scale: self.scale.clone(),
             precision: self.precision.clone(),
+            implementation: self.implementation,
             workers: Arc::default(),
-            is_composed: self.is_composed,
         }
     }
 }
 
-impl Loss {
-    /// E and ||F_r|| as numbers.
-    pub fn numbers(&self) -> [f64; 2] {
-        let data = self.0.to_data();
-        let mut numbers = data.iter::<f32>().map(f64::from);
-        [(); 2].map(|()| numbers.next().expect("a loss has two parts"))
-    }
-
-    /// The parts times their weights, `[2]`.
-    pub fn weighted(self, weights: [f64; 2]) -> Tensor<1> {
-        #[allow(clippy::cast_possible_truncation)] // training runs in f32
-        let weights = TensorData::from(weights.map(|weight| weight as f32));
-        let weights = Tensor::from_data(weights, &self.0.device());
-        self.0 * weights
-    }
+fn numbers(loss: Tensor<1>) -> [f64; 2] {
+    let parts = to_f64(loss).try_into();
+    parts.expect("a loss has two parts")
 }

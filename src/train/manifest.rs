@@ -7,7 +7,7 @@ use crate::model::ModelShape;
 /// The number of the checkpoint format that this program writes and reads.
 pub const FORMAT: u64 = 2;
 
-/// `checkpoint.json`: everything about a checkpoint but its large numbers.
+/// `checkpoint.json`: everything about a checkpoint but its weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     pub format: u64,
@@ -15,7 +15,7 @@ pub struct Manifest {
     pub residyn: String,
     #[serde(flatten)]
     pub shape: ModelShape,
-    /// The whole configuration of the run, as its caller resolved it.
+    /// The configuration of the run, as resolved.
     pub config: serde_json::Value,
     pub seed: u64,
     pub settings: FitSettings,
@@ -30,7 +30,7 @@ pub struct Manifest {
     pub history: Vec<Record>,
 }
 
-/// When the model in `weights.safetensors` was the present one.
+/// The epoch and the validation error of the model in `weights.safetensors`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedBest {
     pub epoch: usize,

@@ -1,5 +1,5 @@
-//! Training: segments of trajectories, the loss through the unrolled integrator, the one fit loop, and
-//! checkpoints from which it goes on bit for bit.
+//! Training: segments of trajectories, the loss through the unrolled integrator, the fit, and checkpoints from which an
+//! interrupted fit resumes bit for bit.
 
 mod backend;
 mod checkpoint;
@@ -19,6 +19,7 @@ pub mod recipe;
 mod residual;
 mod segments;
 mod settings;
+mod stacked;
 mod sweep;
 
 #[cfg(test)]
@@ -26,17 +27,18 @@ mod tests;
 
 pub use backend::Backend;
 pub use checkpoint::{Checkpoint, save};
-pub use error::{CheckpointError, TrainError};
+pub use error::{CheckpointError, SegmentsError, TrainError};
 pub use fit::{Ended, Progress, Training};
 pub use fused::Blocks;
-pub use history::{Best, Record};
-pub use hybrid::{Flow, HybridError, HybridModel, Prepared, Step, replay};
-use hybrid::{Frame, Stack};
+use history::Best;
+pub use history::Record;
+pub use hybrid::{Derivative, HybridError, HybridModel, StepResult, Unpacked, replay};
+use hybrid::{Stack, Structure};
 pub use import::save_imported;
-pub use loss::{Loss, Objective};
+pub use loss::{Batch, Objective};
 pub use manifest::{FORMAT, Manifest};
 pub use penalty::Penalty;
 pub use residual::ResidualTrainer;
-pub use segments::{Batch, Columns, Segments, SegmentsError};
+pub use segments::{Columns, Segments};
 pub use settings::{Batching, FitSettings, LearningRates};
-pub use sweep::{Start, Sweep, SweepProgress, Trained};
+pub use sweep::{Sweep, SweepProgress, Trained, Variant};

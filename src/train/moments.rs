@@ -1,4 +1,4 @@
-//! What Adam remembers as a safetensors file: `prior.first`, `prior.second`, `residual.first` and `residual.second`,
+//! Adam's moments as a safetensors file: `prior.first`, `prior.second`, `residual.first` and `residual.second`,
 //! f32 each.
 
 use std::path::Path;
@@ -13,33 +13,32 @@ use crate::model::{ModelWeights, SavedModelError};
 const PARTS: [&str; 2] = ["prior", "residual"];
 
 /// The bytes of the file.
-pub(super) fn to_bytes(manifest: &Manifest, moments: &[Option<Moments>; 2]) -> Vec<u8> {
-    let known = PARTS.iter().zip(moments);
-    let entries = known.filter_map(|(part, moments)| {
-        let moments = moments.as_ref()?;
+pub(super) fn to_bytes(manifest: &Manifest, moments: &[Moments; 2]) -> Vec<u8> {
+    let taken = (PARTS.iter().zip(moments)).filter(|(_, moments)| moments.steps > 0);
+    let entries = taken.map(|(part, moments)| {
         let each = [("first", &moments.first), ("second", &moments.second)];
-        Some(each.map(|(which, values)| {
+        each.map(|(which, values)| {
             Entry::of_f32(format!("{part}.{which}"), vec![values.len()], values)
-        }))
+        })
     });
     serialize(&manifest.shape, &entries.flatten().collect::<Vec<_>>())
 }
 
-/// Read the file back; `manifest` says what must be in it, and `weights` how much of it.
+/// Reads the file back; `manifest` says which moments it has, and `weights` their lengths.
 pub(super) fn from_bytes(
     manifest: &Manifest,
     weights: &ModelWeights,
     bytes: &[u8],
     file: &str,
     dir: &Path,
-) -> Result<[Option<Moments>; 2], SavedModelError> {
+) -> Result<[Moments; 2], SavedModelError> {
     let reader = Reader::new(bytes, file, dir)?;
     let of_prior = weights.prior.as_ref();
     let lengths = [
         of_prior.map_or(weights.parameters.len(), |prior| prior.flat().len()),
         weights.residual.as_ref().map_or(0, |r| r.flat().len()),
     ];
-    let read = |k: usize| -> Result<Option<Moments>, SavedModelError> {
+    let read = |k: usize| -> Result<Moments, SavedModelError> {
         let steps = manifest.optimizer_steps[k];
         #[allow(clippy::cast_possible_truncation)] // f32 in the file, widened by the reader
         let moment = |which: &str| -> Result<Vec<f32>, SavedModelError> {
@@ -48,13 +47,13 @@ pub(super) fn from_bytes(
             Ok(values.into_iter().map(|value| value as f32).collect())
         };
         if steps == 0 {
-            return Ok(None);
+            return Ok(Moments::default());
         }
-        Ok(Some(Moments {
+        Ok(Moments {
             steps,
             first: moment("first")?,
             second: moment("second")?,
-        }))
+        })
     };
     Ok([read(0)?, read(1)?])
 }

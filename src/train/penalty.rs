@@ -2,8 +2,8 @@ use serde::{Deserialize, Serialize};
 
 use super::TrainError;
 
-/// How the size of the residual F_r is weighed against the prediction error E. Without it the split of
-/// F into F_p + F_r is not unique: the network could take over what the physics can express.
+/// How the size of the residual F_r is weighed against the prediction error E. Without it F = F_p + F_r is not unique: the
+/// network could replace what the physics can express.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Penalty {
@@ -24,11 +24,22 @@ impl Default for Penalty {
 }
 
 impl Penalty {
-    /// alpha or the first lambda: the number that [`Penalty::next`] carries on.
+    /// alpha or the initial lambda, which [`Penalty::next`] updates.
     pub fn initial(self) -> f64 {
         match self {
             Self::Fixed { alpha } => alpha,
             Self::Adaptive { initial, .. } => initial,
+        }
+    }
+
+    /// The same with another alpha or initial lambda.
+    pub(super) fn from(self, weight: f64) -> Self {
+        match self {
+            Self::Fixed { .. } => Self::Fixed { alpha: weight },
+            Self::Adaptive { rate, .. } => Self::Adaptive {
+                initial: weight,
+                rate,
+            },
         }
     }
 

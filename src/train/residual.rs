@@ -9,7 +9,7 @@ use super::{
 };
 use crate::closeloop::{LearnError, LearnSettings, LearnedResidual, ResidualLearner, ResidualTask};
 use crate::data::Trajectory;
-use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Origin, ResidualOn};
+use crate::model::{Dynamics, LastLayer, MlpSettings, Origin, ResidualOn};
 use crate::sim::Integrator;
 
 /// Trains the residual network of closing the loop.
@@ -18,7 +18,7 @@ pub struct ResidualTrainer {
     pub backend: Backend,
 }
 
-/// The run that trained a residual network, and the hybrid model that came of it.
+/// A run that trained a residual network, and the resulting hybrid model.
 struct TrainedResidual {
     run: Training,
     hybrid: Dynamics,
@@ -57,16 +57,14 @@ impl ResidualTrainer {
         if training.is_empty() || validation.is_empty() {
             return Ok(None);
         }
-        let joints = task.equations.joints;
         let settings = MlpSettings {
             hidden: task.hidden.clone(),
             on: ResidualOn::Accelerations,
-            ..MlpSettings::for_joints(joints)
+            ..MlpSettings::for_joints(task.equations.joints)
         };
-        let scaling = training.scaling(settings.angles);
-        let network = MlpWeights::new(joints, &settings, scaling, LastLayer::Zero, &mut rng);
+        let network = training.network(&settings, LastLayer::Zero, &mut rng);
         let model = HybridModel::physics(&task.equations, &self.backend.device())?;
-        // Batches are full: there is no order to draw.
+        // Batches are full: no order is drawn.
         let order = ChaCha8Rng::seed_from_u64(0);
         let settings = fit_settings(&task.settings);
         let mut run = Training::new(model.with_residual(&network)?, settings, order)?;
@@ -105,7 +103,7 @@ fn segments(task: &ResidualTask) -> [Segments; 2] {
     sets.map(|stretches: &Vec<Trajectory>| {
         let mut set = Segments::new(joints, steps);
         for stretch in stretches {
-            // A stretch that is too short holds no segment; that is no error here.
+            // Too short a stretch holds no segment, which is no error here.
             let _ = set.push_trajectory(&stretch.time, &stretch.states, &stretch.inputs, stride);
         }
         set

@@ -1,39 +1,9 @@
-use std::sync::Arc;
-
 use burn::tensor::{Device, Tensor, TensorData};
+use rand::Rng;
 
-use super::{Backend, Blocks, Frame, TrainError};
+use super::{Blocks, SegmentsError, Structure, TrainError};
 use crate::files::content_id;
-use crate::model::{Angles, InputScaling};
-
-/// Why rows of numbers are no segments.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SegmentsError {
-    #[error(
-        "{what} has {found} numbers, {expected} are needed for {rows} rows and {joints} joints"
-    )]
-    Length {
-        what: &'static str,
-        expected: usize,
-        found: usize,
-        rows: usize,
-        joints: usize,
-    },
-    #[error("{what} of row {row} is {value}; leave such rows out before training")]
-    NotFinite {
-        what: &'static str,
-        row: usize,
-        value: f64,
-    },
-    #[error("time goes from {before} s to {after} s at row {row}; it must grow")]
-    Time { row: usize, before: f64, after: f64 },
-    #[error(
-        "a trajectory of {rows} rows has no segment of {steps} steps; give longer logs or lower the number of steps"
-    )]
-    TooShort { rows: usize, steps: usize },
-    #[error("there is nothing to train on; give at least one trajectory")]
-    Empty,
-}
+use crate::model::{Angles, InputScaling, LastLayer, MlpSettings, MlpWeights};
 
 /// Pieces of trajectories of k steps each, the training data. k = 1 gives transitions (s, a, s').
 ///
@@ -52,15 +22,6 @@ pub struct Segments {
     start: Vec<f32>,
 }
 
-/// Segments ready for a loss, in the form that suits the device.
-#[derive(Debug, Clone)]
-pub enum Batch {
-    /// For Burn's operations.
-    Columns(Columns),
-    /// For the one operation that the processor's own backend has for the whole loss.
-    Blocks(Arc<Blocks>),
-}
-
 /// Segments as columns on a device.
 #[derive(Debug, Clone)]
 pub struct Columns {
@@ -77,7 +38,7 @@ pub struct Columns {
 }
 
 impl Segments {
-    /// No segments yet, for `joints` joints and `steps` steps each.
+    /// An empty set for `joints` joints and `steps` steps each.
     ///
     /// # Panics
     /// When either is zero.
@@ -93,7 +54,7 @@ impl Segments {
         }
     }
 
-    /// Cut a trajectory into segments, a new one beginning every `stride` rows.
+    /// Cuts a trajectory into segments, a new one beginning every `stride` rows.
     ///
     /// `time` has one number a row (s), `states` `2n` (positions, velocities), `inputs` `n` (held until
     /// the next row; the last row's is not used).
@@ -174,36 +135,30 @@ impl Segments {
         self.start.is_empty()
     }
 
-    /// Number of joints n.
-    pub fn joints(&self) -> usize {
-        self.joints
-    }
-
-    /// Number of steps k in each segment.
-    pub fn steps(&self) -> usize {
-        self.steps
-    }
-
-    /// Can a model of this frame learn from them? `role` is what they are for.
+    /// Checks that a model of this structure can be fitted to them; `role` is their use, for the message.
     ///
     /// # Errors
     /// No segments, or another number of joints.
-    pub(super) fn check_for(&self, frame: &Frame, role: &'static str) -> Result<(), TrainError> {
+    pub(super) fn check_for(
+        &self,
+        structure: &Structure,
+        role: &'static str,
+    ) -> Result<(), TrainError> {
         if self.is_empty() {
             return Err(SegmentsError::Empty.into());
         }
-        if self.joints != frame.joints {
+        if self.joints != structure.joints {
             return Err(TrainError::Joints {
                 role,
-                system: frame.system.clone(),
-                expected: frame.joints,
+                system: structure.system.clone(),
+                expected: structure.joints,
                 found: self.joints,
             });
         }
         Ok(())
     }
 
-    /// A hash of all numbers, which tells segments of other contents apart.
+    /// A hash of all numbers.
     pub fn fingerprint(&self) -> String {
         let numbers = [&self.states, &self.inputs, &self.dt, &self.start];
         let numbers = numbers.into_iter().flatten().map(|x| x.to_bits());
@@ -213,7 +168,7 @@ impl Segments {
         content_id(&bytes.collect::<Vec<u8>>())
     }
 
-    /// Mean and spread of the features that a network sees, over all steps.
+    /// Mean and standard deviation of a network's features over all steps.
     pub fn scaling(&self, angles: Angles) -> InputScaling {
         let n = self.joints;
         let rows = (0..self.len() * self.steps).map(|k| {
@@ -229,21 +184,19 @@ impl Segments {
         InputScaling::from_rows(angles.features(n), rows)
     }
 
-    /// The chosen segments for losses on a device.
-    pub fn batch(&self, chosen: &[usize], device: &Device) -> Batch {
-        if *device == Backend::NdArray.device() {
-            Batch::Blocks(Arc::new(self.blocks(chosen)))
-        } else {
-            Batch::Columns(self.columns(chosen, device))
-        }
+    /// A new network for models of this motion, its features scaled to it.
+    pub fn network(
+        &self,
+        settings: &MlpSettings,
+        last: LastLayer,
+        rng: &mut impl Rng,
+    ) -> MlpWeights {
+        let scaling = self.scaling(settings.angles);
+        MlpWeights::new(self.joints, settings, scaling, last, rng)
     }
 
-    /// All segments for losses on a device.
-    pub fn all(&self, device: &Device) -> Batch {
-        self.batch(&(0..self.len()).collect::<Vec<_>>(), device)
-    }
-
-    fn blocks(&self, chosen: &[usize]) -> Blocks {
+    /// The chosen segments for the fused loss.
+    pub(super) fn blocks(&self, chosen: &[usize]) -> Blocks {
         let (n, k) = (self.joints, self.steps);
         Blocks::new(n, k, chosen.len(), |row| {
             let segment = chosen[row];
@@ -263,21 +216,17 @@ impl Segments {
         })
     }
 
+    /// The chosen segments for the composed loss on a device.
     pub(super) fn columns(&self, chosen: &[usize], device: &Device) -> Columns {
         let (n, k) = (self.joints, self.steps);
         let column = |from: &[f32], width: usize, offset: usize| {
             let values: Vec<f32> = chosen.iter().map(|i| from[i * width + offset]).collect();
             Tensor::<1>::from_data(TensorData::new(values, [chosen.len()]), device)
         };
-        let group = |from: &[f32], rows: usize, width: usize| -> Vec<Vec<Tensor<1>>> {
-            let row = |row: usize| (0..width).map(move |c| row * width + c);
-            (0..rows)
-                .map(|r| {
-                    row(r)
-                        .map(|offset| column(from, rows * width, offset))
-                        .collect()
-                })
-                .collect()
+        let group = |from: &[f32], rows: usize, width: usize| {
+            let at = |offset| column(from, rows * width, offset);
+            let row = |row| (row * width..(row + 1) * width).map(at).collect();
+            (0..rows).map(row).collect()
         };
         let dt: Vec<Tensor<1>> = (0..k).map(|step| column(&self.dt, k, step)).collect();
         let mut time = vec![column(&self.start, 1, 0)];

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Penalty, TrainError};
 use crate::sim::Integrator;
 
-/// Everything that decides how a fit runs. Defaults are the published ones.
+/// The settings of a fit. Defaults are the published ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FitSettings {
@@ -13,9 +13,9 @@ pub struct FitSettings {
     pub learning_rates: LearningRates,
     /// Share of the learning rates that is left in the last epoch; they fall by the same factor in each. 1 keeps them.
     pub anneal: f64,
-    /// By this share of the learning rate every number of the residual or, in a model without one, of the network that
-    /// is the model shrinks at each step (decoupled weight decay, Loshchilov and Hutter 2019, arXiv:1711.05101). It keeps
-    /// a network near to nothing where there are no data.
+    /// Decoupled weight decay (Loshchilov and Hutter 2019, arXiv:1711.05101): at each step the weights of the residual or,
+    /// in a model without one, of the network shrink by this share of the learning rate. It keeps a network small where
+    /// there are no data.
     pub weight_decay: f64,
     pub batching: Batching,
     pub penalty: Penalty,

@@ -1,38 +1,27 @@
-//! Many independent models of one shape trained as one batch, for devices that one model leaves idle.
+//! One recipe's model trained many times, from other networks or with other penalties.
 
-use std::ops::Range;
+use std::ops::ControlFlow;
 
-use burn::tensor::{Bool, Tensor, TensorData};
-use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::optimizer::Stepper;
-use super::{
-    Batching, Columns, FitSettings, HybridModel, Objective, Penalty, Segments, Stack, TrainError,
-};
-use crate::model::{MlpWeights, to_f32};
+use super::stacked::StackedSweep;
+use super::{Backend, FitSettings, HybridModel, Segments, TrainError, Training};
+use crate::model::MlpWeights;
 
-/// A run of many models. The sum of their losses is minimised, in which each model has numbers of its own: every gradient
-/// and every step of Adam, which goes entry by entry, is that of a model alone. One whose loss is no longer finite
-/// stays as it is from then on and harms no other.
+/// A run of many models of one structure.
+///
+/// On the processor one model is trained after the other, each by the fused loss on all cores. On other devices, which
+/// one model leaves idle, all are trained as one batch.
+#[derive(Debug, Clone)]
 pub struct Sweep {
-    stack: Stack,
+    model: HybridModel,
     settings: FitSettings,
-    objective: Objective,
-    optimizer: Stepper<2>,
-    /// Of the minibatches of each model.
-    orders: Vec<ChaCha8Rng>,
-    /// alpha, or the present lambda, of each model.
-    penalty_weights: Vec<f64>,
-    /// What E and ||F_r|| are multiplied by, `[models]` each.
-    weights: [Tensor<1>; 2],
-    /// Whether all losses of a model were finite so far, `[models]`.
-    alive: Tensor<1, Bool>,
+    variants: Vec<Variant>,
 }
 
-/// What tells a model of a sweep from the others.
+/// What distinguishes one model of a sweep.
 #[derive(Debug, Clone)]
-pub struct Start {
+pub struct Variant {
     /// In place of the network of the sweep's model.
     pub network: MlpWeights,
     /// alpha, or the first lambda.
@@ -54,192 +43,132 @@ pub struct Trained {
     pub diverged: bool,
 }
 
-/// What an observer sees after each epoch.
+/// The progress of a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepProgress {
-    /// Epochs done.
-    pub epoch: usize,
-    /// Models that had diverged when last counted, every `record_every` epochs.
+    /// Calls of the observer so far, of the [`Sweep::rounds`].
+    pub round: usize,
+    /// Models that had diverged when last counted.
     pub diverged: usize,
 }
 
-/// What a step saw.
-struct Step {
-    share: f64,
-    /// The prediction error of each model before it, `[models]`.
-    error: Tensor<1>,
-}
-
 impl Sweep {
-    /// A run that has not begun: copies of `model`, each with what its start says. The model must be on a device
+    /// A run that has not begun: copies of `model`, one for each variant. The model must be on a device
     /// with gradients and have a network.
     ///
     /// # Errors
     /// Settings that are out of range.
     ///
     /// # Panics
-    /// When there are no starts, or with networks that are not of the shape of the model's own.
+    /// When there are no variants, or with networks that are not of the shape of the model's own.
     pub fn new(
         model: &HybridModel,
         settings: FitSettings,
-        starts: Vec<Start>,
+        variants: Vec<Variant>,
     ) -> Result<Self, TrainError> {
         settings.check()?;
-        let scale = settings.error_scale.as_deref();
-        let objective = Objective::new(settings.integrator, scale, model.joints())?;
-        let penalty_weights: Vec<f64> = starts.iter().map(|s| s.penalty_weight).collect();
-        let (networks, orders): (Vec<_>, Vec<_>) = (starts.into_iter())
-            .map(|start| (start.network, start.order))
-            .unzip();
-        let stack = Stack::new(model, &networks);
-        let weights = [(); 2].map(|()| Tensor::zeros([networks.len()], &stack.device()));
-        let mut sweep = Self {
-            alive: weights[0].clone().inner().is_finite(),
-            optimizer: Stepper::new(model.frame(), &settings),
-            weights,
-            stack,
-            orders,
-            penalty_weights,
-            objective,
+        let made = model.structure().networks.last().map(MlpWeights::widths);
+        let fits = |variant: &Variant| Some(variant.network.widths()) == made;
+        assert!(
+            !variants.is_empty() && variants.iter().all(fits),
+            "networks are of the shape of the model's"
+        );
+        Ok(Self {
+            model: model.clone(),
             settings,
-        };
-        sweep.weights = sweep.weights_on_device();
-        Ok(sweep)
+            variants,
+        })
     }
 
-    /// Train to the last epoch; `observer` is called after each.
+    /// How often the observer of a run is called.
+    pub fn rounds(&self) -> usize {
+        match self.is_stacked() {
+            true => self.settings.epochs,
+            false => self.variants.len() * self.settings.epochs,
+        }
+    }
+
+    fn is_stacked(&self) -> bool {
+        self.model.device() != Backend::NdArray.device()
+    }
+
+    /// Trains every model to its last epoch; `observer` is called after each epoch of all models or, on the processor, of
+    /// one.
     ///
     /// # Errors
     /// Segments that do not fit the model.
     pub fn run(
-        &mut self,
+        &self,
         segments: &Segments,
         observer: &mut dyn FnMut(SweepProgress),
     ) -> Result<Vec<Trained>, TrainError> {
-        segments.check_for(self.stack.frame(), "training")?;
-        let whole = self.columns(segments, &self.in_order(segments), 0..segments.len());
-        let mut diverged = 0;
-        for epoch in 1..=self.settings.epochs {
-            self.optimizer.anneal(self.settings.share_in(epoch - 1));
-            let steps = self.run_epoch(segments, &whole);
-            self.reweigh(steps);
-            // Only now and then, since it waits for the device.
-            if epoch.is_multiple_of(self.settings.record_every.get()) {
-                diverged = self
-                    .diverged()
-                    .into_iter()
-                    .filter(|diverged| *diverged)
-                    .count();
-            }
-            observer(SweepProgress { epoch, diverged });
+        if self.is_stacked() {
+            let variants = self.variants.clone();
+            return StackedSweep::new(&self.model, self.settings.clone(), variants)?
+                .run(segments, observer);
         }
-        Ok(self.judge(&whole))
+        let mut trained: Vec<Trained> = Vec::new();
+        for (k, variant) in self.variants.iter().enumerate() {
+            let diverged = trained.iter().filter(|model| model.diverged).count();
+            let mut each = |epoch: usize| {
+                observer(SweepProgress {
+                    round: k * self.settings.epochs + epoch,
+                    diverged,
+                });
+            };
+            trained.push(self.alone(variant, segments, &mut each)?);
+        }
+        Ok(trained)
     }
 
-    fn run_epoch(&mut self, segments: &Segments, whole: &Columns) -> Vec<Step> {
-        let Batching::Mini { size } = self.settings.batching else {
-            return vec![self.step(whole, 1.0)];
+    fn alone(
+        &self,
+        variant: &Variant,
+        segments: &Segments,
+        after_epoch: &mut dyn FnMut(usize),
+    ) -> Result<Trained, TrainError> {
+        let mut run = self.training(variant)?;
+        let ended = run.run(segments, None, &mut |at| {
+            after_epoch(at.epoch);
+            ControlFlow::Continue(())
+        });
+        match ended {
+            Ok(_) => Ok(Trained::of(&run)),
+            Err(TrainError::Diverged { .. }) => Ok(Trained {
+                error: f64::NAN,
+                residual_norm: f64::NAN,
+                parameters: run.model().weights().parameters,
+                diverged: true,
+            }),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The run of one variant alone.
+    pub(super) fn training(&self, variant: &Variant) -> Result<Training, TrainError> {
+        let mut weights = self.model.weights();
+        match &mut weights.residual {
+            Some(residual) => *residual = variant.network.clone(),
+            None => weights.prior = Some(variant.network.clone()),
+        }
+        let settings = FitSettings {
+            penalty: self.settings.penalty.from(variant.penalty_weight),
+            ..self.settings.clone()
         };
-        let mut orders = self.in_order(segments);
-        for (order, rng) in orders.iter_mut().zip(&mut self.orders) {
-            order.shuffle(rng);
+        let model = self.model.with_weights(&weights)?;
+        Training::new(model, settings, variant.order.clone())
+    }
+}
+
+impl Trained {
+    /// The end of a run that did not diverge.
+    pub(super) fn of(run: &Training) -> Self {
+        let last = run.history().last().expect("a run records its end");
+        Self {
+            error: last.error,
+            residual_norm: last.residual_norm,
+            parameters: last.parameters.clone(),
+            diverged: false,
         }
-        let firsts = (0..segments.len()).step_by(size.get());
-        firsts
-            .map(|first| {
-                let chosen = first..segments.len().min(first + size.get());
-                let share = chosen.len() as f64 / segments.len() as f64;
-                self.step(&self.columns(segments, &orders, chosen), share)
-            })
-            .collect()
-    }
-
-    /// One step of the optimiser on one batch, which is so large a `share` of all segments.
-    fn step(&mut self, batch: &Columns, share: f64) -> Step {
-        let rows = batch.size / self.stack.models();
-        let prepared = self.stack.prepare(rows);
-        let [error, norm] = self
-            .objective
-            .of_each(self.stack.models(), &prepared, batch);
-        let before = error.clone().inner();
-        let [of_error, of_norm] = self.weights.clone();
-        let losses = error * of_error + norm * of_norm;
-        self.alive = (self.alive.clone()).bool_and(losses.clone().inner().is_finite());
-        // Backwards from every loss at once, as from their sum.
-        let stepped = (self.optimizer).step(self.stack.tensors(), losses.backward());
-        self.stack = self.stack.stepped(stepped, &self.alive);
-        Step {
-            share,
-            error: before,
-        }
-    }
-
-    /// Carry the weights of the penalty on after an epoch's steps, as a run alone does.
-    fn reweigh(&mut self, steps: Vec<Step>) {
-        // It would wait for the device, for nothing.
-        if let Penalty::Fixed { .. } = self.settings.penalty {
-            return;
-        }
-        let mut means = vec![0.0; self.penalty_weights.len()];
-        for Step { share, error } in steps {
-            for (mean, error) in means.iter_mut().zip(error.into_data().iter::<f64>()) {
-                *mean += share * error;
-            }
-        }
-        for (weight, error) in self.penalty_weights.iter_mut().zip(means) {
-            *weight = self.settings.penalty.next(*weight, error);
-        }
-        self.weights = self.weights_on_device();
-    }
-
-    fn weights_on_device(&self) -> [Tensor<1>; 2] {
-        let has_residual = self.stack.frame().has_residual;
-        let weigh = |weight: &f64| self.settings.penalty.weights(*weight, has_residual);
-        [0, 1].map(|part| {
-            let weights: Vec<f64> = self
-                .penalty_weights
-                .iter()
-                .map(|w| weigh(w)[part])
-                .collect();
-            let data = TensorData::new(to_f32(&weights), [weights.len()]);
-            Tensor::from_data(data, &self.stack.device())
-        })
-    }
-
-    fn judge(&self, whole: &Columns) -> Vec<Trained> {
-        let models = self.stack.models();
-        let prepared = self.stack.prepare(whole.size / models);
-        let parts = self.objective.of_each(models, &prepared, whole);
-        let [error, norm] = parts.map(|part| part.into_data().iter::<f64>().collect::<Vec<_>>());
-        let found = error.into_iter().zip(norm).zip(self.stack.parameters());
-        found
-            .zip(self.diverged())
-            .map(|(((error, residual_norm), parameters), diverged)| Trained {
-                diverged: diverged || !(error + residual_norm).is_finite(),
-                error,
-                residual_norm,
-                parameters,
-            })
-            .collect()
-    }
-
-    fn diverged(&self) -> Vec<bool> {
-        self.alive
-            .clone()
-            .bool_not()
-            .into_data()
-            .iter::<bool>()
-            .collect()
-    }
-
-    /// For each model all segments as they come.
-    fn in_order(&self, segments: &Segments) -> Vec<Vec<usize>> {
-        vec![(0..segments.len()).collect(); self.stack.models()]
-    }
-
-    /// The `chosen` of each model's order, one model's after the other's.
-    fn columns(&self, segments: &Segments, orders: &[Vec<usize>], chosen: Range<usize>) -> Columns {
-        let rows = orders.iter().flat_map(|order| &order[chosen.clone()]);
-        segments.columns(&rows.copied().collect::<Vec<_>>(), &self.stack.device())
     }
 }

@@ -60,10 +60,7 @@ impl Experiment {
     }
 
     pub(super) fn wrong(&self, message: String) -> ExperimentError {
-        ExperimentError::File {
-            path: self.path.clone(),
-            message,
-        }
+        ExperimentError::file(&self.path, message)
     }
 
     fn check(&self) -> Result<(), String> {

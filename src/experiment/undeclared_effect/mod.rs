@@ -5,12 +5,12 @@
 //! the declared model and a network, and with the plant's own equations.
 
 mod file;
-mod lab;
-mod outcome;
+mod results;
 mod runs;
+mod session;
 mod trial;
 
 pub use file::{Case, Experiment};
-pub use lab::Lab;
-pub use outcome::{Compared, Outcome, OutcomeOfCase, TARGET, WonBack};
-pub use trial::{Closed, Contestant, Named, Score, Trial};
+pub use results::{CaseResults, Compared, Recovered, Results, TARGET};
+pub use session::Session;
+pub use trial::{Closed, ModelScore, NamedEffect, PlanningModel, Trial};

@@ -1,7 +1,8 @@
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Lab, Trial};
+use super::{Results, Session, Trial};
 use crate::experiment::ExperimentError;
 use crate::runs::{Identity, RunFolder};
 
@@ -12,9 +13,36 @@ struct Kept {
     trial: Trial,
 }
 
-impl Lab {
+impl Session {
+    /// Carries out the trials that are not in the folder yet. `observer` is called after each trial.
+    ///
+    /// # Errors
+    /// A trial that cannot be carried out, or a folder that cannot be written or holds another run.
+    pub fn run(
+        &self,
+        folder: &RunFolder,
+        observer: &(impl Fn(&Trial) + Sync),
+    ) -> Result<Results, ExperimentError> {
+        folder.claim(&self.identity())?;
+        let runs = folder.within("runs");
+        let cases = 0..self.experiment.cases.len();
+        let trials: Vec<(usize, u64)> = cases
+            .flat_map(|case| (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k)))
+            .collect();
+        let trial = |&(case, seed): &(usize, u64)| {
+            let trial = self.trial_in(&runs, case, seed)?;
+            observer(&trial);
+            Ok(trial)
+        };
+        let trials: Vec<Trial> = trials
+            .par_iter()
+            .map(trial)
+            .collect::<Result<_, ExperimentError>>()?;
+        Ok(Results::new(&self.experiment, &trials))
+    }
+
     /// The settings that all trials share. Cases and seeds are not among them, so that more can be added later.
-    pub(super) fn identity(&self) -> Identity {
+    fn identity(&self) -> Identity {
         let experiment = &self.experiment;
         self.identity_of(json!({
             "declaration": self.declared.declaration,
@@ -36,7 +64,7 @@ impl Lab {
     }
 
     /// The trial saved in `folder`; a new one is carried out and saved there.
-    pub(super) fn trial_in(
+    fn trial_in(
         &self,
         folder: &RunFolder,
         case: usize,

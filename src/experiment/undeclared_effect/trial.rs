@@ -1,14 +1,14 @@
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::Lab;
+use super::Session;
 use crate::closeloop::{
     Finding, Outcome, Request, Settings, Split, StudyError, Verdict, close_loop,
 };
 use crate::control::Predictor;
 use crate::data::{Joint, Log};
 use crate::experiment::ExperimentError;
-use crate::mbrl::{Experience, Judge, Judged, Learner, Prior, RunError};
+use crate::mbrl::{EpisodeScore, Evaluator, Learner, Prior, RunError, transitions};
 use crate::model::Dynamics;
 use crate::runs::{Purpose, stream};
 
@@ -17,25 +17,25 @@ use crate::runs::{Purpose, stream};
 pub struct Trial {
     pub case: String,
     pub seed: u64,
-    pub scores: Vec<Score>,
+    pub scores: Vec<ModelScore>,
     /// The results of closing the loop, one per number of episodes.
     pub closed: Vec<Closed>,
 }
 
 /// The result of an episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Score {
-    pub model: Contestant,
+pub struct ModelScore {
+    pub model: PlanningModel,
     /// Number of episodes that the model was fitted to.
     pub episodes: usize,
     #[serde(flatten)]
-    pub judged: Judged,
+    pub episode: EpisodeScore,
 }
 
 /// A kind of model to plan with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Contestant {
+pub enum PlanningModel {
     /// The model file as it is.
     Declared,
     /// With the parameters and effects from closing the loop.
@@ -51,20 +51,20 @@ pub enum Contestant {
 pub struct Closed {
     pub episodes: usize,
     pub verdict: Verdict,
-    pub effects: Vec<Named>,
+    pub effects: Vec<NamedEffect>,
     /// Declared parameters and their fitted values.
     pub parameters: Vec<(String, f64)>,
 }
 
 /// An effect in the result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Named {
+pub struct NamedEffect {
     pub name: String,
     pub joint: Joint,
     pub parameters: Vec<(String, f64)>,
 }
 
-impl Contestant {
+impl PlanningModel {
     /// The name in results.
     pub fn name(self) -> &'static str {
         match self {
@@ -79,7 +79,7 @@ impl Contestant {
 impl Closed {
     fn new(episodes: usize, outcome: &Outcome) -> Self {
         let parameter = |p: &crate::model::Parameter| (p.name.clone(), p.value);
-        let named = |finding: &Finding| Named {
+        let named = |finding: &Finding| NamedEffect {
             name: finding.effect.title(),
             joint: finding.effect.joint,
             parameters: finding.parameters.iter().map(parameter).collect(),
@@ -95,7 +95,7 @@ impl Closed {
     }
 }
 
-impl Lab {
+impl Session {
     /// Drives the plant of a case with every model. The first episode of data is gathered with the declared model, the
     /// next ones with the model closed on the first.
     ///
@@ -109,24 +109,25 @@ impl Lab {
             source,
         };
         let learner = self.learner();
-        let judge = self.judge(case, seed);
-        let score = |model, episodes, predictor: &Predictor| -> Result<Score, ExperimentError> {
-            let judged = judge.judge(predictor, self.task.replan).map_err(failed)?;
-            Ok(Score {
-                model,
-                episodes,
-                judged,
-            })
-        };
-        let declared = self.predictor(self.declared());
+        let evaluator = self.evaluator(case, seed);
+        let score =
+            |model, episodes, predictor: &Predictor| -> Result<ModelScore, ExperimentError> {
+                let episode = evaluator.score(predictor, self.task.replan);
+                Ok(ModelScore {
+                    model,
+                    episodes,
+                    episode: episode.map_err(failed)?,
+                })
+            };
+        let declared = self.predictor(self.declared.dynamics());
         let truth = self.predictor(self.plants[case].dynamics());
-        let mut scores = vec![score(Contestant::Declared, 0, &declared)?];
+        let mut scores = vec![score(PlanningModel::Declared, 0, &declared)?];
         let mut closed = Vec::new();
         let mut logs = Vec::new();
         let mut best = declared;
         for &episodes in &self.experiment.episodes {
             while logs.len() < episodes {
-                logs.push(self.gather(judge, &best, logs.len()).map_err(failed)?);
+                logs.push(self.gather(evaluator, &best, logs.len()).map_err(failed)?);
             }
             let outcome = self
                 .close(&logs, seed)
@@ -136,22 +137,18 @@ impl Lab {
                     source,
                 })?;
             closed.push(Closed::new(episodes, &outcome));
-            best = self.predictor(fitted(&outcome));
-            scores.push(score(Contestant::Closed, episodes, &best)?);
+            best = self.predictor(outcome.models.after.model.dynamics());
+            scores.push(score(PlanningModel::Closed, episodes, &best)?);
             let hybrid = self.hybrid(&learner, &logs, seed).map_err(failed)?;
-            scores.push(score(Contestant::Hybrid, episodes, &hybrid)?);
+            scores.push(score(PlanningModel::Hybrid, episodes, &hybrid)?);
         }
-        scores.push(score(Contestant::True, 0, &truth)?);
+        scores.push(score(PlanningModel::True, 0, &truth)?);
         Ok(Trial {
             case: name(),
             seed,
             scores,
             closed,
         })
-    }
-
-    fn declared(&self) -> Dynamics {
-        self.declared.dynamics()
     }
 
     fn predictor(&self, dynamics: Dynamics) -> Predictor {
@@ -162,15 +159,15 @@ impl Lab {
         Learner {
             system: self.declared.name.clone(),
             joints: self.declared.joints,
-            prior: Prior::Equations(Box::new(self.declared())),
+            prior: Prior::Equations(Box::new(self.declared.dynamics())),
             network: self.experiment.network.clone(),
             fit: self.experiment.fit.clone(),
             backend: self.backend,
         }
     }
 
-    fn judge(&self, case: usize, seed: u64) -> Judge<'_> {
-        Judge {
+    fn evaluator(&self, case: usize, seed: u64) -> Evaluator<'_> {
+        Evaluator {
             task: &self.task,
             plant: &self.plants[case],
             seed,
@@ -178,9 +175,14 @@ impl Lab {
     }
 
     /// The log of an episode with an initial state and random numbers of its own.
-    fn gather(&self, judge: Judge<'_>, model: &Predictor, number: usize) -> Result<Log, RunError> {
-        let seed = stream(judge.seed, Purpose::Gather(number)).next_u64();
-        let (episode, _) = Judge { seed, ..judge }.episode(model, self.task.replan)?;
+    fn gather(
+        &self,
+        evaluator: Evaluator<'_>,
+        model: &Predictor,
+        number: usize,
+    ) -> Result<Log, RunError> {
+        let seed = stream(evaluator.seed, Purpose::Gather(number)).next_u64();
+        let (episode, _) = Evaluator { seed, ..evaluator }.episode(model, self.task.replan)?;
         let mut log = episode.stretch.log;
         log.path = format!("episode{}.csv", number + 1).into();
         Ok(log)
@@ -194,17 +196,9 @@ impl Lab {
     }
 
     fn hybrid(&self, learner: &Learner, logs: &[Log], seed: u64) -> Result<Predictor, RunError> {
-        let experience = Experience {
-            logs: logs.to_vec(),
-        };
-        let segments = experience.segments(learner.joints)?;
+        let segments = transitions(logs, learner.joints)?;
         let training = learner.learn(&segments, None, seed, logs.len())?;
         let model = training.result()?;
         Ok(model.predictor(learner.fit.integrator))
     }
-}
-
-/// The model that closing the loop gives.
-fn fitted(outcome: &Outcome) -> Dynamics {
-    outcome.models.after.model.dynamics()
 }

@@ -9,7 +9,7 @@ use crate::plan::noise::Noise;
 use crate::sim::batch::{Rows, W};
 
 #[test]
-fn normal_numbers_are_normal() {
+fn random_numbers_follow_the_standard_normal_distribution() {
     let (mut rng, mut rows) = (rng(7), vec![Rows::splat(0.0); 3]);
     let mut gaussian = Gaussian::new(rows.len());
     let mut all = Vec::new();

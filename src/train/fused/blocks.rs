@@ -1,8 +1,8 @@
 use crate::lanes::Row;
 use crate::sim::batch::{Rows, W};
 
-/// Segments with [`W`] of them side by side. The last ones are repeated until the last block is full, and do not
-/// count there.
+/// Segments in blocks of [`W`], one in each lane. The last segment is repeated to fill the last block, where the
+/// copies do not count.
 #[derive(Debug)]
 pub struct Blocks {
     pub(super) joints: usize,
@@ -14,15 +14,15 @@ pub struct Blocks {
     last: Rows,
 }
 
-/// What is given of one step.
-pub(super) struct Given<'a> {
+/// The data of one step.
+pub(super) struct StepData<'a> {
     /// `2n`, at its start.
     pub state: &'a [Rows],
     /// `n`, held.
     pub input: &'a [Rows],
     /// s
     pub dt: &'a Rows,
-    /// When it begins, s.
+    /// When the step begins, s.
     pub time: &'a Rows,
     /// `2n`, at its end.
     pub next: &'a [Rows],
@@ -73,12 +73,12 @@ impl Blocks {
         }
     }
 
-    /// What is given of step `k`.
+    /// The data of step `k`.
     #[inline(always)]
-    pub(super) fn given(&self, block: usize, k: usize) -> Given<'_> {
-        let (n, stride, step) = (self.joints, self.stride(), self.step());
+    pub(super) fn step(&self, block: usize, k: usize) -> StepData<'_> {
+        let (n, stride, step) = (self.joints, self.stride(), self.step_rows());
         let rows = &self.rows[block * stride + k * step..][..step + 2 * n];
-        Given {
+        StepData {
             state: &rows[..2 * n],
             input: &rows[2 * n..3 * n],
             dt: &rows[3 * n],
@@ -87,13 +87,13 @@ impl Blocks {
         }
     }
 
-    /// Values of a step.
-    fn step(&self) -> usize {
+    /// Rows of a step.
+    fn step_rows(&self) -> usize {
         3 * self.joints + 2
     }
 
-    /// Values of a block.
+    /// Rows of a block.
     fn stride(&self) -> usize {
-        self.steps * self.step() + 2 * self.joints
+        self.steps * self.step_rows() + 2 * self.joints
     }
 }

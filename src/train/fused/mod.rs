@@ -1,15 +1,18 @@
 //! The loss and its derivative in one operation: rollout, networks and penalty together, many rows at a time, on all
-//! cores. The composed operations of [`composed`](super::composed) are its reference, and what other devices use.
+//! cores. The composed operations of [`composed`](super::composed) are its reference, and used on other devices.
 
 mod blocks;
-mod operation;
+mod evaluation;
+mod forward;
 mod part;
-mod plan;
+mod problem;
+mod programs;
 mod record;
-mod tapes;
-mod work;
-mod worker;
+mod reverse;
+mod rollout;
+mod rows;
+mod workspace;
 
 pub use blocks::Blocks;
-pub(super) use operation::loss;
-pub(super) use work::Workers;
+pub(super) use evaluation::{Evaluation, Workers};
+pub(super) use problem::Problem;

@@ -2,170 +2,175 @@ use std::ops::Range;
 
 use pulp::{Simd, WithSimd};
 
-use super::plan::{CHUNK, Numbers, Plan};
+use super::problem::{CHUNK, Problem, Weights};
+use super::programs::Programs;
 use super::record::Layout;
-use super::tapes::Tapes;
-use super::worker::{Desk, Worker, total};
+use super::rollout::Rollout;
+use super::rows::total;
+use super::workspace::Workspace;
 use crate::lanes::{Element, Vector};
 use crate::sim::batch::Rows;
-use crate::train::Frame;
+use crate::train::Structure;
 
-/// One thread's share of a loss, with memory that serves again for the next.
+/// One thread's share of a loss, with buffers that are used again for the next loss.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// The blocks that it works on.
     blocks: Range<usize>,
-    /// Of all chunks, or of one at a time.
+    /// The records of all chunks or, where these are not kept, of one at a time.
     records: Vec<Rows>,
-    tapes: Tapes,
-    desk: Desk,
+    programs: Programs,
+    workspace: Workspace,
     /// Sums of the squared errors and of the squared residuals.
     pub sums: [f64; 2],
-    /// Derivatives by the numbers of each network.
+    /// Derivatives by the weights of each network.
     pub by_networks: Vec<Vec<f32>>,
     /// Derivatives by the free parameters, in their units.
     pub by_parameters: Vec<f64>,
 }
 
-/// The loss on the blocks of a part.
-pub(super) struct Forward<'a> {
-    pub plan: &'a Plan,
-    pub numbers: &'a Numbers,
-    pub part: &'a mut Part,
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Pass {
+    /// The sums that the loss is made of.
+    Forward,
+    /// The derivatives by all learnable numbers, from those by the two sums.
+    Reverse([f32; 2]),
 }
 
-/// Its derivative, after it.
-pub(super) struct Backward<'a> {
-    pub plan: &'a Plan,
-    pub numbers: &'a Numbers,
+/// A pass over the blocks of a part.
+pub(super) struct PassOver<'a> {
+    pub pass: Pass,
     pub part: &'a mut Part,
-    /// Derivatives by the sums that the loss made.
-    pub seeds: [f32; 2],
+    pub problem: &'a Problem,
+    pub weights: &'a Weights,
+}
+
+impl WithSimd for PassOver<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self {
+            pass,
+            part,
+            problem,
+            weights,
+        } = self;
+        match pass {
+            Pass::Forward => part.forward(simd, problem, weights),
+            Pass::Reverse(seeds) => part.reverse(simd, problem, weights, seeds),
+        }
+    }
 }
 
 impl Part {
-    pub(super) fn new(frame: &Frame) -> Self {
+    pub(super) fn new(structure: &Structure) -> Self {
         Self {
             blocks: 0..0,
             records: Vec::new(),
-            tapes: Tapes::new(frame),
-            desk: Desk::default(),
+            programs: Programs::new(structure),
+            workspace: Workspace::default(),
             sums: [0.0; 2],
             by_networks: Vec::new(),
             by_parameters: Vec::new(),
         }
     }
 
-    /// Make ready for the loss on these blocks.
-    pub(super) fn begin(&mut self, blocks: Range<usize>, plan: &Plan, numbers: &Numbers) {
-        let kept = match plan.keeps(&numbers.networks) {
+    /// Prepares for the loss on these blocks.
+    pub(super) fn begin(&mut self, blocks: Range<usize>, problem: &Problem, weights: &Weights) {
+        let kept = match problem.keeps_records(&weights.networks) {
             true => blocks.len(),
             false => blocks.len().min(CHUNK),
         };
-        let rows = kept * plan.recorded(&numbers.networks);
+        let rows = kept * problem.recorded(&weights.networks);
         self.records.resize(rows, Rows::splat(0.0));
-        self.desk.begin(&plan.frame, &numbers.networks);
-        self.tapes.set_parameters(&numbers.parameters);
+        self.workspace.begin(&problem.structure, &weights.networks);
+        self.programs.set_parameters(&weights.parameters);
         self.blocks = blocks;
     }
 
-    /// From sums lane by lane to numbers.
+    #[inline(always)]
+    fn forward<S: Simd>(&mut self, simd: S, problem: &Problem, weights: &Weights) {
+        self.sums = [0.0; 2];
+        for (chunk, record) in chunks(&self.blocks, problem, weights) {
+            let rollout = rollout(simd, problem, weights, chunk);
+            let scratch = &mut self.workspace.scratch;
+            let record = &mut self.records[record];
+            let sums = rollout.forward(&mut self.programs, scratch, record);
+            for (sum, more) in self.sums.iter_mut().zip(sums) {
+                *sum += more;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn reverse<S: Simd>(&mut self, simd: S, problem: &Problem, weights: &Weights, seeds: [f32; 2]) {
+        let Self {
+            programs,
+            workspace,
+            ..
+        } = self;
+        workspace.clear_sums::<S>(&problem.structure, &weights.networks);
+        let is_recorded = problem.keeps_records(&weights.networks);
+        for (chunk, record) in chunks(&self.blocks, problem, weights) {
+            let rollout = rollout(simd, problem, weights, chunk);
+            let record = &mut self.records[record];
+            if !is_recorded {
+                rollout.forward(programs, &mut workspace.scratch, record);
+            }
+            rollout.reverse(programs, workspace, record, seeds);
+        }
+        self.add_up(simd);
+    }
+
+    /// Adds up the lanes of the derivatives.
     #[inline(always)]
     fn add_up<S: Simd>(&mut self, simd: S) {
-        let desk = &self.desk;
-        self.by_networks.resize(desk.network_sums.len(), Vec::new());
-        for (to, sums) in self.by_networks.iter_mut().zip(&desk.network_sums) {
+        let workspace = &self.workspace;
+        self.by_networks
+            .resize(workspace.network_sums.len(), Vec::new());
+        for (to, sums) in self.by_networks.iter_mut().zip(&workspace.network_sums) {
             let sums = f32::registers::<S>(sums);
             to.resize(sums.len(), 0.0);
             for (to, sum) in to.iter_mut().zip(sums) {
                 *to = Vector::<S, f32>::new(simd, *sum).sum();
             }
         }
-        self.by_parameters.resize(desk.parameter_sums.len(), 0.0);
-        for (to, sum) in self.by_parameters.iter_mut().zip(&desk.parameter_sums) {
+        self.by_parameters
+            .resize(workspace.parameter_sums.len(), 0.0);
+        for (to, sum) in self.by_parameters.iter_mut().zip(&workspace.parameter_sums) {
             *to = total(simd, sum);
         }
     }
 }
 
-/// The chunks of some blocks, each with the number of its first block in the records.
+/// The chunks of some blocks, each with the range of its record.
 fn chunks(
     blocks: &Range<usize>,
-    keeps: bool,
-) -> impl Iterator<Item = (Range<usize>, usize)> + use<> {
+    problem: &Problem,
+    weights: &Weights,
+) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + use<> {
     let (first, last) = (blocks.start, blocks.end);
+    let keeps = problem.keeps_records(&weights.networks);
+    let rows = problem.recorded(&weights.networks);
     (first..last).step_by(CHUNK).map(move |start| {
-        let recorded = if keeps { start - first } else { 0 };
-        (start..last.min(start + CHUNK), recorded)
+        let chunk = start..last.min(start + CHUNK);
+        let before = if keeps { start - first } else { 0 };
+        let record = before * rows..(before + chunk.len()) * rows;
+        (chunk, record)
     })
 }
 
-impl WithSimd for Forward<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            plan,
-            numbers,
-            part,
-        } = self;
-        part.sums = [0.0; 2];
-        let (keeps, rows) = (
-            plan.keeps(&numbers.networks),
-            plan.recorded(&numbers.networks),
-        );
-        for (chunk, first) in chunks(&part.blocks, keeps) {
-            let record = &mut part.records[first * rows..][..chunk.len() * rows];
-            let worker = worker(simd, plan, numbers, chunk);
-            let sums = worker.forward(&mut part.tapes, &mut part.desk.scratch, record);
-            for (sum, more) in part.sums.iter_mut().zip(sums) {
-                *sum += more;
-            }
-        }
-    }
-}
-
-impl WithSimd for Backward<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let Self {
-            plan,
-            numbers,
-            part,
-            seeds,
-        } = self;
-        part.desk.clear_sums::<S>(&plan.frame, &numbers.networks);
-        let (keeps, rows) = (
-            plan.keeps(&numbers.networks),
-            plan.recorded(&numbers.networks),
-        );
-        for (chunk, first) in chunks(&part.blocks, keeps) {
-            let record = &mut part.records[first * rows..][..chunk.len() * rows];
-            let worker = worker(simd, plan, numbers, chunk);
-            if !keeps {
-                worker.forward(&mut part.tapes, &mut part.desk.scratch, record);
-            }
-            worker.backward(&mut part.tapes, &mut part.desk, record, seeds);
-        }
-        part.add_up(simd);
-    }
-}
-
-fn worker<'a, S: Simd>(
+fn rollout<'a, S: Simd>(
     simd: S,
-    plan: &'a Plan,
-    numbers: &'a Numbers,
+    problem: &'a Problem,
+    weights: &'a Weights,
     chunk: Range<usize>,
-) -> Worker<'a, S> {
-    let (joints, blocks) = (plan.frame.joints, chunk.len());
-    Worker {
+) -> Rollout<'a, S> {
+    Rollout {
         simd,
-        plan,
-        numbers,
+        layout: Layout::new(problem, &weights.networks, chunk.len()),
+        problem,
+        weights,
         chunk,
-        layout: Layout::new(joints, &numbers.networks, plan.stages(), blocks),
     }
 }

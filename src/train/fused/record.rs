@@ -1,23 +1,24 @@
+use super::problem::Problem;
 use crate::sim::batch::{Network, Rows};
 
-/// What the way back through a rollout needs of the way there, for the blocks of a chunk: the stages one after the
-/// other, then the state at the end of each step.
+/// The layout of what the reverse sweep needs from the forward sweep, for the blocks of a chunk: the stages one after
+/// the other, then the state at the end of each step.
 pub(super) struct Layout {
     blocks: usize,
     states: usize,
-    /// Values of one stage and block.
+    /// Rows of one stage and block.
     stage: usize,
     stages: usize,
 }
 
 /// One stage, each part `[block][value]`.
-pub(super) struct Stage<'a> {
+pub(super) struct StageRecord<'a> {
     pub states: &'a mut [Rows],
-    /// What each network saw, and what its layers made of it.
+    /// Of each network, in the order of the structure's.
     pub networks: [Activations<'a>; 2],
 }
 
-/// A network at work.
+/// The features of a network and the outputs of its layers.
 #[derive(Default)]
 pub(super) struct Activations<'a> {
     pub features: &'a mut [Rows],
@@ -25,14 +26,13 @@ pub(super) struct Activations<'a> {
 }
 
 impl Layout {
-    pub(super) fn new(joints: usize, networks: &[Network], stages: usize, blocks: usize) -> Self {
-        let networks = networks.iter();
-        let of_networks: usize = networks.map(|n| n.features() + n.activations()).sum();
+    /// Of a chunk of `blocks` blocks.
+    pub(super) fn new(problem: &Problem, networks: &[Network], blocks: usize) -> Self {
         Self {
             blocks,
-            states: 2 * joints,
-            stage: 2 * joints + of_networks,
-            stages,
+            states: 2 * problem.structure.joints,
+            stage: problem.recorded_by_stage(networks),
+            stages: problem.stages(),
         }
     }
 
@@ -41,7 +41,7 @@ impl Layout {
         record: &'a mut [Rows],
         stage: usize,
         networks: &[Network],
-    ) -> Stage<'a> {
+    ) -> StageRecord<'a> {
         let rows = self.blocks * self.stage;
         let (states, mut rest) =
             record[stage * rows..][..rows].split_at_mut(self.blocks * self.states);
@@ -52,7 +52,7 @@ impl Layout {
             *part = Activations { features, values };
             rest = after;
         }
-        Stage {
+        StageRecord {
             states,
             networks: parts,
         }

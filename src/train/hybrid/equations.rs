@@ -1,17 +1,18 @@
-//! The physical parameters of declared equations as one tensor, each divided by its scale: an optimiser's step is then
+//! The physical parameters of declared equations as learnable numbers, each divided by its scale: an optimiser's step is then
 //! relative to each parameter's own magnitude. The entries of fixed parameters are never read.
 
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 
 use super::HybridError;
-use super::mlp::to_f64;
-use crate::model::{Dynamics, Parameter, to_f32};
+use super::tensor::vector;
+use crate::model::{Dynamics, Parameter};
 
-/// value / scale of every parameter, `[parameters]`.
+/// value / scale of every parameter.
 ///
 /// # Errors
 /// A parameter that is not finite, outside of its bounds, or without a scale.
-pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, HybridError> {
+#[allow(clippy::cast_possible_truncation)] // training runs in f32
+pub(super) fn scaled(dynamics: &Dynamics) -> Result<Vec<f32>, HybridError> {
     for p in &dynamics.parameters {
         let scaled = p.scale.is_finite() && p.scale > 0.0;
         let inside = p.bounds[0] <= p.value && p.value <= p.bounds[1];
@@ -24,20 +25,21 @@ pub(super) fn scaled(dynamics: &Dynamics, device: &Device) -> Result<Tensor<1>, 
             });
         }
     }
-    Ok(tensor(&dynamics.parameters, |p| p.value / p.scale, device))
+    let parameters = dynamics.parameters.iter();
+    Ok(parameters.map(|p| (p.value / p.scale) as f32).collect())
 }
 
 /// The equations with these values; fixed ones as declared, to the last bit.
-pub(super) fn current(declared: &Dynamics, scaled: Tensor<1>) -> Dynamics {
-    let scaled = to_f64(scaled);
+pub(super) fn current(declared: &Dynamics, scaled: &[f32]) -> Dynamics {
+    let scaled: Vec<f64> = scaled.iter().copied().map(f64::from).collect();
     let values = values(&declared.parameters, &scaled);
     declared.clone().with_values(values)
 }
 
 /// The value of every parameter in its unit; of fixed ones as declared, to the last bit.
 pub(super) fn values(declared: &[Parameter], scaled: &[f64]) -> impl Iterator<Item = f64> {
-    let each = declared.iter().zip(scaled);
-    each.map(|(p, scaled)| if p.fixed { p.value } else { scaled * p.scale })
+    let pairs = declared.iter().zip(scaled);
+    pairs.map(|(p, scaled)| if p.fixed { p.value } else { scaled * p.scale })
 }
 
 /// Every parameter in its unit, from value / scale `[models, parameters]`: a tensor of shape `[models * rows]`, each
@@ -47,11 +49,11 @@ pub(super) fn columns(parameters: &[Parameter], scaled: Tensor<2>, rows: usize) 
         return Vec::new();
     }
     let (device, models) = (scaled.device(), scaled.dims()[0]);
-    let values = scaled * tensor(parameters, |p| p.scale, &device).unsqueeze();
+    let values = scaled * each(parameters, |p| p.scale, &device).unsqueeze();
     (parameters.iter().enumerate())
         .map(|(k, parameter)| {
             if parameter.fixed {
-                tensor(std::slice::from_ref(parameter), |p| p.value, &device)
+                each(std::slice::from_ref(parameter), |p| p.value, &device)
             } else {
                 let column = values.clone().narrow(1, k, 1);
                 column.expand([models, rows]).reshape([models * rows])
@@ -60,31 +62,15 @@ pub(super) fn columns(parameters: &[Parameter], scaled: Tensor<2>, rows: usize) 
         .collect()
 }
 
-/// The values brought back within their bounds; none where they are there already.
+/// Brings values / scale back within their bounds. What is not a number stays so.
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
-pub(super) fn projected(parameters: &[Parameter], scaled: &Tensor<1>) -> Option<Tensor<1>> {
-    let bounded = |p: &Parameter| p.bounds.iter().any(|bound| bound.is_finite());
-    if !parameters.iter().any(bounded) {
-        return None;
-    }
-    let mut values: Vec<f32> = scaled.to_data().iter().collect();
-    let mut moved = false;
-    for (value, p) in values.iter_mut().zip(parameters) {
+pub(super) fn project(parameters: &[Parameter], scaled: &mut [f32]) {
+    for (value, p) in scaled.iter_mut().zip(parameters) {
         let [lowest, highest] = p.bounds.map(|bound| (bound / p.scale) as f32);
-        let inside = value.clamp(lowest, highest);
-        moved |= inside != *value;
-        *value = inside;
+        *value = value.clamp(lowest, highest);
     }
-    let shape = [values.len()];
-    moved.then(|| Tensor::from_data(TensorData::new(values, shape), &scaled.device()))
 }
 
-fn tensor(
-    parameters: &[Parameter],
-    value: impl Fn(&Parameter) -> f64,
-    device: &Device,
-) -> Tensor<1> {
-    let values: Vec<f64> = parameters.iter().map(value).collect();
-    let shape = [values.len()];
-    Tensor::from_data(TensorData::new(to_f32(&values), shape), device)
+fn each(parameters: &[Parameter], value: impl Fn(&Parameter) -> f64, device: &Device) -> Tensor<1> {
+    vector(&parameters.iter().map(value).collect::<Vec<_>>(), device)
 }

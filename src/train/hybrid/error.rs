@@ -1,6 +1,6 @@
 use crate::model::NetworkError;
 
-/// Why a model cannot be put together.
+/// Why a model cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum HybridError {
     #[error(transparent)]

@@ -1,9 +1,10 @@
-use burn::tensor::{Device, Tensor, TensorData, activation::relu};
+use burn::tensor::{Tensor, activation::relu};
 
-use crate::model::{Angles, MlpWeights, ResidualOn, to_f32};
+use super::tensor::tensor;
+use crate::model::{Angles, MlpWeights, ResidualOn};
 
-/// Multilayer perceptrons of one shape with ReLU on every layer but the last, unpacked for Burn's operations. Each sees
-/// rows of its own, one network's after the other's.
+/// Multilayer perceptrons of one shape with ReLU on every layer but the last, unpacked for Burn's operations. Each
+/// evaluates its own rows, one network's after the other's.
 #[derive(Debug)]
 pub(super) struct Mlp<'m> {
     made: &'m MlpWeights,
@@ -16,11 +17,11 @@ pub(super) struct Mlp<'m> {
 }
 
 impl<'m> Mlp<'m> {
-    /// The networks that were made as `made` and have the numbers `[network, number]` now, in the order of
+    /// The networks of the shape of `made` with the weights and biases `[network, number]`, in the order of
     /// [`MlpWeights::flat`].
     pub(super) fn new(made: &'m MlpWeights, numbers: &Tensor<2>) -> Self {
         let networks = numbers.dims()[0];
-        let row = |values: &[f64]| vector(values, &numbers.device()).reshape([1, values.len()]);
+        let row = |values: &[f64]| tensor(values, [1, values.len()], &numbers.device());
         let factor: Vec<f64> = made.scaling.std.iter().map(|std| 1.0 / std).collect();
         let mut first = 0;
         let mut next = |rows: usize, columns: usize| {
@@ -73,18 +74,4 @@ impl<'m> Mlp<'m> {
         let outputs = values.dims()[2];
         values.reshape([batch, outputs])
     }
-}
-
-/// The weights and biases of a network as one tensor.
-pub(super) fn flat(weights: &MlpWeights, device: &Device) -> Tensor<1> {
-    vector(&weights.flat(), device)
-}
-
-fn vector(values: &[f64], device: &Device) -> Tensor<1> {
-    Tensor::from_data(TensorData::new(to_f32(values), [values.len()]), device)
-}
-
-/// The entries of a tensor, row after row.
-pub(super) fn to_f64<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
-    tensor.into_data().iter::<f32>().map(f64::from).collect()
 }

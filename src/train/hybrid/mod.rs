@@ -2,20 +2,21 @@
 
 mod equations;
 mod error;
-mod frame;
 mod mlp;
 mod model;
-mod prepared;
 mod replay;
 mod stack;
 mod step;
+mod structure;
+mod tensor;
+mod unpacked;
 
 pub use error::HybridError;
-pub(crate) use frame::Frame;
 pub use model::HybridModel;
-#[cfg(test)]
-pub(super) use model::{PRIOR_ID, RESIDUAL_ID};
-pub use prepared::{Flow, Prepared};
+pub(super) use model::Numbers;
 pub use replay::replay;
 pub(super) use stack::Stack;
-pub use step::Step;
+pub use step::StepResult;
+pub(crate) use structure::Structure;
+pub(super) use tensor::{to_f32, to_f64, vector};
+pub use unpacked::{Derivative, Unpacked};

@@ -1,34 +1,29 @@
 use std::sync::Arc;
 
-use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor};
 
-use super::mlp::{flat, to_f64};
-use super::prepared::{columns, rows_of};
-use super::{Frame, HybridError, Prepared, equations};
+use super::tensor::{rows_of, vector_of_f32};
+use super::{HybridError, Structure, Unpacked, equations};
 use crate::control::Predictor;
 use crate::model::{
-    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
+    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, to_f32, with_residual,
 };
 use crate::sim::Integrator;
 
-// The names by which Burn knows the tensors.
-pub(in crate::train) const PRIOR_ID: u64 = 1;
-pub(in crate::train) const RESIDUAL_ID: u64 = 2;
+/// Learnable numbers of the prior and of the residual.
+pub(in crate::train) type Numbers = [Vec<f32>; 2];
 
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
 /// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
-#[derive(Module, Debug)]
+#[derive(Debug, Clone)]
 pub struct HybridModel {
-    // One tensor for each part: an optimiser's step costs by the tensor.
-    /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`].
-    prior: Param<Tensor<1>>,
-    /// The residual network's numbers.
-    residual: Option<Param<Tensor<1>>>,
-    #[module(skip)]
-    frame: Arc<Frame>,
+    /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`]; and the
+    /// residual network's.
+    numbers: Numbers,
+    structure: Arc<Structure>,
+    device: Device,
 }
 
 impl HybridModel {
@@ -41,9 +36,9 @@ impl HybridModel {
     /// A parameter that is not finite, outside of its bounds, or without a scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
         Ok(Self {
-            prior: learnable(PRIOR_ID, equations::scaled(dynamics, device)?),
-            residual: None,
-            frame: Arc::new(Frame::of_equations(dynamics)),
+            numbers: [equations::scaled(dynamics)?, Vec::new()],
+            structure: Arc::new(Structure::of_equations(dynamics)),
+            device: device.clone(),
         })
     }
 
@@ -61,9 +56,9 @@ impl HybridModel {
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
         Ok(Self {
-            prior: learnable(PRIOR_ID, flat(weights, device)),
-            residual: None,
-            frame: Arc::new(Frame::of_network(system, joints, weights)),
+            numbers: [to_f32(&weights.flat()), Vec::new()],
+            structure: Arc::new(Structure::of_network(system, joints, weights)),
+            device: device.clone(),
         })
     }
 
@@ -73,9 +68,10 @@ impl HybridModel {
     /// A network that is not one for the model's joints.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
+        let [prior, _] = self.numbers;
         Ok(Self {
-            residual: Some(learnable(RESIDUAL_ID, flat(weights, &self.device()))),
-            frame: Arc::new(self.frame.with_residual(weights)),
+            numbers: [prior, to_f32(&weights.flat())],
+            structure: Arc::new(self.structure.with_residual(weights)),
             ..self
         })
     }
@@ -90,16 +86,27 @@ impl HybridModel {
         dynamics: &Dynamics,
         device: &Device,
     ) -> Result<Self, HybridError> {
-        let model = match &weights.prior {
-            Some(prior) => Self::network(&shape.system, shape.joints, prior, device)?,
-            None => {
-                let saved = shape.parameters.iter().zip(&weights.parameters);
-                let trained = Dynamics {
-                    parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
-                    ..dynamics.clone()
-                };
-                Self::physics(&trained, device)?
+        let equations = || {
+            let saved = shape.parameters.iter().zip(&weights.parameters);
+            Dynamics {
+                parameters: saved.map(|(p, value)| p.restore(*value)).collect(),
+                ..dynamics.clone()
             }
+        };
+        Self::assembled(&shape.system, shape.joints, equations, weights, device)
+    }
+
+    /// A model with the networks of `weights`, and with `equations` where its prior is none of these.
+    fn assembled(
+        system: &str,
+        joints: usize,
+        equations: impl FnOnce() -> Dynamics,
+        weights: &ModelWeights,
+        device: &Device,
+    ) -> Result<Self, HybridError> {
+        let model = match &weights.prior {
+            Some(prior) => Self::network(system, joints, prior, device)?,
+            None => Self::physics(&equations(), device)?,
         };
         match &weights.residual {
             Some(residual) => model.with_residual(residual),
@@ -109,12 +116,12 @@ impl HybridModel {
 
     /// Name of the system.
     pub fn system(&self) -> &str {
-        &self.frame.system
+        &self.structure.system
     }
 
     /// Number of joints n.
     pub fn joints(&self) -> usize {
-        self.frame.joints
+        self.structure.joints
     }
 
     /// The physical parameters as declared, with their current values; none where the prior is a network.
@@ -129,27 +136,18 @@ impl HybridModel {
         declared.map(|p| (p.name, p.value)).collect()
     }
 
-    /// Current value of one physical parameter.
-    pub fn parameter(&self, name: &str) -> Option<f64> {
-        let mut parameters = self.parameters().into_iter();
-        parameters.find(|(n, _)| n == name).map(|(_, value)| value)
-    }
-
     /// Every learnable number.
     pub fn weights(&self) -> ModelWeights {
+        let network = |made: Option<&MlpWeights>, numbers: &[f32]| {
+            let numbers: Vec<f64> = numbers.iter().copied().map(f64::from).collect();
+            Some(made?.with_flat(&numbers))
+        };
+        let [prior, residual] = &self.numbers;
         ModelWeights {
             parameters: self.parameters().into_iter().map(|(_, v)| v).collect(),
-            prior: self.network_of(self.frame.prior(), Some(&self.prior)),
-            residual: self.network_of(self.frame.residual(), self.residual.as_ref()),
+            prior: network(self.structure.prior(), prior),
+            residual: network(self.structure.residual(), residual),
         }
-    }
-
-    fn network_of(
-        &self,
-        made: Option<&MlpWeights>,
-        numbers: Option<&Param<Tensor<1>>>,
-    ) -> Option<MlpWeights> {
-        Some(made?.with_flat(&to_f64(numbers?.val())))
     }
 
     /// The same model with other numbers.
@@ -157,27 +155,22 @@ impl HybridModel {
     /// # Errors
     /// When the numbers belong to a model of another shape.
     pub fn with_weights(&self, weights: &ModelWeights) -> Result<Self, HybridError> {
-        let device = self.device();
-        let prior = match (&self.frame.equations, &weights.prior) {
-            (Some(equations), None) if equations.parameters.len() == weights.parameters.len() => {
-                let values = weights.parameters.iter().copied();
-                Self::physics(&equations.clone().with_values(values), &device)?
-            }
-            (None, Some(mlp)) if weights.parameters.is_empty() => {
-                Self::network(self.system(), self.joints(), mlp, &device)?
-            }
-            _ => {
-                return Err(HybridError::Weights {
-                    system: self.system().to_owned(),
-                    expected: self.frame.parameters().len(),
-                    found: weights.parameters.len(),
-                });
-            }
-        };
-        match &weights.residual {
-            Some(mlp) => prior.with_residual(mlp),
-            None => Ok(prior),
+        let (expected, found) = (self.structure.parameters().len(), weights.parameters.len());
+        let declared = self.structure.equations.as_ref();
+        if expected != found || declared.is_some() == weights.prior.is_some() {
+            return Err(HybridError::Weights {
+                system: self.system().to_owned(),
+                expected,
+                found,
+            });
         }
+        let equations = || {
+            let declared = declared.expect("a prior is equations or a network");
+            let values = weights.parameters.iter().copied();
+            declared.clone().with_values(values)
+        };
+        let (system, joints, device) = (self.system(), self.joints(), self.device());
+        Self::assembled(system, joints, equations, weights, &device)
     }
 
     /// The whole model, networks included, as one program with the current numbers: what integrators in
@@ -217,77 +210,55 @@ impl HybridModel {
 
     /// The declared equations with the current values.
     fn equations(&self) -> Option<Dynamics> {
-        let declared = self.frame.equations.as_ref()?;
-        Some(equations::current(declared, self.prior.val()))
+        let declared = self.structure.equations.as_ref()?;
+        Some(equations::current(declared, &self.numbers[0]))
     }
 
-    /// Unpack the parameters, once for all evaluations that one gradient runs through.
-    pub fn prepare(&self) -> Prepared<'_> {
-        let each = |tensor: Option<Tensor<1>>| tensor.and_then(|numbers| rows_of(numbers, 1));
-        Prepared::new(&self.frame, 1, self.tensors().map(each))
+    /// Unpacks the learnable numbers for evaluations without a gradient.
+    pub fn unpack(&self) -> Unpacked<'_> {
+        self.unpack_tensors(&self.tensors())
     }
 
-    /// ds/dt and the part F_r of it that the residual makes, at a batch of points.
-    ///
-    /// `state` is `[batch, 2n]` (positions, velocities), `input` `[batch, n]`, `time` `[batch]` in
-    /// seconds. Returns `[batch, 2n]` and, where the model has a residual, `[batch, n or 2n]`.
-    pub fn derivative(
-        &self,
-        state: Tensor<2>,
-        input: Tensor<2>,
-        time: &Tensor<1>,
-    ) -> (Tensor<2>, Option<Tensor<2>>) {
-        let batch = state.dims()[0];
-        let flow = self.prepare().flow(&columns(state), &columns(input), time);
-        let rates = flow.rates.into_iter().map(|rate| rate.expand([batch]));
-        (Tensor::stack(rates.collect(), 1), flow.residual)
-    }
-
-    /// Bring every physical parameter back within its bounds. Called after each optimiser step
-    /// (projected gradient descent): a parameter may rest on a bound and leave it again.
-    #[must_use]
-    pub fn project(self) -> Self {
-        let prior = self.prior.val().inner();
-        match equations::projected(self.frame.parameters(), &prior) {
-            Some(inside) => Self {
-                prior: learnable(PRIOR_ID, Tensor::from_inner(inside)),
-                ..self
-            },
-            None => self,
-        }
+    /// Unpacks the model's [`HybridModel::tensors`], once for all evaluations that one gradient runs through.
+    pub(in crate::train) fn unpack_tensors(&self, tensors: &[Tensor<1>; 2]) -> Unpacked<'_> {
+        let tensors = tensors.clone().map(|numbers| rows_of(numbers, 1));
+        Unpacked::new(&self.structure, 1, tensors)
     }
 
     /// The device that the model was made on.
     pub fn device(&self) -> Device {
-        self.prior.val().device()
+        self.device.clone()
     }
 
-    /// What the model is without its learnable numbers.
-    pub(crate) fn frame(&self) -> &Arc<Frame> {
-        &self.frame
+    /// The model without its learnable numbers.
+    pub(crate) fn structure(&self) -> &Arc<Structure> {
+        &self.structure
     }
 
-    /// The learnable numbers of the prior and of the residual.
-    pub(in crate::train) fn tensors(&self) -> [Option<Tensor<1>>; 2] {
-        [
-            Some(self.prior.val()),
-            self.residual.as_ref().map(Param::val),
-        ]
-    }
-
-    /// The same model with other learnable numbers where some are given.
-    pub(in crate::train) fn with_tensors(&self, tensors: [Option<Tensor<1>>; 2]) -> Self {
-        let [prior, residual] = tensors;
-        let prior = prior.map(|tensor| learnable(PRIOR_ID, tensor));
-        let residual = residual.map(|tensor| learnable(RESIDUAL_ID, tensor));
+    /// The same model on the device without gradients.
+    #[must_use]
+    pub(in crate::train) fn without_gradients(&self) -> Self {
         Self {
-            prior: prior.unwrap_or_else(|| self.prior.clone()),
-            residual: residual.or_else(|| self.residual.clone()),
-            frame: self.frame.clone(),
+            device: self.device().without_autodiff(),
+            ..self.clone()
         }
     }
-}
 
-fn learnable(id: u64, tensor: Tensor<1>) -> Param<Tensor<1>> {
-    Param::initialized(ParamId::from(id), tensor.require_grad())
+    /// The learnable numbers of the prior and of the residual; none where there is no residual.
+    pub(in crate::train) fn numbers(&self) -> &Numbers {
+        &self.numbers
+    }
+
+    /// The numbers as tensors of their own on the model's device.
+    pub(in crate::train) fn tensors(&self) -> [Tensor<1>; 2] {
+        let numbers = self.numbers.each_ref();
+        numbers.map(|numbers| vector_of_f32(numbers, &self.device).require_grad())
+    }
+
+    /// Applies `step` to the learnable numbers, then brings physical parameters back within their bounds (projected gradient
+    /// descent): a parameter may rest on a bound and leave it again.
+    pub(in crate::train) fn update(&mut self, step: impl FnOnce(&mut Numbers)) {
+        step(&mut self.numbers);
+        equations::project(self.structure.parameters(), &mut self.numbers[0]);
+    }
 }

@@ -2,14 +2,14 @@ use burn::tensor::{Bool, Device, Tensor};
 
 use crate::expr::{Binary, Node, Op, Program, Unary};
 
-/// A value on the way through a replay: constants stay numbers until they meet a tensor.
+/// A value of a replay: constants stay numbers until they are combined with a tensor.
 #[derive(Clone)]
 enum Value {
     Number(f64),
     Column(Tensor<1>),
 }
 
-/// Carry out a program on Burn tensors, one row of the batch in each entry, so that Burn differentiates and places it.
+/// Evaluates a program on Burn tensors, one row of the batch in each entry, with Burn's derivatives and on its devices.
 /// `inputs` are of shape `[batch]`, or `[1]` for what all rows share; so are the outputs.
 ///
 /// # Panics
@@ -88,7 +88,7 @@ fn columns(op: Binary, a: Tensor<1>, b: Tensor<1>) -> Tensor<1> {
         Binary::Div => a / b,
         Binary::Pow => a.powf(b),
         Binary::Atan2 => a.atan2(b),
-        // As in numbers: what is not a number spreads instead of vanishing.
+        // As in scalar evaluation: NaN propagates.
         Binary::Min => {
             let (a, b) = same_shape(a, b);
             let first = a.clone().lower(b.clone()).bool_or(a.clone().is_nan());

@@ -1,16 +1,15 @@
 use std::sync::Arc;
 
-use burn::tensor::{Bool, Device, Tensor, TensorData};
+use burn::tensor::{Bool, Device, Tensor};
 
-use super::mlp::to_f64;
-use super::prepared::rows_of;
-use super::{Frame, HybridModel, Prepared, equations};
-use crate::model::{MlpWeights, Parameter, to_f32};
+use super::tensor::{rows_of, tensor, to_f64, vector_of_f32};
+use super::{HybridModel, Structure, Unpacked, equations};
+use crate::model::{MlpWeights, Parameter};
 
-/// Independent models of one frame side by side, so that one operation on a device serves them all.
+/// Independent models of one structure, evaluated together by one operation on a device.
 #[derive(Debug, Clone)]
 pub(in crate::train) struct Stack {
-    frame: Arc<Frame>,
+    structure: Arc<Structure>,
     models: usize,
     /// The learnable numbers of the prior and of the residual, `[models, numbers]` each; none where there are no numbers.
     tensors: [Option<Tensor<2>>; 2],
@@ -25,8 +24,8 @@ impl Stack {
     /// # Panics
     /// When there are no networks, or not of the shape of the model's own.
     pub(in crate::train) fn new(model: &HybridModel, networks: &[MlpWeights]) -> Self {
-        let (frame, device) = (model.frame().clone(), model.device());
-        let made = frame.networks.last().map(MlpWeights::widths);
+        let (structure, device) = (model.structure().clone(), model.device());
+        let made = structure.networks.last().map(MlpWeights::widths);
         let fits = |network: &MlpWeights| Some(network.widths()) == made;
         assert!(
             !networks.is_empty() && networks.iter().all(fits),
@@ -35,20 +34,18 @@ impl Stack {
         let models = networks.len();
         let flat: Vec<f64> = networks.iter().flat_map(MlpWeights::flat).collect();
         let width = flat.len() / models;
-        let drawn = matrix(&flat, [models, width], &device);
-        let [prior, _] = model.tensors();
-        let detached = |prior: Tensor<1>| Tensor::from_inner(prior.inner());
-        let tensors = if frame.has_residual {
-            let prior = prior.and_then(|prior| rows_of(detached(prior), models));
-            [prior, Some(drawn)]
+        let drawn = tensor(&flat, [models, width], &device);
+        let tensors = if structure.has_residual {
+            let prior = vector_of_f32(&model.numbers()[0], &device);
+            [rows_of(prior, models), Some(drawn)]
         } else {
             [Some(drawn), None]
         };
         Self {
-            bounds: bounds(frame.parameters(), &device),
+            bounds: bounds(structure.parameters(), &device),
             tensors: tensors.map(|tensor| tensor.map(Tensor::require_grad)),
             models,
-            frame,
+            structure,
         }
     }
 
@@ -57,9 +54,9 @@ impl Stack {
         self.models
     }
 
-    /// What the models are without their learnable numbers.
-    pub(in crate::train) fn frame(&self) -> &Frame {
-        &self.frame
+    /// The models without their learnable numbers.
+    pub(in crate::train) fn structure(&self) -> &Structure {
+        &self.structure
     }
 
     pub(in crate::train) fn device(&self) -> Device {
@@ -73,8 +70,8 @@ impl Stack {
     }
 
     /// Unpack the parameters for evaluations at so many rows for each model, one model's after the other's.
-    pub(in crate::train) fn prepare(&self, rows: usize) -> Prepared<'_> {
-        Prepared::new(&self.frame, rows, self.tensors())
+    pub(in crate::train) fn unpack(&self, rows: usize) -> Unpacked<'_> {
+        Unpacked::new(&self.structure, rows, self.tensors())
     }
 
     /// The models that are `alive` (`[models]`) with other learnable numbers, physical parameters brought back within
@@ -112,7 +109,7 @@ impl Stack {
 
     /// Values of the physical parameters of each model, in their units.
     pub(in crate::train) fn parameters(&self) -> Vec<Vec<f64>> {
-        let declared = self.frame.parameters();
+        let declared = self.structure.parameters();
         if declared.is_empty() {
             return vec![Vec::new(); self.models];
         }
@@ -129,11 +126,7 @@ fn bounds(parameters: &[Parameter], device: &Device) -> Option<[Tensor<2>; 2]> {
     let plain = device.clone().without_autodiff();
     let bound = |end: usize| {
         let values: Vec<f64> = parameters.iter().map(|p| p.bounds[end] / p.scale).collect();
-        matrix(&values, [1, values.len()], &plain)
+        tensor(&values, [1, values.len()], &plain)
     };
     parameters.iter().any(bounded).then(|| [bound(0), bound(1)])
-}
-
-fn matrix(values: &[f64], shape: [usize; 2], device: &Device) -> Tensor<2> {
-    Tensor::from_data(TensorData::new(to_f32(values), shape), device)
 }

@@ -1,20 +1,20 @@
 use burn::tensor::Tensor;
 
-use super::{Flow, Prepared};
+use super::{Derivative, Unpacked};
 use crate::sim::{Integrator, Scheme};
 
-/// One step of a batch.
+/// A batch after one step.
 #[derive(Debug, Clone)]
-pub struct Step {
+pub struct StepResult {
     /// `2n` columns `[batch]`.
     pub state: Vec<Tensor<1>>,
-    /// F_r at the start of the step, `[batch, n or 2n]`: not at inner stages, so that its norm means the
-    /// same under every integrator.
+    /// F_r at the start of the step, `[batch, n or 2n]`: not at inner stages, so that its norm is comparable between
+    /// integrators.
     pub residual: Option<Tensor<2>>,
 }
 
-impl Prepared<'_> {
-    /// Advance columns `[batch]` of states by `dt` seconds (`[batch]`) from `time`, under `input`.
+impl Unpacked<'_> {
+    /// Advances columns `[batch]` of states by `dt` seconds (`[batch]`) from `time`, under `input`.
     pub fn step(
         &self,
         integrator: Integrator,
@@ -22,8 +22,8 @@ impl Prepared<'_> {
         input: &[Tensor<1>],
         time: &Tensor<1>,
         dt: &Tensor<1>,
-    ) -> Step {
-        let first = self.flow(state, input, time);
+    ) -> StepResult {
+        let first = self.derivative(state, input, time);
         let residual = first.residual.clone();
         let h = match integrator.substeps() {
             1 => dt.clone(),
@@ -32,22 +32,22 @@ impl Prepared<'_> {
         let mut state = substep(integrator.scheme(), self, state, input, time, &h, first);
         for k in 1..integrator.substeps() {
             let time = time.clone() + h.clone() * k as f64;
-            let start = self.flow(&state, input, &time);
+            let start = self.derivative(&state, input, &time);
             state = substep(integrator.scheme(), self, &state, input, &time, &h, start);
         }
-        Step { state, residual }
+        StepResult { state, residual }
     }
 }
 
-/// A substep of length `h`; `first` is the flow at its start.
+/// A substep of length `h`; `first` is the derivative at its start.
 fn substep(
     scheme: &Scheme,
-    model: &Prepared,
+    model: &Unpacked,
     state: &[Tensor<1>],
     input: &[Tensor<1>],
     time: &Tensor<1>,
     h: &Tensor<1>,
-    first: Flow,
+    first: Derivative,
 ) -> Vec<Tensor<1>> {
     if scheme.semi_implicit {
         return semi_implicit(state, &first, h);
@@ -58,7 +58,9 @@ fn substep(
         if k > 0 {
             let after = h.clone() * stage.time;
             let inner = along(state, &rates, &after);
-            rates = model.flow(&inner, input, &(time.clone() + after)).rates;
+            rates = model
+                .derivative(&inner, input, &(time.clone() + after))
+                .rates;
         }
         let weighted = rates.iter().map(|rate| rate.clone() * stage.weight);
         mean = match k {
@@ -69,10 +71,10 @@ fn substep(
     along(state, &mean, h)
 }
 
-fn semi_implicit(state: &[Tensor<1>], flow: &Flow, h: &Tensor<1>) -> Vec<Tensor<1>> {
+fn semi_implicit(state: &[Tensor<1>], derivative: &Derivative, h: &Tensor<1>) -> Vec<Tensor<1>> {
     let joints = state.len() / 2;
     let (q, v) = state.split_at(joints);
-    let (f_q, f_v) = flow.rates.split_at(joints);
+    let (f_q, f_v) = derivative.rates.split_at(joints);
     let gains: Vec<Tensor<1>> = f_v.iter().map(|f| f.clone() * h.clone()).collect();
     let positions = (q.iter().zip(f_q).zip(&gains))
         .map(|((q, f), gain)| q.clone() + (f.clone() + gain.clone()) * h.clone());

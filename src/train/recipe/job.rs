@@ -1,6 +1,6 @@
 use serde_json::{Value, json};
 
-use super::{Kind, Material, Recipe, RecipeError};
+use super::{Kind, Recipe, RecipeError, TrainingData};
 use crate::files::{beside_or_named, content_id, text_or_embedded};
 use crate::model::{Dynamics, LastLayer, Library, MlpSettings, MlpWeights, Model, Origin};
 use crate::runs::{Identity, Purpose, RunFolder, stream};
@@ -9,7 +9,7 @@ use crate::train::{Backend, Checkpoint, HybridModel, Training};
 /// A recipe with everything it refers to, read or sampled: ready to train or to resume.
 pub struct Job {
     pub recipe: Recipe,
-    pub material: Material,
+    pub data: TrainingData,
     /// The model before training.
     pub model: HybridModel,
     /// What the checkpoints record of the run.
@@ -20,12 +20,6 @@ pub struct Job {
 
 /// The configuration's key for the command line that repeats the run.
 const COMMAND_LINE: &str = "command_line";
-
-/// A model file: its system and its text.
-pub(super) struct Declared {
-    pub system: Model,
-    pub text: String,
-}
 
 impl Job {
     /// Prepares training from scratch.
@@ -38,34 +32,34 @@ impl Job {
         backend: Backend,
         seed: u64,
     ) -> Result<Self, RecipeError> {
-        let Declared { system, text } = declared(&recipe, library)?;
-        let mut dynamics = system.dynamics();
+        let (declared, model_toml) = declared(&recipe, library)?;
+        let mut dynamics = declared.dynamics();
         recipe.set_parameters(&mut dynamics)?;
-        let material = Material::gather(&recipe, &system, library, seed)?;
+        let data = TrainingData::load(&recipe, &declared, library, seed)?;
         let last = recipe.kind.last_layer();
-        let network = || new_network(&recipe, &system, &material, seed, last);
+        let network = || new_network(&recipe, &declared, &data, seed, last);
         let device = backend.device();
         let model = match recipe.kind {
             Kind::Physics => HybridModel::physics(&dynamics, &device)?,
             Kind::Hybrid => HybridModel::physics(&dynamics, &device)?.with_residual(&network())?,
             Kind::DataDriven => {
-                HybridModel::network(&system.name, system.joints, &network(), &device)?
+                HybridModel::network(&declared.name, declared.joints, &network(), &device)?
             }
         };
         let config = json!({
             "command": "train",
             "recipe": recipe,
-            "data": material.training.fingerprint(),
+            "data": data.training.fingerprint(),
             "device": backend.name(),
         });
         Ok(Self {
             recipe,
-            material,
+            data,
             model,
             origin: Origin {
                 config,
                 seed,
-                model_toml: text,
+                model_toml,
             },
             dynamics,
         })
@@ -117,29 +111,27 @@ fn identity(config: &Value, seed: u64, model_toml: &str) -> Identity {
     }
 }
 
-pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<Declared, RecipeError> {
+/// The recipe's model and the text of its file.
+pub(super) fn declared(recipe: &Recipe, library: &Library) -> Result<(Model, String), RecipeError> {
     let path = beside_or_named(&recipe.path, &recipe.model);
-    let system = library.model(&path)?;
+    let model = library.model(&path)?;
     let text = text_or_embedded(&path, Library::system_text)
         .map_err(|source| RecipeError::Open { path, source })?;
-    Ok(Declared {
-        system,
-        text: text.into_owned(),
-    })
+    Ok((model, text.into_owned()))
 }
 
+/// The network of the recipe or, where it says nothing, of the model file.
 pub(super) fn new_network(
     recipe: &Recipe,
-    system: &Model,
-    material: &Material,
+    model: &Model,
+    data: &TrainingData,
     seed: u64,
     last: LastLayer,
 ) -> MlpWeights {
     let settings = recipe.network.clone().unwrap_or_else(|| MlpSettings {
-        hidden: system.hidden.clone(),
-        ..MlpSettings::for_joints(system.joints)
+        hidden: model.hidden.clone(),
+        ..MlpSettings::for_joints(model.joints)
     });
-    let scaling = material.training.scaling(settings.angles);
     let mut rng = stream(seed, Purpose::RecipeNetwork);
-    MlpWeights::new(system.joints, &settings, scaling, last, &mut rng)
+    data.training.network(&settings, last, &mut rng)
 }

@@ -1,7 +1,7 @@
 use super::{Job, Kind, Recipe, RecipeError};
 use crate::model::MlpWeights;
 use crate::runs::{Purpose, stream};
-use crate::train::{Penalty, Start, Sweep};
+use crate::train::{Penalty, Sweep, Variant};
 
 /// What sets one model of a sweep apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,20 +24,20 @@ impl Job {
     /// If `members` is empty.
     pub fn sweep(&self, members: &[Member]) -> Result<Sweep, RecipeError> {
         self.check(members)?;
-        let made = self.model.frame().networks.last();
+        let made = self.model.structure().networks.last();
         let made = made.expect("only models of equations alone have no network");
-        let starts = members.iter().map(|member| self.start(made, member));
+        let variants = members.iter().map(|member| self.variant(made, member));
         Ok(Sweep::new(
             &self.model,
             self.recipe.fit.clone(),
-            starts.collect(),
+            variants.collect(),
         )?)
     }
 
-    fn start(&self, made: &MlpWeights, member: &Member) -> Start {
+    fn variant(&self, made: &MlpWeights, member: &Member) -> Variant {
         let Recipe { kind, fit, .. } = &self.recipe;
         let mut rng = stream(member.seed, Purpose::RecipeNetwork);
-        Start {
+        Variant {
             network: made.redrawn(kind.last_layer(), &mut rng),
             penalty_weight: member.alpha.unwrap_or(fit.penalty.initial()),
             order: stream(member.seed, Purpose::RecipeOrder),
@@ -87,12 +87,12 @@ mod tests {
                 Job::train(recipe, &Library::built_in(), Backend::NdArray, seed).unwrap()
             };
             let (first, own) = (job(4), job(5));
-            let network = |job: &Job| job.model.frame().networks.last().unwrap().clone();
+            let network = |job: &Job| job.model.structure().networks.last().unwrap().clone();
             let (seed, alpha) = (5, None);
-            let start = first.start(&network(&first), &Member { seed, alpha });
-            assert_eq!(start.network.layers, network(&own).layers);
-            assert_ne!(start.network.layers, network(&first).layers);
-            assert_eq!(start.network.scaling, network(&first).scaling);
+            let variant = first.variant(&network(&first), &Member { seed, alpha });
+            assert_eq!(variant.network.layers, network(&own).layers);
+            assert_ne!(variant.network.layers, network(&first).layers);
+            assert_eq!(variant.network.scaling, network(&first).scaling);
         }
     }
 }

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::job::{declared, new_network};
-use super::{Job, Kind, Material, Recipe, RecipeError};
+use super::{Job, Kind, Recipe, RecipeError, TrainingData};
 use crate::model::{LastLayer, Library, Model, Origin};
 use crate::train::{Backend, Checkpoint};
 
@@ -31,7 +31,7 @@ impl Job {
             ));
         }
         // Only to refuse a checkpoint of another system: the equations are those saved with the weights.
-        let meant = declared(&recipe, library)?.system.dynamics();
+        let meant = declared(&recipe, library)?.0.dynamics();
         let refused = |source| RecipeError::OtherModel {
             path: recipe.path.clone(),
             source: Box::new(source),
@@ -65,11 +65,11 @@ fn tuned(
     backend: Backend,
     seed: u64,
 ) -> Result<Job, RecipeError> {
-    let system = beside(checkpoint, library)?;
-    let dynamics = system.dynamics();
+    let declared = beside(checkpoint, library)?;
+    let dynamics = declared.dynamics();
     let prior = checkpoint.model(&dynamics, &backend.device())?;
-    let material = Material::gather(&recipe, &system, library, seed)?;
-    let residual = || new_network(&recipe, &system, &material, seed, LastLayer::Zero);
+    let data = TrainingData::load(&recipe, &declared, library, seed)?;
+    let residual = || new_network(&recipe, &declared, &data, seed, LastLayer::Zero);
     let model = match (recipe.kind, kind_of(checkpoint)) {
         (asked, saved) if asked == saved => prior,
         (Kind::Hybrid, _) => prior.with_residual(&residual())?,
@@ -79,13 +79,13 @@ fn tuned(
     let config = json!({
         "command": "tune",
         "recipe": recipe,
-        "data": material.training.fingerprint(),
+        "data": data.training.fingerprint(),
         "device": backend.name(),
         "from": {"config": manifest.config, "seed": manifest.seed, "epoch": manifest.epoch},
     });
     Ok(Job {
         recipe,
-        material,
+        data,
         model,
         origin: Origin {
             config,
@@ -96,6 +96,7 @@ fn tuned(
     })
 }
 
+/// The model file of a checkpoint.
 fn beside(checkpoint: &Checkpoint, library: &Library) -> Result<Model, RecipeError> {
     let name = Path::new("the checkpoint's model.toml");
     Ok(Model::from_text(

@@ -1,9 +1,8 @@
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use super::{hybrid, parameter, pendulum, rng, transitions};
-use crate::model::{LastLayer, MlpSettings, MlpWeights, Origin};
+use super::{fit, hybrid, parameter, pendulum, rng, transitions};
+use crate::model::{LastLayer, MlpSettings, Origin};
 use crate::train::{Backend, Checkpoint, FitSettings, HybridModel, Training, save};
 
 fn origin() -> Origin {
@@ -21,11 +20,7 @@ fn trained(c_g: f64) -> Training {
         epochs: 3,
         ..FitSettings::default()
     };
-    let mut training = Training::new(model, settings, rng(3)).unwrap();
-    training
-        .run(&segments, None, &mut |_| ControlFlow::Continue(()))
-        .unwrap();
-    training
+    fit(model, &segments, settings)
 }
 
 /// A saved checkpoint, in a directory that lives as long as the first part.
@@ -42,7 +37,7 @@ fn message(dir: &Path) -> String {
 }
 
 #[test]
-fn a_checkpoint_gives_back_the_model_and_its_origin() {
+fn a_checkpoint_restores_the_model_and_its_origin() {
     let (_parent, dir) = saved();
     let checkpoint = Checkpoint::load(&dir).unwrap();
     assert_eq!(checkpoint.model_toml, origin().model_toml);
@@ -59,13 +54,10 @@ fn a_checkpoint_gives_back_the_model_and_its_origin() {
 }
 
 #[test]
-fn the_prior_of_a_network_is_saved_too() {
+fn a_prior_that_is_a_network_is_saved_too() {
     let segments = transitions(20, 0.0, 1);
     let settings = MlpSettings::for_joints(1);
-    let new = |seed| {
-        let scaling = segments.scaling(settings.angles);
-        MlpWeights::new(1, &settings, scaling, LastLayer::Random, &mut rng(seed))
-    };
+    let new = |seed| segments.network(&settings, LastLayer::Random, &mut rng(seed));
     let model = HybridModel::network("pendulum", 1, &new(1), &Backend::NdArray.device())
         .and_then(|model| model.with_residual(&new(2)))
         .unwrap();
@@ -81,12 +73,12 @@ fn the_prior_of_a_network_is_saved_too() {
 }
 
 #[test]
-fn an_older_checkpoint_is_replaced_and_found_while_it_waits() {
+fn an_older_checkpoint_is_replaced_and_found_after_an_interrupted_replacement() {
     let (_parent, dir) = saved();
     save(&dir, &trained(9.0), &origin()).unwrap();
     let newer = Checkpoint::load(&dir).unwrap();
     assert_eq!(newer.weights, trained(9.0).model().weights());
-    // What a program leaves that dies between the two renamings.
+    // The state after a kill between the two renamings.
     fs::rename(&dir, dir.with_file_name("run.previous")).unwrap();
     assert_eq!(Checkpoint::load(&dir).unwrap().weights, newer.weights);
     save(&dir, &trained(8.0), &origin()).unwrap();
@@ -111,7 +103,7 @@ fn other_files_are_not_replaced() {
 }
 
 #[test]
-fn what_is_no_checkpoint_is_named() {
+fn missing_and_damaged_files_are_named() {
     let (_parent, dir) = saved();
     assert!(
         message(Path::new("nowhere"))
@@ -129,7 +121,7 @@ fn what_is_no_checkpoint_is_named() {
 }
 
 #[test]
-fn a_damaged_optimiser_state_is_noticed() {
+fn a_damaged_optimiser_state_is_refused() {
     let (_parent, dir) = saved();
     let load = || message(&dir);
     let path = dir.join("optimizer.safetensors");

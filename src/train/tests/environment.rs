@@ -8,8 +8,8 @@ use crate::train::{Backend, HybridModel};
 
 #[test]
 fn an_environment_steps_as_training_does() {
-    let system = Library::built_in().model(Path::new("acrobot")).unwrap();
-    let dynamics = system.dynamics();
+    let model = Library::built_in().model(Path::new("acrobot")).unwrap();
+    let dynamics = model.dynamics();
     let device = Backend::NdArray.device();
     let model = HybridModel::physics(&dynamics, &device).unwrap();
     let column = |x: f64| Tensor::<1>::from_data(TensorData::new(vec![x as f32], [1]), &device);
@@ -17,9 +17,9 @@ fn an_environment_steps_as_training_does() {
     for integrator in Integrator::each() {
         let mut state = start;
         Environment::new(&dynamics, integrator, 0.02).step(&mut state, &tau, 0.0);
-        let prepared = model.prepare();
+        let unpacked = model.unpack();
         let (columns, inputs) = (start.map(column), tau.map(column));
-        let step = prepared.step(integrator, &columns, &inputs, &column(0.0), &column(0.02));
+        let step = unpacked.step(integrator, &columns, &inputs, &column(0.0), &column(0.02));
         for (mine, trained) in state.iter().zip(step.state) {
             let trained = f64::from(trained.into_scalar::<f32>());
             assert!(

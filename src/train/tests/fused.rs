@@ -1,19 +1,16 @@
 //! The fused loss against the composed one.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
-use burn::module::{Module, ParamGroup, ParamId};
-use burn::tensor::{Device, Gradients};
+use burn::tensor::Device;
 use rand::RngExt;
 
-use super::{hybrid, one_joint, parameter, rng, transitions};
+use super::{fit, hybrid, hybrid_of, one_joint, parameter, rng, transitions};
 use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
-use crate::train::hybrid::{PRIOR_ID, RESIDUAL_ID};
-use crate::train::{
-    Backend, Batch, FitSettings, HybridModel, Objective, Segments, Start, Sweep, Training,
-};
+use crate::train::loss::Gradient;
+use crate::train::stacked::StackedSweep;
+use crate::train::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Variant};
 
 /// Segments of `steps` irregular steps that lead through random states.
 pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
@@ -37,8 +34,10 @@ pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
 /// The library's equations, one of their parameters held.
 pub(super) fn equations(joints: usize) -> Dynamics {
     let name = ["pendulum", "acrobot"][joints - 1];
-    let system = Library::built_in().model(Path::new(name)).unwrap();
-    let mut dynamics = system.dynamics();
+    let mut dynamics = Library::built_in()
+        .model(Path::new(name))
+        .unwrap()
+        .dynamics();
     dynamics.parameters[1].fixed = true;
     dynamics
 }
@@ -49,14 +48,7 @@ pub(super) fn network(joints: usize, angles: Angles, on: ResidualOn, seed: u64) 
         angles,
         on,
     };
-    let scaling = segments(joints, 50, 1).scaling(angles);
-    MlpWeights::new(
-        joints,
-        &settings,
-        scaling,
-        LastLayer::Random,
-        &mut rng(seed),
-    )
+    segments(joints, 50, 1).network(&settings, LastLayer::Random, &mut rng(seed))
 }
 
 /// Every kind of model of so many joints.
@@ -76,49 +68,35 @@ fn models(joints: usize, device: &Device) -> Vec<HybridModel> {
     models
 }
 
-/// The parts of the loss, and the gradients of all that is learnable, one after the other.
-fn value_and_gradients(
-    model: &HybridModel,
-    batch: &Batch,
-    integrator: Integrator,
-) -> ([f64; 2], [Option<Vec<f64>>; 2]) {
-    let scale: Vec<f64> = (1..=2 * model.joints()).map(|k| 0.3 * k as f64).collect();
-    let objective = Objective::new(integrator, Some(&scale), model.joints()).unwrap();
-    let loss = objective.loss(model, batch);
-    let numbers = loss.numbers();
-    let weights = [0.7, if model.frame().has_residual { 1.3 } else { 0.0 }];
-    let gradients = loss.weighted(weights).backward();
-    (numbers, gradients_of(model, &gradients))
+/// The loss and its gradient with weights of a training.
+fn gradient(model: &HybridModel, batch: &Batch, objective: &Objective) -> Gradient {
+    let of_norm = if model.structure().has_residual {
+        1.3
+    } else {
+        0.0
+    };
+    objective.gradient(model, batch, [0.7, of_norm])
 }
 
-fn gradients_of(model: &HybridModel, gradients: &Gradients) -> [Option<Vec<f64>>; 2] {
-    model.tensors().map(|numbers| {
-        let gradient = numbers?.grad(gradients)?.into_data();
-        Some(gradient.iter::<f32>().map(f64::from).collect())
-    })
-}
-
-fn norm(numbers: impl Iterator<Item = f64>) -> f64 {
-    numbers.map(|x| x * x).sum::<f64>().sqrt()
+fn norm(numbers: impl Iterator<Item = f32>) -> f64 {
+    numbers.map(|x| f64::from(x).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Sums of f32 in another order: some 1e-7 for each of the few hundred operations on the way.
 fn assert_agrees(model: &HybridModel, segments: &Segments, integrator: Integrator) {
-    let all: Vec<usize> = (0..segments.len()).collect();
-    let device = model.device();
-    let fused = segments.batch(&all, &device);
+    let scale: Vec<f64> = (1..=2 * model.joints()).map(|k| 0.3 * k as f64).collect();
+    let objective = Objective::new(integrator, Some(&scale), model.joints()).unwrap();
+    let fused = objective.all(segments, &model.device());
     assert!(matches!(fused, Batch::Blocks(_)));
-    let composed = Batch::Columns(segments.columns(&all, &device));
-    let (value, gradients) = value_and_gradients(model, &fused, integrator);
-    let (wanted, wanted_gradients) = value_and_gradients(model, &composed, integrator);
-    for (value, wanted) in value.iter().zip(wanted) {
-        assert!((value - wanted).abs() <= 1e-5 * wanted, "{value} {wanted}");
+    let found = gradient(model, &fused, &objective);
+    let objective = objective.composed();
+    let composed = objective.all(segments, &model.device());
+    assert!(matches!(composed, Batch::Columns(_)));
+    let wanted = gradient(model, &composed, &objective);
+    for (found, wanted) in found.loss.iter().zip(wanted.loss) {
+        assert!((found - wanted).abs() <= 1e-5 * wanted, "{found} {wanted}");
     }
-    for (found, wanted) in gradients.iter().zip(&wanted_gradients) {
-        assert_eq!(found.is_some(), wanted.is_some());
-        let (Some(found), Some(wanted)) = (found, wanted) else {
-            continue;
-        };
+    for (found, wanted) in found.by_numbers.iter().zip(&wanted.by_numbers) {
         assert_eq!(found.len(), wanted.len());
         let off = norm(found.iter().zip(wanted).map(|(a, b)| a - b));
         let size = norm(wanted.iter().copied());
@@ -144,7 +122,7 @@ fn the_fused_loss_is_the_composed_one_for_every_model_and_integrator() {
 }
 
 #[test]
-fn batches_of_any_size_agree() {
+fn batches_of_every_size_agree() {
     for size in [1, 31, 32, 33, 128, 257, 1000] {
         let segments = transitions(size, -0.5, 1);
         let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Random);
@@ -153,7 +131,7 @@ fn batches_of_any_size_agree() {
 }
 
 #[test]
-fn checkpointing_of_gradients_changes_nothing() {
+fn gradient_checkpointing_does_not_change_the_gradients() {
     let segments = segments(1, 40, 2);
     for model in models(1, &Backend::NdArray.device().gradient_checkpointing()) {
         assert_agrees(&model, &segments, Integrator::RK4);
@@ -165,48 +143,20 @@ fn equations_without_parameters_can_have_a_residual() {
     let segments = segments(1, 40, 2);
     let dynamics = one_joint("9.81 * sin(q1)", Vec::new());
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
-    let model = HybridModel::physics(&dynamics, &Backend::NdArray.device())
-        .and_then(|model| model.with_residual(&residual))
-        .unwrap();
+    let model = hybrid_of(&dynamics, &residual, &Backend::NdArray.device());
     assert_agrees(&model, &segments, Integrator::RK4);
 }
 
 #[test]
-fn a_frozen_input_leaves_the_others_gradient_as_it_is() {
-    let segments = segments(1, 40, 2);
-    let device = Backend::NdArray.device();
-    let batch = segments.all(&device);
-    let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
-    let gradients = |model: &HybridModel| {
-        let loss = objective.loss(model, &batch).weighted([1.0, 1.0]);
-        gradients_of(model, &loss.backward())
-    };
-    let models = models(1, &device).into_iter();
-    for model in models.filter(|model| model.frame().has_residual) {
-        let both = gradients(&model);
-        assert!(both.iter().all(Option::is_some));
-        for frozen in 0..2 {
-            let id = if frozen == 0 { PRIOR_ID } else { RESIDUAL_ID };
-            let part = ParamGroup::from_ids(vec![ParamId::from(id)]);
-            let some = gradients(&model.clone().set_require_grad_group(part, false));
-            assert_eq!(some[frozen], None);
-            assert_eq!(some[1 - frozen], both[1 - frozen]);
-        }
-        let value = objective.loss(&model, &batch).numbers();
-        assert_eq!(objective.loss(&model.valid(), &batch).numbers(), value);
-    }
-}
-
-#[test]
-fn what_is_not_finite_stays_so() {
+fn a_diverging_rollout_makes_the_loss_infinite_or_nan() {
     let segments = segments(1, 40, 3);
     let dynamics = one_joint("C * exp(1000 * q1 * q1)", vec![parameter("C", 3.0)]);
     let residual = network(1, Angles::Raw, ResidualOn::Accelerations, 7);
     let model = HybridModel::physics(&dynamics, &Backend::NdArray.device()).unwrap();
     let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
-    let batch = segments.all(&model.device());
+    let batch = objective.all(&segments, &model.device());
     for model in [model.clone(), model.with_residual(&residual).unwrap()] {
-        let [error, _] = objective.loss(&model, &batch).numbers();
+        let [error, _] = objective.loss(&model, &batch);
         assert!(!error.is_finite(), "{error}");
     }
 }
@@ -220,11 +170,7 @@ fn the_same_run_twice_has_the_same_bits() {
             epochs: 50,
             ..FitSettings::default()
         };
-        let mut training = Training::new(model, settings, rng(3)).unwrap();
-        training
-            .run(&segments, None, &mut |_| ControlFlow::Continue(()))
-            .unwrap();
-        training.model().weights()
+        fit(model, &segments, settings).model().weights()
     };
     let first = run();
     for _ in 0..3 {
@@ -233,25 +179,22 @@ fn the_same_run_twice_has_the_same_bits() {
 }
 
 #[test]
-fn a_run_by_either_way_reaches_the_same_error() {
+fn fused_and_composed_runs_reach_the_same_error() {
     let segments = transitions(500, -0.5, 1);
     let model = hybrid((8.0, 2.0), &segments, Backend::NdArray, LastLayer::Zero);
     let settings = FitSettings {
         epochs: 300,
         ..FitSettings::default()
     };
-    let start = Start {
+    let variant = Variant {
         network: model.weights().residual.unwrap(),
         penalty_weight: settings.penalty.initial(),
         order: rng(3),
     };
     // A sweep composes its loss of Burn's operations.
-    let mut sweep = Sweep::new(&model, settings.clone(), vec![start]).unwrap();
+    let mut sweep = StackedSweep::new(&model, settings.clone(), vec![variant]).unwrap();
     let composed = sweep.run(&segments, &mut |_| ()).unwrap().remove(0);
-    let mut training = Training::new(model, settings, rng(3)).unwrap();
-    training
-        .run(&segments, None, &mut |_| ControlFlow::Continue(()))
-        .unwrap();
+    let training = fit(model, &segments, settings);
     let fused = training.history().last().unwrap();
     // Rounding grows over 300 steps of Adam to some 1e-3.
     assert!(

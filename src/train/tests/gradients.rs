@@ -1,8 +1,7 @@
-use burn::module::Module;
-
 use super::{hybrid, rng, transitions};
 use crate::model::{LastLayer, MlpWeights, ModelWeights};
 use crate::sim::Integrator;
+use crate::train::loss::Gradient;
 use crate::train::{Backend, HybridModel, Objective, Segments};
 
 /// A trajectory with irregular steps, cut into segments of three.
@@ -23,11 +22,12 @@ fn segments() -> Segments {
     segments
 }
 
-fn total(model: &HybridModel, segments: &Segments, integrator: Integrator) -> burn::Tensor<1> {
+const WEIGHTS: [f64; 2] = [1.0, 0.3];
+
+fn gradient(model: &HybridModel, segments: &Segments, integrator: Integrator) -> Gradient {
     let objective = Objective::new(integrator, Some(&[0.5, 2.0]), 1).unwrap();
-    let batch = segments.all(&model.device());
-    let loss = objective.loss(model, &batch);
-    loss.weighted([1.0, 0.3]).sum()
+    let batch = objective.all(segments, &model.device());
+    objective.gradient(model, &batch, WEIGHTS)
 }
 
 /// The k-th weight of the first hidden layer or the k-th physical parameter, moved by `by`.
@@ -49,19 +49,14 @@ fn gradients_match_central_differences() {
     {
         let segments = segments();
         let model = hybrid((8.0, 2.0), &segments, backend, LastLayer::Random);
-        let gradients = total(&model, &segments, integrator).backward();
-        let of = |numbers: Option<burn::Tensor<1>>| {
-            numbers.unwrap().grad(&gradients).unwrap().into_data()
-        };
-        let [physics, residual] = model.tensors().map(of);
-        let (physics, residual): (Vec<f32>, Vec<f32>) =
-            (physics.iter().collect(), residual.iter().collect());
+        let [physics, residual] = gradient(&model, &segments, integrator).by_numbers;
         // After the weights and biases of the first layer.
         let hidden = &residual[4 * 16..];
 
         let value = |weights: &ModelWeights| {
-            let model = model.with_weights(weights).unwrap().valid();
-            f64::from(total(&model, &segments, integrator).into_scalar::<f32>())
+            let model = model.with_weights(weights).unwrap();
+            let [error, norm] = gradient(&model, &segments, integrator).loss;
+            WEIGHTS[0] * error + WEIGHTS[1] * norm
         };
         let weights = model.weights();
         // The loss is an f32 near 30, so differences over 2 h carry about 2e-6 / h.
@@ -87,9 +82,7 @@ fn gradients_match_central_differences() {
 fn a_residual_of_zero_has_a_finite_gradient() {
     let segments = transitions(20, -0.5, 1);
     let model = hybrid((15.0, 3.0), &segments, Backend::NdArray, LastLayer::Zero);
-    let gradients = total(&model, &segments, Integrator::default()).backward();
-    let [_, residual] = model.tensors();
-    let all = residual.unwrap().grad(&gradients).unwrap().into_data();
-    let last: Vec<f32> = all.iter().skip(16 * (4 + 17 + 17)).collect();
+    let [_, residual] = gradient(&model, &segments, Integrator::default()).by_numbers;
+    let last = &residual[16 * (4 + 17 + 17)..];
     assert!(last.iter().all(|g| g.is_finite()) && last.iter().any(|g| *g != 0.0));
 }

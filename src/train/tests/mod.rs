@@ -10,10 +10,13 @@ mod resume;
 mod shrinking;
 mod sweep;
 
+use std::ops::ControlFlow;
+
+use burn::tensor::Device;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Backend, HybridModel, Segments};
+use super::{Backend, Ended, FitSettings, HybridModel, Segments, Training};
 use crate::expr::{Graph, Scope, SignForm, parse};
 use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
 
@@ -94,10 +97,30 @@ pub(super) fn hybrid(
     backend: Backend,
     last: LastLayer,
 ) -> HybridModel {
-    let settings = MlpSettings::for_joints(1);
-    let scaling = segments.scaling(settings.angles);
-    let residual = MlpWeights::new(1, &settings, scaling, last, &mut rng(7));
-    HybridModel::physics(&pendulum(c_g, c_i), &backend.device())
-        .and_then(|model| model.with_residual(&residual))
+    let residual = segments.network(&MlpSettings::for_joints(1), last, &mut rng(7));
+    hybrid_of(&pendulum(c_g, c_i), &residual, &backend.device())
+}
+
+/// These equations and this residual.
+pub(super) fn hybrid_of(
+    dynamics: &Dynamics,
+    residual: &MlpWeights,
+    device: &Device,
+) -> HybridModel {
+    HybridModel::physics(dynamics, device)
+        .and_then(|model| model.with_residual(residual))
         .unwrap()
+}
+
+/// A run of all epochs without validation.
+pub(super) fn fit(model: HybridModel, segments: &Segments, settings: FitSettings) -> Training {
+    let mut training = Training::new(model, settings, rng(3)).unwrap();
+    run(&mut training, segments);
+    training
+}
+
+/// Trains to the last epoch.
+pub(super) fn run(training: &mut Training, segments: &Segments) {
+    let ended = training.run(segments, None, &mut |_| ControlFlow::Continue(()));
+    assert_eq!(ended.unwrap(), Ended::Finished);
 }

@@ -1,10 +1,9 @@
 use std::path::Path;
 
-use burn::module::Module;
 use burn::tensor::{Tensor, TensorData};
 use rand::RngExt;
 
-use super::{pendulum, rng, transitions};
+use super::{hybrid_of, pendulum, rng, transitions};
 use crate::expr::Program;
 use crate::lanes::Row;
 use crate::model::{
@@ -16,27 +15,35 @@ use crate::train::{Backend, HybridModel};
 const ROWS: usize = 37;
 
 /// Random points: states `[q, qd]`, inputs and times.
-fn points() -> Vec<[f64; 4]> {
+fn points() -> [[f64; 4]; ROWS] {
     let mut rng = rng(11);
     let mut one = |bound: f64| f64::from(rng.random_range(-bound..bound) as f32);
-    (0..ROWS)
-        .map(|_| [one(3.0), one(8.0), one(3.0), one(1.0)])
-        .collect()
+    [(); ROWS].map(|()| [one(3.0), one(8.0), one(3.0), one(1.0)])
+}
+
+/// Rates `[row][state]` at rows `[states, inputs, time]`.
+fn derivative<const N: usize>(model: &HybridModel, rows: &[[f32; N]]) -> Vec<f64> {
+    let states = 2 * model.joints();
+    let column = |k: usize| {
+        let values: Vec<f32> = rows.iter().map(|row| row[k]).collect();
+        Tensor::<1>::from_data(TensorData::new(values, [rows.len()]), &model.device())
+    };
+    let columns: Vec<Tensor<1>> = (0..N).map(column).collect();
+    let (state, input) = columns[..N - 1].split_at(states);
+    let derivative = model.unpack().derivative(state, input, &columns[N - 1]);
+    let residual = model.structure().networks.last();
+    if let (Some(found), Some(made)) = (derivative.residual, residual) {
+        assert_eq!(found.dims(), [rows.len(), made.on.outputs(model.joints())]);
+    }
+    let rates = derivative.rates.into_iter();
+    let rates = rates.map(|rate| rate.expand([rows.len()])).collect();
+    let rates: Tensor<2> = Tensor::stack(rates, 1);
+    assert_eq!(rates.dims(), [rows.len(), states]);
+    rates.into_data().iter::<f32>().map(f64::from).collect()
 }
 
 fn tensors(model: &HybridModel) -> Vec<f64> {
-    let device = model.device();
-    let column = |k: usize| points().iter().map(|p| p[k] as f32).collect::<Vec<f32>>();
-    let matrix = |columns: &[usize]| {
-        let stacked: Vec<Tensor<1>> = (columns.iter())
-            .map(|k| Tensor::from_data(TensorData::new(column(*k), [ROWS]), &device))
-            .collect();
-        Tensor::stack::<2>(stacked, 1)
-    };
-    let time = Tensor::from_data(TensorData::new(column(3), [ROWS]), &device);
-    let (rates, _) = model.derivative(matrix(&[0, 1]), matrix(&[2]), &time);
-    assert_eq!(rates.dims(), [ROWS, 2]);
-    rates.into_data().iter::<f32>().map(f64::from).collect()
+    derivative(model, &points().map(|point| point.map(|x| x as f32)))
 }
 
 fn numbers(dynamics: &Dynamics) -> Vec<f64> {
@@ -70,14 +77,7 @@ fn networks() -> Vec<MlpWeights> {
                 angles,
                 on,
             };
-            let scaling = segments.scaling(angles);
-            networks.push(MlpWeights::new(
-                1,
-                &settings,
-                scaling,
-                LastLayer::Random,
-                &mut rng(7),
-            ));
+            networks.push(segments.network(&settings, LastLayer::Random, &mut rng(7)));
         }
     }
     networks
@@ -94,36 +94,32 @@ fn assert_close(found: &[f64], wanted: &[f64], tolerance: f64) {
 }
 
 #[test]
-fn tensors_and_the_written_out_program_agree() {
+fn tensors_lanes_and_the_exported_program_agree() {
     // Sums of 16 products of order one in f32, four layers deep: a few 1e-6.
     for (backend, mlp) in Backend::ALL
         .iter()
         .flat_map(|b| networks().into_iter().map(|m| (*b, m)))
     {
         let device = backend.device();
-        let hybrid = HybridModel::physics(&pendulum(15.0, 3.0), &device)
-            .and_then(|model| model.with_residual(&mlp))
-            .unwrap();
+        let hybrid = hybrid_of(&pendulum(15.0, 3.0), &mlp, &device);
         let alone = HybridModel::network("pendulum", 1, &mlp, &device).unwrap();
         for model in [hybrid, alone] {
             let dynamics = model.to_dynamics().unwrap();
             let exact = numbers(&dynamics);
             assert_close(&tensors(&model), &exact, 1e-5);
-            assert_close(&tensors(&model.clone().valid()), &exact, 1e-5);
+            assert_close(&tensors(&model.without_gradients()), &exact, 1e-5);
             assert_close(&lanes(&dynamics.program, &dynamics.values()), &exact, 1e-5);
         }
     }
 }
 
 #[test]
-fn two_joints_agree_too() {
+fn tensors_and_the_exported_program_of_two_joints_agree() {
     let acrobot = Library::built_in().model(Path::new("acrobot")).unwrap();
     let acrobot = acrobot.with_sign_widths(vec![0.0; 2]).dynamics();
     let mut rng = rng(12);
-    // Positions, velocities, inputs of each row.
-    let rows: Vec<[f32; 6]> = (0..ROWS)
-        .map(|_| [0; 6].map(|_| rng.random_range(-3.0..3.0)))
-        .collect();
+    // Positions, velocities, inputs and time of each row.
+    let rows = [(); ROWS].map(|()| [(); 7].map(|()| rng.random_range(-3.0f32..3.0)));
     for on in [ResidualOn::Accelerations, ResidualOn::Derivative] {
         let settings = MlpSettings {
             on,
@@ -133,18 +129,11 @@ fn two_joints_agree_too() {
         let scaling = InputScaling::identity(8);
         let mlp = MlpWeights::new(2, &settings, scaling, LastLayer::Random, &mut rng);
         let device = Backend::NdArray.device();
-        let model = HybridModel::physics(&acrobot, &device)
-            .and_then(|model| model.with_residual(&mlp))
-            .unwrap();
-        let data = TensorData::new(rows.concat(), [ROWS, 6]);
-        let all: Tensor<2> = Tensor::from_data(data, &device);
-        let (state, input) = (all.clone().narrow(1, 0, 4), all.narrow(1, 4, 2));
-        let (rates, residual) = model.derivative(state, input, &Tensor::zeros([ROWS], &device));
-        assert_eq!(residual.unwrap().dims(), [ROWS, on.outputs(2)]);
-        let found: Vec<f64> = rates.into_data().iter::<f32>().map(f64::from).collect();
+        let model = hybrid_of(&acrobot, &mlp, &device);
+        let found = derivative(&model, &rows);
         let written = model.to_dynamics().unwrap();
         let exact = rows.iter().flat_map(|row| {
-            let point = row.iter().copied().map(f64::from).chain([0.0]);
+            let point = row.iter().copied().map(f64::from);
             let inputs: Vec<f64> = point.chain(written.values()).collect();
             written.program.eval(&inputs)
         });
@@ -153,14 +142,12 @@ fn two_joints_agree_too() {
 }
 
 #[test]
-fn numbers_survive_the_way_through_the_module() {
+fn a_model_returns_the_weights_that_it_was_made_of() {
     for (backend, mlp) in Backend::ALL
         .iter()
         .flat_map(|b| networks().into_iter().map(|m| (*b, m)))
     {
-        let model = HybridModel::physics(&pendulum(15.0, 3.0), &backend.device())
-            .and_then(|model| model.with_residual(&mlp))
-            .unwrap();
+        let model = hybrid_of(&pendulum(15.0, 3.0), &mlp, &backend.device());
         let weights = model.weights();
         assert_eq!(weights.residual.as_ref(), Some(&mlp));
         assert_eq!(model.with_weights(&weights).unwrap().weights(), weights);
@@ -169,10 +156,9 @@ fn numbers_survive_the_way_through_the_module() {
 }
 
 #[test]
-fn a_new_residual_changes_nothing_to_the_last_bit() {
+fn a_residual_of_zero_changes_no_bit_of_the_rates() {
     let settings = MlpSettings::for_joints(1);
-    let scaling = transitions(50, 0.0, 1).scaling(Angles::Raw);
-    let mlp = MlpWeights::new(1, &settings, scaling, LastLayer::Zero, &mut rng(7));
+    let mlp = transitions(50, 0.0, 1).network(&settings, LastLayer::Zero, &mut rng(7));
     let physics = pendulum(14.3, 2.9);
     assert_eq!(with_residual(&physics, &mlp).unwrap(), physics);
     for backend in Backend::ALL {

@@ -70,7 +70,7 @@ fn a_resumed_run_equals_an_uninterrupted_one_bit_for_bit() {
 
         assert_eq!(resumed.model().weights(), whole.model().weights());
         assert_eq!(resumed.history(), whole.history());
-        assert_eq!(resumed.best(), whole.best());
+        assert_eq!(resumed.best, whole.best);
         assert_eq!(resumed.rng, whole.rng);
         assert_eq!(
             resumed.penalty_weight.to_bits(),

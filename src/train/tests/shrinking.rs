@@ -1,17 +1,11 @@
 //! Weight decay, and learning rates that fall.
 
-use std::ops::ControlFlow;
-
-use super::{hybrid, rng, transitions};
+use super::{fit, hybrid, rng, transitions};
 use crate::model::{LastLayer, MlpWeights};
 use crate::train::{Backend, FitSettings, HybridModel, LearningRates, Training};
 
 fn after(model: &HybridModel, settings: FitSettings) -> HybridModel {
-    let segments = transitions(20, -0.5, 1);
-    let mut training = Training::new(model.clone(), settings, rng(2)).unwrap();
-    training
-        .run(&segments, None, &mut |_| ControlFlow::Continue(()))
-        .unwrap();
+    let training = fit(model.clone(), &transitions(20, -0.5, 1), settings);
     training.result().unwrap()
 }
 
@@ -27,7 +21,7 @@ fn settings(epochs: usize) -> FitSettings {
 }
 
 #[test]
-fn weights_shrink_by_their_share_of_the_rate_and_parameters_do_not() {
+fn weight_decay_applies_to_weights_and_not_to_physical_parameters() {
     let segments = transitions(20, -0.5, 1);
     let model = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random);
     let decaying = FitSettings {
@@ -48,7 +42,7 @@ fn weights_shrink_by_their_share_of_the_rate_and_parameters_do_not() {
 }
 
 #[test]
-fn a_prior_below_a_residual_does_not_shrink() {
+fn weight_decay_does_not_apply_to_a_prior_below_a_residual() {
     let segments = transitions(20, -0.5, 1);
     let device = Backend::NdArray.device();
     let network: MlpWeights = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random)
@@ -92,7 +86,7 @@ fn a_prior_below_a_residual_does_not_shrink() {
 }
 
 #[test]
-fn rates_fall_from_the_whole_to_the_share() {
+fn learning_rates_fall_from_one_to_the_annealed_share() {
     let segments = transitions(20, -0.5, 1);
     let model = hybrid((14.0, 3.5), &segments, Backend::NdArray, LastLayer::Random);
     let falling = FitSettings {

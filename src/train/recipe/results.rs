@@ -8,7 +8,7 @@ use crate::train::{HybridModel, Objective, Segments, TrainError, Training};
 
 /// The results of a training.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct TrainingResults {
     pub schema: u32,
     pub system: String,
     pub kind: Kind,
@@ -24,7 +24,7 @@ pub struct Outcome {
     pub test_error: Option<Change>,
     /// ||F_r||; 0 for a model without a residual.
     pub residual_norm: Change,
-    pub parameters: Vec<Learnt>,
+    pub parameters: Vec<FittedParameter>,
     pub checkpoint: PathBuf,
 }
 
@@ -37,7 +37,7 @@ pub struct Change {
 
 /// A physical parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Learnt {
+pub struct FittedParameter {
     pub name: String,
     pub unit: String,
     pub start: f64,
@@ -54,27 +54,26 @@ impl Job {
     ///
     /// # Errors
     /// Settings that do not match the model, so that the test error cannot be computed.
-    pub fn outcome(&self, training: &Training, dir: &Path) -> Result<Outcome, TrainError> {
+    pub fn results(&self, training: &Training, dir: &Path) -> Result<TrainingResults, TrainError> {
         let model = training.result()?;
         let history = training.history();
         let (first, last) = (
             history.first().expect("a run records its start"),
             history.last().expect("a run records its end"),
         );
-        let judge = |model: &HybridModel, test| error_on(model, training, test);
-        let test_error = match &self.material.test {
+        let test_error = match &self.data.test {
             Some(test) => Some(Change {
-                before: judge(&self.model, test)?,
-                after: judge(&model, test)?,
+                before: error_on(&self.model, training, test)?,
+                after: error_on(&model, training, test)?,
             }),
             None => None,
         };
-        Ok(Outcome {
+        Ok(TrainingResults {
             schema: 1,
             system: model.system().to_owned(),
             kind: self.recipe.kind,
             epochs: training.epoch(),
-            segments: self.material.training.len(),
+            segments: self.data.training.len(),
             loss: last.loss,
             error: Change {
                 before: first.error,
@@ -85,15 +84,15 @@ impl Job {
                 before: first.residual_norm,
                 after: last.residual_norm,
             },
-            parameters: self.learnt(&model),
+            parameters: self.fitted(&model),
             checkpoint: dir.to_owned(),
         })
     }
 
-    fn learnt(&self, model: &HybridModel) -> Vec<Learnt> {
-        let truth = |name: &str| self.material.truth.iter().find(|(known, _)| known == name);
+    fn fitted(&self, model: &HybridModel) -> Vec<FittedParameter> {
+        let truth = |name: &str| self.data.truth.iter().find(|(known, _)| known == name);
         (self.model.declared().into_iter().zip(model.declared()))
-            .map(|(start, found)| Learnt {
+            .map(|(start, found)| FittedParameter {
                 truth: truth(&found.name).map(|(_, value)| *value),
                 name: found.name,
                 unit: found.unit,
@@ -105,16 +104,17 @@ impl Job {
     }
 }
 
+/// The prediction error of a model with the objective of a run.
 fn error_on(model: &HybridModel, run: &Training, segments: &Segments) -> Result<f64, TrainError> {
     let settings = run.settings();
     let scale = settings.error_scale.as_deref();
     let objective = Objective::new(settings.integrator, scale, model.joints())?;
-    let batch = segments.all(&model.device());
-    let [error, _] = objective.loss(model, &batch).numbers();
+    let batch = objective.all(segments, &model.device());
+    let [error, _] = objective.loss(model, &batch);
     Ok(error)
 }
 
-impl Outcome {
+impl TrainingResults {
     /// The results as a table for the terminal.
     pub fn text(&self) -> String {
         let mut out = format!(

@@ -8,7 +8,7 @@ use crate::runs::{Purpose, stream};
 /// Evaluates models as controllers, in episodes that are not used for training. Initial state, sensor noise and the
 /// planner's random numbers are the same for every model, so that results differ by the model alone.
 #[derive(Debug, Clone, Copy)]
-pub struct Judge<'a> {
+pub struct Evaluator<'a> {
     pub task: &'a Task,
     pub plant: &'a Plant,
     pub seed: u64,
@@ -16,7 +16,7 @@ pub struct Judge<'a> {
 
 /// The result of an evaluation episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Judged {
+pub struct EpisodeScore {
     /// The sum of rewards.
     #[serde(rename = "return")]
     pub total: f64,
@@ -26,14 +26,14 @@ pub struct Judged {
     pub diverged: usize,
 }
 
-impl Judge<'_> {
+impl Evaluator<'_> {
     /// Evaluates a model in an episode, planning anew every `replan` steps.
     ///
     /// # Errors
     /// A plant that diverges.
-    pub fn judge(&self, predictor: &Predictor, replan: usize) -> Result<Judged, RunError> {
+    pub fn score(&self, predictor: &Predictor, replan: usize) -> Result<EpisodeScore, RunError> {
         let (episode, diverged) = self.episode(predictor, replan)?;
-        Ok(Judged {
+        Ok(EpisodeScore {
             total: episode.total(),
             success: episode.success,
             diverged,

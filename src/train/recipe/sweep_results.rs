@@ -10,7 +10,7 @@ use crate::train::Trained;
 
 /// The results of a sweep, as written to `sweep.json`. Numbers that are not finite are null there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Swept {
+pub struct SweepResults {
     pub schema: u32,
     /// Version of the program that wrote it.
     pub residyn: String,
@@ -27,7 +27,7 @@ pub struct Swept {
     pub error: Option<Quartiles>,
     pub residual_norm: Option<Quartiles>,
     pub parameters: BTreeMap<String, Option<Quartiles>>,
-    pub models: Vec<Model>,
+    pub models: Vec<SweptModel>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -51,7 +51,7 @@ pub struct Quartiles {
 
 /// One model of the sweep.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Model {
+pub struct SweptModel {
     /// Seed of its initial weights.
     pub seed: u64,
     /// Weight alpha of the penalty, or the initial lambda; none for a model without a residual.
@@ -64,25 +64,29 @@ pub struct Model {
     pub diverged: bool,
 }
 
-impl Swept {
+impl SweepResults {
     /// Summarises the `trained` models of a sweep of `job`, one per member, after `wall_s` seconds of training.
     pub fn new(job: &Job, members: &[Member], trained: Vec<Trained>, wall_s: f64) -> Self {
         let declared = job.model.declared();
         let fit = &job.recipe.fit;
         let alpha = |member: &Member| member.alpha.unwrap_or(fit.penalty.initial());
-        let models = members.iter().zip(trained).map(|(member, trained)| Model {
-            seed: member.seed,
-            alpha: (job.recipe.kind == Kind::Hybrid).then(|| alpha(member)),
-            error: trained.error,
-            residual_norm: trained.residual_norm,
-            parameters: (declared.iter().map(|p| p.name.clone()))
-                .zip(trained.parameters)
-                .collect(),
-            diverged: trained.diverged,
-        });
-        let models: Vec<Model> = models.collect();
-        let sound: Vec<&Model> = models.iter().filter(|model| !model.diverged).collect();
-        let of = |number: &dyn Fn(&Model) -> f64| Quartiles::of(sound.iter().map(|m| number(m)));
+        let models = members
+            .iter()
+            .zip(trained)
+            .map(|(member, trained)| SweptModel {
+                seed: member.seed,
+                alpha: (job.recipe.kind == Kind::Hybrid).then(|| alpha(member)),
+                error: trained.error,
+                residual_norm: trained.residual_norm,
+                parameters: (declared.iter().map(|p| p.name.clone()))
+                    .zip(trained.parameters)
+                    .collect(),
+                diverged: trained.diverged,
+            });
+        let models: Vec<SweptModel> = models.collect();
+        let sound: Vec<&SweptModel> = models.iter().filter(|model| !model.diverged).collect();
+        let of =
+            |number: &dyn Fn(&SweptModel) -> f64| Quartiles::of(sound.iter().map(|m| number(m)));
         let parameters = declared.iter().map(|p| {
             let name = p.name.clone();
             (name, of(&|model| model.parameters[&p.name]))
@@ -94,7 +98,7 @@ impl Swept {
             kind: job.recipe.kind,
             config: config(job),
             seed: job.origin.seed,
-            segments: job.material.training.len(),
+            segments: job.data.training.len(),
             totals: Totals {
                 models: models.len(),
                 diverged: models.len() - sound.len(),

@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::{Case, Closed, Contestant, Experiment, Lab, Trial};
+use super::{Case, Closed, Experiment, PlanningModel, Trial};
 use crate::data::statistics::{bootstrap, mean, sample_deviation};
 use crate::runs::{Purpose, stream};
 
@@ -11,7 +11,7 @@ pub const TARGET: f64 = 0.9;
 
 /// The results of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct Results {
     pub schema: u32,
     /// Version of the program that wrote it.
     pub residyn: String,
@@ -19,12 +19,12 @@ pub struct Outcome {
     pub target: f64,
     /// Whether the target is reached in every case with a loss.
     pub reached: bool,
-    pub cases: Vec<OutcomeOfCase>,
+    pub cases: Vec<CaseResults>,
 }
 
 /// The results for one plant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OutcomeOfCase {
+pub struct CaseResults {
     pub case: Case,
     /// Return with the true model minus return with the declared one, mean over the seeds.
     pub loss: f64,
@@ -40,7 +40,7 @@ pub struct OutcomeOfCase {
 /// The returns of a model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Compared {
-    pub model: Contestant,
+    pub model: PlanningModel,
     /// Number of episodes that it was fitted to.
     pub episodes: usize,
     /// One per seed.
@@ -50,29 +50,29 @@ pub struct Compared {
     /// Number of episodes in which the goal was held until the end.
     pub successes: usize,
     /// None for the declared and the true model, and where nothing is lost.
-    pub won_back: Option<WonBack>,
+    pub won_back: Option<Recovered>,
 }
 
 /// The share of the lost return that a model wins back.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct WonBack {
+pub struct Recovered {
     /// Ratio of means over the seeds; 1 if the whole loss is won back.
     pub share: f64,
     pub ci95: [f64; 2],
 }
 
-impl Outcome {
-    pub(super) fn new(lab: &Lab, trials: &[Trial]) -> Self {
+impl Results {
+    pub(super) fn new(experiment: &Experiment, trials: &[Trial]) -> Self {
         let of_case = |case: &Case| {
             let own: Vec<&Trial> = trials.iter().filter(|t| t.case == case.name).collect();
-            OutcomeOfCase::new(case, &own)
+            CaseResults::new(case, &own)
         };
-        let cases: Vec<OutcomeOfCase> = lab.experiment.cases.iter().map(of_case).collect();
-        let first = lab.experiment.episodes[0];
+        let cases: Vec<CaseResults> = experiment.cases.iter().map(of_case).collect();
+        let first = experiment.episodes[0];
         Self {
             schema: 1,
             residyn: env!("CARGO_PKG_VERSION").to_owned(),
-            config: lab.experiment.clone(),
+            config: experiment.clone(),
             target: TARGET,
             reached: cases
                 .iter()
@@ -99,7 +99,7 @@ impl Outcome {
     }
 }
 
-impl OutcomeOfCase {
+impl CaseResults {
     fn new(case: &Case, trials: &[&Trial]) -> Self {
         let mut models: Vec<Compared> = (0..trials[0].scores.len())
             .map(|k| Compared::new(trials, k))
@@ -122,7 +122,7 @@ impl OutcomeOfCase {
             .filter(|model| is_lost && model.episodes > 0);
         for model in learnt {
             let share = |drawn: &[usize]| of(&model.returns, drawn) / of(&truth, drawn);
-            model.won_back = Some(WonBack {
+            model.won_back = Some(Recovered {
                 share: share(&all),
                 ci95: bootstrap(seeds, &mut rng, share),
             });
@@ -140,7 +140,7 @@ impl OutcomeOfCase {
 
     /// The share that the closed model wins back after this number of episodes; none where nothing is lost.
     fn share(&self, episodes: usize) -> Option<f64> {
-        let is_it = |m: &&Compared| m.model == Contestant::Closed && m.episodes == episodes;
+        let is_it = |m: &&Compared| m.model == PlanningModel::Closed && m.episodes == episodes;
         let model = self.models.iter().find(is_it)?;
         model.won_back.map(|won| won.share)
     }
@@ -173,14 +173,14 @@ impl Compared {
     /// Collects the k-th model of every trial.
     fn new(trials: &[&Trial], k: usize) -> Self {
         let scores = || trials.iter().map(|trial| &trial.scores[k]);
-        let returns: Vec<f64> = scores().map(|score| score.judged.total).collect();
+        let returns: Vec<f64> = scores().map(|score| score.episode.total).collect();
         let first = &trials[0].scores[k];
         Self {
             model: first.model,
             episodes: first.episodes,
             mean: mean(&returns),
             deviation: sample_deviation(&returns),
-            successes: scores().filter(|score| score.judged.success).count(),
+            successes: scores().filter(|score| score.episode.success).count(),
             won_back: None,
             returns,
         }
@@ -200,7 +200,7 @@ impl Compared {
             self.successes,
             self.returns.len()
         );
-        if let Some(WonBack { share, ci95 }) = self.won_back {
+        if let Some(Recovered { share, ci95 }) = self.won_back {
             let [share, low, high] = [share, ci95[0], ci95[1]].map(|x| 100.0 * x);
             let _ = write!(out, ", won back {share:.0} % ({low:.0} to {high:.0})");
         }

@@ -10,8 +10,8 @@ use crate::runs::{Purpose, stream};
 use crate::sim::as_modelled;
 use crate::train::{Segments, SegmentsError};
 
-/// The data of a recipe, ready for training.
-pub struct Material {
+/// The data of a recipe, read or sampled.
+pub struct TrainingData {
     pub training: Segments,
     /// The same number of other segments of the plant, for testing; none with logs.
     pub test: Option<Segments>,
@@ -21,38 +21,38 @@ pub struct Material {
     pub notes: Vec<String>,
 }
 
-impl Material {
+impl TrainingData {
     /// Reads the logs or samples the plant.
     ///
     /// # Errors
     /// Unreadable logs, logs that are too short, another number of joints, or a plant that diverges.
-    pub fn gather(
+    pub fn load(
         recipe: &Recipe,
-        system: &Model,
+        model: &Model,
         library: &Library,
         seed: u64,
     ) -> Result<Self, RecipeError> {
         match &recipe.data {
-            Data::Logged(logged) => from_logs(recipe, logged, system),
-            Data::Simulated(simulated) => from_plant(recipe, simulated, system, library, seed),
+            Data::Logged(logged) => from_logs(recipe, logged, model),
+            Data::Simulated(simulated) => from_plant(recipe, simulated, model, library, seed),
         }
     }
 }
 
-fn from_logs(recipe: &Recipe, logged: &Logged, system: &Model) -> Result<Material, RecipeError> {
-    let read = |path: &PathBuf| system.read_log(beside(&recipe.path, path));
+fn from_logs(recipe: &Recipe, logged: &Logged, model: &Model) -> Result<TrainingData, RecipeError> {
+    let read = |path: &PathBuf| model.read_log(beside(&recipe.path, path));
     let logs: Vec<Log> = logged.logs.iter().map(read).collect::<Result<_, _>>()?;
     let thinning = Thinning {
         step_s: logged.step_s,
         length_s: f64::INFINITY,
     };
-    let dynamics = system.dynamics();
+    let dynamics = model.dynamics();
     let modelled = |log: &Log| match recipe.kind {
         // A network alone has no effects: it learns from the commanded torques and the sensor readings.
         Kind::DataDriven => log.clone(),
         Kind::Hybrid | Kind::Physics => as_modelled(&dynamics, log),
     };
-    let mut training = Segments::new(system.joints, logged.steps);
+    let mut training = Segments::new(model.joints, logged.steps);
     for log in &logs {
         let before = training.len();
         for trajectory in trajectories(&modelled(log), thinning) {
@@ -71,7 +71,7 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &Model) -> Result<Materia
             .iter()
             .map(|note| format!("{}: {note}", log.name()))
     });
-    Ok(Material {
+    Ok(TrainingData {
         training,
         test: None,
         truth: Vec::new(),
@@ -82,33 +82,33 @@ fn from_logs(recipe: &Recipe, logged: &Logged, system: &Model) -> Result<Materia
 fn from_plant(
     recipe: &Recipe,
     simulated: &Simulated,
-    system: &Model,
+    model: &Model,
     library: &Library,
     seed: u64,
-) -> Result<Material, RecipeError> {
+) -> Result<TrainingData, RecipeError> {
     let of_plant = |source| RecipeError::Plant {
         path: recipe.path.clone(),
         source,
     };
     let path = beside_or_named(&recipe.path, &simulated.plant);
     let plant = Plant::read(&path, library).map_err(of_plant)?;
-    if plant.system.name != system.name || plant.system.joints != system.joints {
+    if plant.system.name != model.name || plant.system.joints != model.joints {
         return Err(recipe.wrong(format!(
             "[data]: the plant's system is {} with {} joints, but `model` is {} with {}; name a plant of the \
              same system",
-            plant.system.name, plant.system.joints, system.name, system.joints
+            plant.system.name, plant.system.joints, model.name, model.joints
         )));
     }
     let draw = |purpose| {
         let drawn = plant.sample(&simulated.sampling, &mut stream(seed, purpose));
-        let mut segments = Segments::new(system.joints, simulated.steps);
+        let mut segments = Segments::new(model.joints, simulated.steps);
         for trajectory in drawn.map_err(of_plant)? {
             push(&mut segments, &trajectory).map_err(in_file(&recipe.path))?;
         }
         Ok::<_, RecipeError>(segments)
     };
     let names = plant.system.parameters.iter().map(|p| p.name.clone());
-    Ok(Material {
+    Ok(TrainingData {
         training: draw(Purpose::RecipeTraining)?,
         test: Some(draw(Purpose::RecipeTest)?),
         truth: names.zip(plant.parameters.iter().copied()).collect(),

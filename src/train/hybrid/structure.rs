@@ -1,29 +1,29 @@
 use crate::expr::{Graph, Node, Program};
 use crate::model::{Dynamics, MlpWeights, Parameter, nothing_but};
 
-/// A hybrid model without its learnable numbers, for those who carry out its networks themselves: one program for
-/// everything around them, and its derivative.
+/// A hybrid model without its learnable numbers: declared equations and networks, and one program, with its derivative,
+/// for everything but the networks.
 #[derive(Debug)]
-pub(crate) struct Frame {
+pub(crate) struct Structure {
     /// Name of the system.
     pub system: String,
     pub joints: usize,
-    /// The prior as declared, where it is equations.
+    /// The prior as declared, if it is equations.
     pub equations: Option<Dynamics>,
     /// The networks whose outputs are added to the last of the rates: the prior, where it is one, and the residual.
     pub networks: Vec<MlpWeights>,
-    /// Whether the last of them is a residual.
+    /// Whether the last network is a residual.
     pub has_residual: bool,
     /// Inputs as in [`Dynamics`]. Outputs: `2n` rates without the networks, then the scaled features of each network.
     pub program: Program,
-    /// Inputs: those of `program`, but before the parameters the derivative of a number by each of its outputs. Outputs:
-    /// that number's derivatives by the `2n` states, then by each parameter that is not fixed.
+    /// The reverse derivative of `program`. Inputs: those of `program`, with the derivatives of a quantity by each output
+    /// before the parameters. Outputs: its derivatives by the `2n` states, then by each parameter that is not fixed.
     pub adjoint: Program,
-    /// As `adjoint`, by the parameters alone.
+    /// `adjoint` by the parameters alone.
     pub parameter_adjoint: Program,
 }
 
-impl Frame {
+impl Structure {
     /// Equations alone.
     pub(super) fn of_equations(dynamics: &Dynamics) -> Self {
         let (system, joints) = (dynamics.name.clone(), dynamics.joints);
@@ -50,7 +50,7 @@ impl Frame {
         equations.map_or(&[], |dynamics| &dynamics.parameters)
     }
 
-    /// The prior as it was made, where it is a network.
+    /// The initial network of the prior, where it is one.
     pub(super) fn prior(&self) -> Option<&MlpWeights> {
         match self.equations {
             Some(_) => None,
@@ -58,7 +58,7 @@ impl Frame {
         }
     }
 
-    /// The residual as it was made.
+    /// The initial network of the residual.
     pub(super) fn residual(&self) -> Option<&MlpWeights> {
         self.networks.last().filter(|_| self.has_residual)
     }
@@ -71,15 +71,15 @@ impl Frame {
         has_residual: bool,
     ) -> Self {
         let parameters = equations.as_ref().map_or(&[][..], |d| &d.parameters);
-        let mut outline = Outline::new(joints, parameters);
+        let mut builder = Builder::new(joints, parameters);
         let mut outputs = match &equations {
-            Some(dynamics) => outline.append(&dynamics.program),
-            None => outline.append(&nothing_but(&system, joints, networks[0].on).program),
+            Some(dynamics) => builder.append(&dynamics.program),
+            None => builder.append(&nothing_but(&system, joints, networks[0].on).program),
         };
         for network in &networks {
-            outputs.extend(outline.features(network));
+            outputs.extend(builder.features(network));
         }
-        let program = outline.graph.finish(&outputs);
+        let program = builder.graph.finish(&outputs);
         let (adjoint, parameter_adjoint) = adjoints(&program, joints, parameters);
         Self {
             system,
@@ -94,14 +94,14 @@ impl Frame {
     }
 }
 
-/// The program while it grows.
-struct Outline {
+/// The program under construction.
+struct Builder {
     graph: Graph,
     joints: usize,
     inputs: Vec<Node>,
 }
 
-impl Outline {
+impl Builder {
     fn new(joints: usize, parameters: &[Parameter]) -> Self {
         let mut graph = Graph::new();
         let mut inputs = Vec::new();

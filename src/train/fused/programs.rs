@@ -1,33 +1,29 @@
 use crate::expr::{Program, Tape};
 use crate::sim::batch::W;
-use crate::train::Frame;
+use crate::train::Structure;
 
-/// The programs of a frame, ready to run.
+/// The programs of a structure as tapes, one for each thread.
 #[derive(Debug)]
-pub(super) struct Tapes {
+pub(super) struct Programs {
     pub program: Tape<'static, f32, W>,
     pub adjoint: Tape<'static, f32, W>,
     pub parameter_adjoint: Tape<'static, f32, W>,
-    /// Of the parameters, the last inputs of each.
-    count: usize,
 }
 
-impl Tapes {
-    pub(super) fn new(frame: &Frame) -> Self {
-        let count = frame.parameters().len();
+impl Programs {
+    pub(super) fn new(structure: &Structure) -> Self {
         let tape = |program: &Program| {
-            let first = program.inputs().len() - count;
+            let first = program.inputs().len() - structure.parameters().len();
             program.tape_with_held(first).into_owned()
         };
         Self {
-            program: tape(&frame.program),
-            adjoint: tape(&frame.adjoint),
-            parameter_adjoint: tape(&frame.parameter_adjoint),
-            count,
+            program: tape(&structure.program),
+            adjoint: tape(&structure.adjoint),
+            parameter_adjoint: tape(&structure.parameter_adjoint),
         }
     }
 
-    /// Put the parameters in place.
+    /// Sets the parameters, in their units: the last inputs of each program.
     pub(super) fn set_parameters(&mut self, parameters: &[f32]) {
         for tape in [
             &mut self.program,
@@ -35,7 +31,7 @@ impl Tapes {
             &mut self.parameter_adjoint,
         ] {
             let inputs = tape.inputs();
-            let first = inputs.len() - self.count;
+            let first = inputs.len() - parameters.len();
             for (input, value) in inputs[first..].iter_mut().zip(parameters) {
                 input.fill(*value);
             }

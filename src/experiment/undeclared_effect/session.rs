@@ -1,16 +1,13 @@
-use rayon::prelude::*;
-
-use super::{Case, Experiment, Outcome, Trial};
+use super::{Case, Experiment};
 use crate::control::Task;
 use crate::experiment::ExperimentError;
 use crate::files::beside_or_named;
 use crate::model::{Library, Model};
 use crate::plant::Plant;
-use crate::runs::RunFolder;
 use crate::train::Backend;
 
 /// An experiment with everything it refers to read and checked.
-pub struct Lab {
+pub struct Session {
     pub experiment: Experiment,
     pub library: Library,
     pub declared: Model,
@@ -23,7 +20,7 @@ pub struct Lab {
     pub first_seed: u64,
 }
 
-impl Lab {
+impl Session {
     /// Reads everything that the experiment refers to. The seeds are `first_seed` and those that follow.
     ///
     /// # Errors
@@ -44,13 +41,13 @@ impl Lab {
             )));
         }
         let plant = |case: &Case| -> Result<Plant, ExperimentError> {
-            let told =
+            let wrong =
                 |message: String| experiment.wrong(format!("case `{}`: {message}", case.name));
             let mut plant =
-                Plant::read(&model, &library).map_err(|error| told(error.to_string()))?;
-            plant.set_parameters(&case.parameters).map_err(told)?;
+                Plant::read(&model, &library).map_err(|error| wrong(error.to_string()))?;
+            plant.set_parameters(&case.parameters).map_err(wrong)?;
             let hidden = plant.hide(&library, &case.effects);
-            hidden.map_err(|error| told(error.to_string()))?;
+            hidden.map_err(|error| wrong(error.to_string()))?;
             Ok(plant)
         };
         let plants = experiment
@@ -67,32 +64,5 @@ impl Lab {
             backend,
             first_seed,
         })
-    }
-
-    /// Carries out the trials that are not in the folder yet. `observer` is called after each trial.
-    ///
-    /// # Errors
-    /// A trial that cannot be carried out, or a folder that cannot be written or holds another run.
-    pub fn run(
-        &self,
-        folder: &RunFolder,
-        observer: &(impl Fn(&Trial) + Sync),
-    ) -> Result<Outcome, ExperimentError> {
-        folder.claim(&self.identity())?;
-        let runs = folder.within("runs");
-        let cases = 0..self.experiment.cases.len();
-        let trials: Vec<(usize, u64)> = cases
-            .flat_map(|case| (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k)))
-            .collect();
-        let trial = |&(case, seed): &(usize, u64)| {
-            let trial = self.trial_in(&runs, case, seed)?;
-            observer(&trial);
-            Ok(trial)
-        };
-        let trials: Vec<Trial> = trials
-            .par_iter()
-            .map(trial)
-            .collect::<Result<_, ExperimentError>>()?;
-        Ok(Outcome::new(self, &trials))
     }
 }

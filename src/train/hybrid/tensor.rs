@@ -1,0 +1,50 @@
+//! Numbers as tensors and back. Training runs in f32.
+
+use burn::tensor::{Device, Tensor, TensorData};
+
+use crate::model;
+
+pub(in crate::train) fn vector(values: &[f64], device: &Device) -> Tensor<1> {
+    tensor(values, [values.len()], device)
+}
+
+/// The values row after row.
+pub(super) fn tensor<const D: usize>(
+    values: &[f64],
+    shape: [usize; D],
+    device: &Device,
+) -> Tensor<D> {
+    Tensor::from_data(TensorData::new(model::to_f32(values), shape), device)
+}
+
+pub(super) fn vector_of_f32(values: &[f32], device: &Device) -> Tensor<1> {
+    Tensor::from_data(TensorData::new(values.to_vec(), [values.len()]), device)
+}
+
+/// The entries of a tensor, row after row.
+pub(in crate::train) fn to_f32<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    let data = tensor.into_data();
+    data.try_into_vec().expect("training runs in f32")
+}
+
+/// The same in f64.
+pub(in crate::train) fn to_f64<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
+    to_f32(tensor).into_iter().map(f64::from).collect()
+}
+
+/// A vector as so many equal rows of a matrix; none of an empty vector, since Burn has no empty matrices.
+pub(super) fn rows_of(vector: Tensor<1>, rows: usize) -> Option<Tensor<2>> {
+    let width = vector.dims()[0];
+    (width > 0).then(|| vector.expand([rows, width]))
+}
+
+/// The columns of a matrix `[batch, width]`.
+pub(super) fn columns(matrix: Tensor<2>) -> Vec<Tensor<1>> {
+    let [batch, width] = matrix.dims();
+    if width == 1 {
+        return vec![matrix.reshape([batch])];
+    }
+    (0..width)
+        .map(|k| matrix.clone().slice([0..batch, k..k + 1]).reshape([batch]))
+        .collect()
+}
