@@ -58,7 +58,7 @@ const NOT_IN_THE_EQUATIONS: [&str; 5] = [
 const NEAR: f64 = 1e-4;
 
 #[test]
-fn rigs_and_model_files_mean_the_same_by_every_effect_though_they_share_no_code() {
+fn bench_rigs_and_effect_files_agree_on_every_effect() {
     let library = Library::built_in();
     let mut compared = 0;
     for mut cell in read(&path("effects.toml")).unwrap() {
@@ -160,7 +160,7 @@ fn a_wrong_grid_or_selection_is_refused() {
 }
 
 #[test]
-fn logs_of_another_program_are_cells_too() {
+fn logs_recorded_by_another_program_are_cells() {
     let folder = tempfile::tempdir().unwrap();
     let rig = folder.path().join("rig-01");
     std::fs::create_dir(&rig).unwrap();

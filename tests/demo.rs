@@ -53,7 +53,7 @@ fn the_same_seed_gives_the_same_report() {
 }
 
 #[test]
-fn simulations_of_the_accepted_model_show_what_the_logs_could() {
+fn calibration_reports_false_alarms_and_detection_limits() {
     let folder = tempfile::tempdir().unwrap();
     let calibrated = |seed: &str, name: &str| {
         let out = folder.path().join(name);
@@ -100,7 +100,7 @@ fn a_calibration_of_no_runs_is_refused() {
 }
 
 #[test]
-fn what_was_written_is_taken_by_other_commands() {
+fn other_commands_read_the_written_files() {
     let (report, folder) = demo("4");
     let out = folder.path().join("report");
     for file in [

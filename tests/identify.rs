@@ -79,7 +79,7 @@ fn assert_recovered(model: &Dynamics, logs: &[Log], active: &[usize]) {
 }
 
 #[test]
-fn parameters_of_noise_free_logs_come_back() {
+fn parameters_of_noise_free_logs_are_recovered() {
     for name in ["pendulum", "drive"] {
         let model = dynamics(&system(name), &[], SignForm::Exact);
         assert_recovered(&model, &logs(&model, 2.0), &free(&model));
@@ -87,7 +87,7 @@ fn parameters_of_noise_free_logs_come_back() {
 }
 
 #[test]
-fn parameters_of_effects_come_back_with_them() {
+fn parameters_of_effects_are_recovered() {
     let library = Library::built_in();
     let effect = |name: &str, values: &[f64]| fitted(library.effect(name).unwrap(), 0, values);
     let effects = [
@@ -187,7 +187,7 @@ fn covered(model: &Dynamics, clean: &Log, seed: u64) -> (Vec<bool>, f64) {
 }
 
 #[test]
-fn intervals_hold_the_truth_as_often_as_they_say() {
+fn intervals_have_their_nominal_coverage() {
     const SEEDS: usize = 60;
     let library = Library::built_in();
     let friction = fitted(library.effect("viscous_friction").unwrap(), 0, &[0.05]);
@@ -226,7 +226,7 @@ fn offset_logs(model: &Dynamics, seed: u64) -> Vec<Log> {
 }
 
 #[test]
-fn offsets_come_back_log_by_log_with_honest_intervals() {
+fn offsets_are_recovered_per_log_with_nominal_coverage() {
     const SEEDS: u64 = 40;
     let library = Library::built_in();
     let offset = fitted(library.effect("sensor_offset").unwrap(), 0, &[0.0]);

@@ -100,7 +100,7 @@ fn noise_is_not_significant() {
 
 /// An effect of the library that the model has leaves nothing that matters, sharper though the rig's friction is.
 #[test]
-fn an_effect_that_was_found_leaves_nothing() {
+fn a_found_effect_leaves_no_remainder() {
     for seed in 0..3 {
         let logs = logs(QUANTISED, "-0.16*size*sign(qd)", seed);
         let left = left(&logs, &["coulomb_friction"], seed);
@@ -204,7 +204,7 @@ fn logs_of_first(model: &str, seed: u64) -> Vec<Log> {
 /// What has a state of its own is no function of angle, speed, torque and time; it is seen all the same, beside
 /// the effects that come nearest.
 #[test]
-fn what_has_a_memory_is_not_taken_for_noise() {
+fn effects_with_internal_state_are_not_taken_for_noise() {
     for model in [COMPLIANT, PRESLIDING] {
         let logs = logs_of_first(model, 1);
         for effects in [&[][..], &["viscous_friction", "coulomb_friction"]] {

@@ -26,10 +26,16 @@ pub fn answer(outcome: &Outcome) -> Answer {
             .iter()
             .map(|alternative| set(&alternative.effects))
             .collect(),
-        declared: (outcome.models.after.absorbed().all_parameters().iter())
-            .filter(is_declared)
-            .map(|parameter| estimate(&parameter.name, parameter))
-            .collect(),
+        declared: (outcome
+            .models
+            .after
+            .model
+            .absorbed()
+            .all_parameters()
+            .iter())
+        .filter(is_declared)
+        .map(|parameter| estimate(&parameter.name, parameter))
+        .collect(),
         left: outcome.remainder.unexplained.fraction,
         left_p_value: outcome.remainder.unexplained.p_value,
         left_where: outcome.remainder.unexplained.place.clone(),

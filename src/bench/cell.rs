@@ -48,10 +48,10 @@ impl Cell {
     ///
     /// # Panics
     /// Never: the effects were checked when the grid was read.
-    pub fn record(&self, system: &Model) -> Result<(Vec<Log>, Truth), LogError> {
+    pub fn record(&self, model: &Model) -> Result<(Vec<Log>, Truth), LogError> {
         match &self.source {
             Source::Files { logs, declared } => {
-                let read = |path| system.read_log(path);
+                let read = |path| model.read_log(path);
                 let logs = logs.iter().map(read).collect::<Result<_, _>>()?;
                 Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
             }
@@ -90,18 +90,18 @@ impl Cell {
     /// # Errors
     /// A model file or log that cannot be read, or logs on which closing the loop fails.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
-        let system = library.model(&self.model)?;
-        let (logs, truth) = self.record(&system)?;
+        let model = library.model(&self.model)?;
+        let (logs, truth) = self.record(&model)?;
         let mut split = Split::given(logs, Vec::new());
         split.test.extend(split.train.pop());
-        let outcome = close(&system, library, split.clone(), self.seed)?;
+        let outcome = close(&model, library, split.clone(), self.seed)?;
         let answer = answer(&outcome);
         Ok(Findings {
             judgement: judge(self.group, &truth, &answer),
             errors: Errors {
                 before: outcome.errors.before.position_rms(),
                 after: outcome.errors.after.position_rms(),
-                told: told(&system, library, &split, &self.effects),
+                told: told(&model, library, &split, &self.effects),
             },
             truth,
             answer,
@@ -109,13 +109,8 @@ impl Cell {
     }
 }
 
-/// The system under test.
-fn close(
-    system: &Model,
-    library: &Library,
-    split: Split,
-    seed: u64,
-) -> Result<Outcome, StudyError> {
-    let request = Request::new(system, library, split);
+/// What is tested.
+fn close(model: &Model, library: &Library, split: Split, seed: u64) -> Result<Outcome, StudyError> {
+    let request = Request::new(model, library, split);
     close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &mut |_| ())
 }

@@ -80,13 +80,13 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_drive_gives_what_it_is_told() {
+    fn an_ideal_drive_passes_the_command_through() {
         assert_eq!(Shape::default().at(-1.5, 3.0), -1.5);
         assert_eq!(Shape::default().at(0.0, 3.0), 0.0);
     }
 
     #[test]
-    fn gain_deadzone_and_saturation_are_those_of_their_definitions() {
+    fn gain_deadzone_and_saturation_follow_their_formulas() {
         assert_eq!(shape(|s| s.gain = 0.5).at(-2.0, 0.0), -3.0);
         let deadzone = shape(|s| s.deadzone = 0.5);
         assert_eq!(
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_is_whole_steps_and_a_rest() {
+    fn a_delay_splits_into_whole_steps_and_a_remainder() {
         assert_eq!(whole_steps(0.02, 0.01), (2, 0.0));
         let (steps, rest) = whole_steps(0.0137, 0.01);
         assert!(steps == 1 && (rest - 0.0037).abs() < 1e-15);

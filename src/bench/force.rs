@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn each_force_has_the_size_and_the_sign_of_its_definition() {
+    fn forces_follow_their_formulas() {
         assert_at(&Force::Viscous { b: 0.5 }, [0.3, 2.0, 0.0], -1.0);
         let slopes = Force::TwoSlopes { b_p: 0.5, b_n: 0.2 };
         assert_at(&slopes, [0.3, 2.0, 0.0], -1.0);

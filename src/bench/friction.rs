@@ -72,7 +72,7 @@ mod tests {
     use super::{DryFriction, Presliding};
 
     #[test]
-    fn each_level_is_that_of_its_definition() {
+    fn friction_levels_follow_their_formulas() {
         let level = |friction: DryFriction, direction| friction.level(direction, 0.5, 0.3, -2.0);
         assert_eq!(level(DryFriction::Coulomb { level: 0.1 }, 1.0), 0.1);
         let stribeck = DryFriction::Stribeck {
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn bent_bristles_are_a_spring_and_slip_at_the_level() {
+    fn bristles_are_a_spring_that_slips_at_the_friction_level() {
         let friction = Presliding {
             level: 0.2,
             stiffness: 10.0,

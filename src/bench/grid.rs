@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_series_is_every_set_of_effects_with_every_seed() {
+    fn a_series_combines_all_sets_of_effects_with_all_seeds() {
         let all = cells(Path::new("grid.toml"), GRID).unwrap();
         let ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
         assert_eq!(
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grid_that_asks_for_what_there_is_not_is_refused_with_the_place() {
+    fn unknown_names_in_a_grid_are_refused_with_their_place() {
         let wrong = |from: &str, to: &str| message(&GRID.replace(from, to));
         assert_eq!(
             wrong("F_c = 0.1", "f = 0.1"),

@@ -51,6 +51,61 @@ impl Numbers<'_> {
         self.left.remove(name).ok_or_else(missing)
     }
 
+    /// The smooth torque of the effect, if it has one.
+    fn force(&mut self) -> Result<Option<Force>, String> {
+        let of = self.of;
+        let mut n = |name: &str| self.take(name);
+        Ok(Some(match of.name.as_str() {
+            "viscous_friction" => Force::Viscous { b: n("b")? },
+            "asymmetric_friction" => Force::TwoSlopes {
+                b_p: n("b_p")?,
+                b_n: n("b_n")?,
+            },
+            "quadratic_drag" => Force::QuadraticDrag { c: n("c")? },
+            "cubic_damping" => Force::CubicDamping { c: n("c")? },
+            "joint_spring" => Force::Spring {
+                k: n("k")?,
+                q_0: n("q_0")?,
+            },
+            "constant_torque" => Force::Constant { tau_0: n("tau_0")? },
+            "cogging_torque" | "fractional_ripple" => Force::Ripple {
+                amplitude: n("A")?,
+                periods: n("N")?,
+                phase: n("phase")?,
+            },
+            "periodic_disturbance" => Force::Hum {
+                amplitude: n("A")?,
+                frequency_hz: n("f")?,
+                phase: n("phase")?,
+            },
+            _ => return Ok(None),
+        }))
+    }
+
+    /// The dry friction of the effect, if it has any.
+    fn dry_friction(&mut self) -> Result<Option<DryFriction>, String> {
+        let of = self.of;
+        let mut n = |name: &str| self.take(name);
+        Ok(Some(match of.name.as_str() {
+            "coulomb_friction" => DryFriction::Coulomb { level: n("F_c")? },
+            "stribeck_friction" => DryFriction::Stribeck {
+                f_c: n("F_c")?,
+                f_s: n("F_s")?,
+                v_s: n("v_s")?,
+            },
+            "asymmetric_friction" => DryFriction::Asymmetric {
+                forward: n("F_p")?,
+                backward: n("F_n")?,
+            },
+            "load_friction" => DryFriction::Load { share: n("k")? },
+            "uneven_friction" => DryFriction::Uneven {
+                level: n("F")?,
+                share: n("a")?,
+            },
+            _ => return Ok(None),
+        }))
+    }
+
     fn none_left(&self) -> Result<(), String> {
         match self.left.keys().next() {
             Some(name) => Err(format!("`{}` has no `{name}`", self.of.name)),
@@ -86,62 +141,21 @@ impl Machine {
             of: hidden,
             left: hidden.values.clone(),
         };
+        let (force, friction) = (numbers.force()?, numbers.dry_friction()?);
+        if force.is_none() && friction.is_none() {
+            self.change(hidden, &mut numbers)?;
+        }
+        self.forces.extend(force.map(|force| (j, force)));
+        self.dry.extend(friction.map(|friction| (j, friction)));
+        numbers.none_left()
+    }
+
+    /// Add an effect that is neither a smooth torque nor dry friction.
+    fn change(&mut self, hidden: &Hidden, numbers: &mut Numbers<'_>) -> Result<(), String> {
+        let j = hidden.joint.index();
         let mut n = |name: &str| numbers.take(name);
         let drive = &mut self.drives[j];
         match hidden.name.as_str() {
-            "viscous_friction" => self.forces.push((j, Force::Viscous { b: n("b")? })),
-            "quadratic_drag" => self.forces.push((j, Force::QuadraticDrag { c: n("c")? })),
-            "cubic_damping" => self.forces.push((j, Force::CubicDamping { c: n("c")? })),
-            "joint_spring" => {
-                let (k, q_0) = (n("k")?, n("q_0")?);
-                self.forces.push((j, Force::Spring { k, q_0 }));
-            }
-            "constant_torque" => {
-                let tau_0 = n("tau_0")?;
-                self.forces.push((j, Force::Constant { tau_0 }));
-            }
-            "cogging_torque" | "fractional_ripple" => {
-                let (amplitude, periods, phase) = (n("A")?, n("N")?, n("phase")?);
-                self.forces.push((
-                    j,
-                    Force::Ripple {
-                        amplitude,
-                        periods,
-                        phase,
-                    },
-                ));
-            }
-            "periodic_disturbance" => {
-                let (amplitude, frequency_hz, phase) = (n("A")?, n("f")?, n("phase")?);
-                self.forces.push((
-                    j,
-                    Force::Hum {
-                        amplitude,
-                        frequency_hz,
-                        phase,
-                    },
-                ));
-            }
-            "coulomb_friction" => {
-                let level = n("F_c")?;
-                self.dry.push((j, DryFriction::Coulomb { level }));
-            }
-            "stribeck_friction" => {
-                let (f_c, f_s, v_s) = (n("F_c")?, n("F_s")?, n("v_s")?);
-                self.dry.push((j, DryFriction::Stribeck { f_c, f_s, v_s }));
-            }
-            "asymmetric_friction" => {
-                let (forward, backward) = (n("F_p")?, n("F_n")?);
-                self.dry
-                    .push((j, DryFriction::Asymmetric { forward, backward }));
-                let (b_p, b_n) = (n("b_p")?, n("b_n")?);
-                self.forces.push((j, Force::TwoSlopes { b_p, b_n }));
-            }
-            "load_friction" => self.dry.push((j, DryFriction::Load { share: n("k")? })),
-            "uneven_friction" => {
-                let (level, share) = (n("F")?, n("a")?);
-                self.dry.push((j, DryFriction::Uneven { level, share }));
-            }
             "presliding" => {
                 let (level, stiffness) = (n("F_c")?, n("sigma")?);
                 self.presliding.push((j, Presliding { level, stiffness }));
@@ -159,11 +173,11 @@ impl Machine {
                 let (stiffness, inertia) = (n("k")?, n("J")?);
                 self.transmissions[j] = Some(Transmission::compliance(stiffness, inertia));
             }
-            // Of the sensor, not of the machine: see `offsets`.
+            // Of the sensor, not of the machine: each log draws its own.
             "sensor_offset" => drop(n("q_z")?),
             name => return Err(format!("`{name}` is no effect of joint {}", hidden.joint)),
         }
-        numbers.none_left()
+        Ok(())
     }
 
     fn shift(&mut self, hidden: &Hidden) -> Result<(), String> {
@@ -218,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn every_effect_of_the_machine_pushes_the_way_its_definition_says() {
+    fn every_effect_changes_the_acceleration_in_its_direction() {
         let against = [
             hidden("viscous_friction", &[("b", 0.1)]),
             hidden("coulomb_friction", &[("F_c", 0.1)]),
@@ -264,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rotor_is_felt_by_its_own_joint_alone() {
+    fn rotor_inertia_acts_on_its_own_joint_alone() {
         let rotor = Machine::with(double_pendulum(), &[hidden("rotor_inertia", &[("J", 0.1)])]);
         let heavy = rotor.unwrap();
         let bare = Machine::bare(double_pendulum());
@@ -280,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shift_changes_the_rig_and_nothing_that_it_has_not() {
+    fn a_shift_of_an_unknown_parameter_is_refused() {
         let shifted = Machine::with(
             double_pendulum(),
             &[hidden("parameter_shift", &[("m2", 1.0)])],

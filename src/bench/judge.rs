@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_set_is_exact_and_its_intervals_are_asked() {
+    fn the_intervals_of_an_exact_answer_are_checked() {
         let values = [("F_c", 0.11, [0.105, 0.115])];
         let answer = answer(
             Verdict::Explained,
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn the_right_name_on_the_wrong_joint_is_wrong_and_missed() {
+    fn an_effect_on_the_wrong_joint_counts_as_wrong_and_missed() {
         let answer = answer(
             Verdict::Explained,
             vec![named("coulomb_friction@2", &[], 0.9)],
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_listed_alternative_is_within_but_an_addition_is_not() {
+    fn a_listed_alternative_counts_but_an_additional_effect_does_not() {
         let viscous = || named("viscous_friction@1", &[], 0.9);
         let listed: &[&[&str]] = &[&["coulomb_friction@1"]];
         let swapped = answer(Verdict::Explained, vec![viscous()], listed);
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn two_effects_for_one_are_within_where_that_whole_set_is_listed() {
+    fn one_effect_may_stand_for_two_where_that_set_is_listed() {
         let pair = truth(&[("coulomb_friction@1", &[]), ("viscous_friction@1", &[])]);
         let one = vec![named("asymmetric_friction@1", &[], 0.9)];
         let listed: &[&[&str]] = &[&["viscous_friction@1", "coulomb_friction@1"]];
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_the_library_a_flag_counts_and_weak_names_do_not_pass() {
+    fn outside_the_library_a_flag_passes_and_weak_effects_fail() {
         let cubic = truth(&[("cubic_damping@1", &[])]);
         let pass =
             |verdict, named| judge(Group::Outside, &cubic, &answer(verdict, named, &[])).passed;
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_is_asked_for_in_each_log() {
+    fn sensor_offsets_are_judged_per_log() {
         let hidden = Hidden {
             name: "sensor_offset".to_owned(),
             joint: Joint::at(1),
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ripple_is_the_same_with_the_other_sign_half_a_turn_on() {
+    fn a_ripple_of_opposite_sign_and_phase_is_recognised() {
         let ripple = truth(&[(
             "cogging_torque@1",
             &[("A", 0.1), ("N", 7.0), ("phase", 1.0)],

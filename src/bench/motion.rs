@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn halving_the_step_changes_nothing_that_a_sensor_sees() {
+    fn halving_the_step_changes_less_than_a_sensor_resolves() {
         let (coarse, fine) = (
             end_of_a_rich_motion(STEP_S),
             end_of_a_rich_motion(0.5 * STEP_S),
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_friction_can_carry_does_not_move_at_all() {
+    fn static_friction_holds_a_joint_exactly() {
         let mut machine = Machine::bare(pendulum());
         machine.dry.push((0, DryFriction::Coulomb { level: 0.5 }));
         let mut state = State::at_rest([0.1, 0.0]);
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sliding_joint_stops_and_stays_where_the_work_of_friction_has_used_up_its_energy() {
+    fn a_sliding_joint_stops_where_friction_has_dissipated_its_energy() {
         let mechanics = Mechanics::Pendulum {
             inertia: 0.2,
             moment: 0.0,
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn one_joint_can_be_held_while_the_other_moves_and_its_reaction_is_counted() {
+    fn a_held_joint_transmits_its_reaction_to_the_moving_one() {
         let mechanics = double_pendulum();
         let mut machine = Machine::bare(mechanics.clone());
         machine.dry.push((1, DryFriction::Coulomb { level: 50.0 }));
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn bristles_spring_back_where_dry_friction_would_hold() {
+    fn presliding_friction_springs_back() {
         let mut machine = Machine::bare(pendulum());
         let friction = Presliding {
             level: 0.5,
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn play_passes_no_torque_until_it_is_used_up() {
+    fn backlash_transmits_no_torque_within_its_play() {
         let mut machine = Machine::bare(pendulum());
         machine.transmissions[0] = Some(Transmission::backlash(0.02));
         let mut state = State::at_rest([0.0; 2]);

@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_of_part_of_a_step_mixes_neighbouring_torques() {
+    fn a_delay_of_part_of_a_step_splits_the_step_between_two_torques() {
         let mut machine = Machine::bare(crate::bench::mechanics::Mechanics::Pendulum {
             inertia: 1.0,
             moment: 0.0,
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_is_added_to_what_is_read_and_nothing_else_in_open_loop() {
+    fn a_sensor_offset_does_not_change_open_loop_motion() {
         let machine = Machine::bare(pendulum());
         let open = condition(Loop::Open);
         let (plain, off) = (record(&machine, &open, 0.0), record(&machine, &open, 0.05));
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn in_closed_loop_the_torque_answers_to_the_rig_within_its_limit() {
+    fn closed_loop_torque_depends_on_the_rig_and_respects_its_limit() {
         let closed = condition(Loop::Closed);
         let plain = record(&Machine::bare(pendulum()), &closed, 0.0);
         let mut rough = Machine::bare(pendulum());
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn encoders_are_noisy_or_coarse_as_asked_and_velocities_are_their_differences() {
+    fn encoders_have_the_configured_noise_and_step_and_velocities_are_differences() {
         let mut machine = Machine::bare(pendulum());
         machine.forces.push((0, Force::Viscous { b: 0.1 }));
         let clean = record(&machine, &condition(Loop::Open), 0.0);

@@ -77,7 +77,7 @@ pub struct Summary {
     pub errors: Vec<(String, String)>,
     pub rows: Vec<Row>,
     /// Error after over error of the true structure, 0.5 s ahead: median, 90 % quantile and largest over the
-    /// cells with an effect that the library knows.
+    /// cells with an effect of the library.
     pub held_out_ratio: Option<[f64; 3]>,
     /// Number of cells whose true structure the library cannot express.
     pub not_told: usize,

@@ -7,26 +7,30 @@ use crate::sim::metric::{Assessment, assess};
 
 /// Error of the model with the true effects, fitted from their true values to the logs that the search had:
 /// position, all joints together, at the middle horizon \[rad\]. `None` where the library lacks one of them.
-pub fn told(system: &Model, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
+pub fn told(declared: &Model, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
     let settings = Settings::default();
-    let mut study = Study::new(system, &split.train, &settings);
-    let declared = study.fit_declared().ok()?;
+    let mut study = Study::new(declared, &split.train, &settings);
+    let before = study.fit_declared().ok()?;
     let truth: Vec<FittedEffect> = effects
         .iter()
         .map(|hidden| fitted(&study, library, hidden))
         .collect::<Option<_>>()?;
-    let locals = declared.fit.locals.clone();
-    let model = study
-        .refit(&declared.with_effects(truth), locals, None)
+    let locals = before.fit.locals.clone();
+    let found = study
+        .refit(&before.model.with_effects(truth), locals, None)
         .ok()?;
-    let errors: Assessment = assess(&model.dynamics(), &split.test, &settings.score.horizons_s);
+    let errors: Assessment = assess(
+        &found.model.dynamics(),
+        &split.test,
+        &settings.score.horizons_s,
+    );
     Some(errors.position_rms())
 }
 
 /// The effect with its true values; `None` where the library has no such effect.
 fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     if hidden.name == "parameter_shift" {
-        return shift(study.system, hidden);
+        return shift(study.declared, hidden);
     }
     let joint = hidden.joint;
     let effect = library.effect(&hidden.name).ok()?;
@@ -45,10 +49,10 @@ fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<Fitte
     Some(fitted)
 }
 
-fn shift(system: &Model, hidden: &Hidden) -> Option<FittedEffect> {
+fn shift(model: &Model, hidden: &Hidden) -> Option<FittedEffect> {
     let (name, value) = hidden.values.first_key_value()?;
-    let declared = system.parameters.iter().find(|p| p.name == *name)?;
-    let mut shifts = system.shifts().into_iter();
+    let declared = model.parameters.iter().find(|p| p.name == *name)?;
+    let mut shifts = model.shifts().into_iter();
     let mut shift = shifts.find(|shift| shift.effect.parameters[0].name == *name)?;
     shift.values[0].0 = value - declared.value;
     Some(shift)

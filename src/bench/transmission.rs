@@ -59,7 +59,7 @@ mod tests {
     use super::Transmission;
 
     #[test]
-    fn nothing_passes_within_the_play_and_contacts_push_only() {
+    fn backlash_has_a_dead_band_and_contacts_only_push() {
         let gear = Transmission::backlash(0.01);
         assert_eq!(gear.torque(0.0049, 5.0), 0.0);
         assert_eq!(gear.torque(-0.0049, -5.0), 0.0);

@@ -22,8 +22,8 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let system = Library::built_in().model(&arguments.model)?;
-    let logs = inputs::logs(&arguments.logs, &system)?;
+    let model = Library::built_in().model(&arguments.model)?;
+    let logs = inputs::logs(&arguments.logs, &model)?;
     inputs::print_notes(&logs);
     let audits: Vec<Audit> = logs.iter().map(audit).collect();
     if arguments.common.json {

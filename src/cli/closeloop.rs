@@ -59,11 +59,11 @@ const DEMO: &str = include_str!("../../configs/demo.toml");
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let (system, split) = match &arguments.model {
+    let (declared, split) = match &arguments.model {
         Some(model) => measured(arguments, model, &library)?,
         None => demo(&library, &mut rng)?,
     };
-    let against = references(&arguments.against, &system, &library)?;
+    let against = references(&arguments.against, &declared, &library)?;
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let learner = ResidualTrainer {
         backend: arguments.common.device,
     };
-    let mut request = Request::new(&system, &library, split);
+    let mut request = Request::new(&declared, &library, split);
     request.against = against;
     request.learner = Some(&learner);
     let mut outcome = close_loop(request, &mut rng, &mut |now| {
@@ -80,12 +80,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bar.set_message(now.text.to_owned());
     })?;
     bar.finish_and_clear();
-    let origin = origin(arguments, &system);
+    let origin = origin(arguments, &declared);
     let mut report = report::write(&arguments.out, &outcome, &origin)?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
         let bar = progress::bar(runs.get());
-        let study = outcome.study(&system);
+        let study = outcome.study(&declared);
         let calibration = calibrate(
             &study,
             &outcome.models.after,
@@ -111,9 +111,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 }
 
 fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {
-    let system = library.model(model)?;
-    let mut train = inputs::logs(&arguments.train, &system)?;
-    let mut test = inputs::logs(&arguments.test, &system)?;
+    let declared = library.model(model)?;
+    let mut train = inputs::logs(&arguments.train, &declared)?;
+    let mut test = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     inputs::print_notes(train.iter().chain(&test));
     let split = if test.is_empty() {
@@ -121,7 +121,7 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
     } else {
         Split::given(train, test)
     };
-    Ok((system, split))
+    Ok((declared, split))
 }
 
 fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(Model, Split)> {
@@ -142,34 +142,34 @@ fn demo(library: &Library, rng: &mut ChaCha8Rng) -> Result<(Model, Split)> {
 }
 
 /// Models that predict the same joints, in the same units.
-fn references(paths: &[PathBuf], system: &Model, library: &Library) -> Result<Vec<Reference>> {
+fn references(paths: &[PathBuf], declared: &Model, library: &Library) -> Result<Vec<Reference>> {
     let reference = |path: &PathBuf| {
         let other = library.model(path)?;
-        if other.prismatic != system.prismatic {
+        if other.prismatic != declared.prismatic {
             bail!(
                 "--against {}: it has {}, {} has {}; give models of the same rig",
                 path.display(),
                 joints(&other),
-                system.name,
-                joints(system)
+                declared.name,
+                joints(declared)
             );
         }
         Ok(Reference {
             name: path.display().to_string(),
-            system: other,
+            model: other,
         })
     };
     paths.iter().map(reference).collect()
 }
 
 /// `2 joint(s) (slide, turn)`
-fn joints(system: &Model) -> String {
+fn joints(model: &Model) -> String {
     let kind = |slides: &bool| if *slides { "slide" } else { "turn" };
-    let kinds: Vec<&str> = system.prismatic.iter().map(kind).collect();
-    format!("{} joint(s) ({})", system.joints, kinds.join(", "))
+    let kinds: Vec<&str> = model.prismatic.iter().map(kind).collect();
+    format!("{} joint(s) ({})", model.joints, kinds.join(", "))
 }
 
-fn origin(arguments: &Arguments, system: &Model) -> Origin {
+fn origin(arguments: &Arguments, declared: &Model) -> Origin {
     let paths = |paths: &[PathBuf]| {
         paths
             .iter()
@@ -193,7 +193,7 @@ fn origin(arguments: &Arguments, system: &Model) -> Origin {
             "device": arguments.common.device.name(),
         }),
         seed: arguments.common.seed,
-        model_toml: system.declaration.clone(),
+        model_toml: declared.declaration.clone(),
     }
 }
 

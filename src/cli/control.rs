@@ -187,8 +187,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
             Ok(model.predictor(integrator))
         }
         Source::File(file) => {
-            let system = library.model(file)?;
-            let dynamics = system.dynamics();
+            let dynamics = library.model(file)?.dynamics();
             Ok(Predictor::of_equations(dynamics, task.integrator))
         }
     }

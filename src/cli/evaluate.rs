@@ -65,17 +65,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     {
         bail!("--horizon {bad}: a horizon is a number of seconds above zero");
     }
-    let (system, dynamics) = model(arguments)?;
-    let mut logs = inputs::logs(&arguments.test, &system)?;
+    let (declared, dynamics) = model(arguments)?;
+    let mut logs = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     inputs::print_notes(&logs);
     let offsets = arguments
         .calibrate
         .map(|share| calibrate(&dynamics, &mut logs, share))
         .transpose()?;
-    let model = offsets.as_ref().map_or(&dynamics, |found| &found.dynamics);
-    let assessment = assess(model, &logs, &arguments.horizon);
-    let summary = summarise(&assessment.horizons, system.joints);
+    let dynamics = offsets.as_ref().map_or(&dynamics, |found| &found.dynamics);
+    let assessment = assess(dynamics, &logs, &arguments.horizon);
+    let summary = summarise(&assessment.horizons, declared.joints);
     if let Some(h) = summary.windows.iter().position(|count| *count == 0) {
         bail!(
             "no window of {} s fits into the logs; give longer logs or a shorter --horizon",
@@ -105,19 +105,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     Ok(Answer::Yes)
 }
 
-/// The system, for its columns, and the dynamics to integrate.
+/// The declared model, for the columns of its logs, and the dynamics to integrate.
 fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
     let library = arguments.effects.library()?;
     match arguments.model.source() {
         Source::File(file) => {
-            let system = library.model(file)?;
-            let dynamics = system.dynamics();
-            Ok((system, dynamics))
+            let declared = library.model(file)?;
+            let dynamics = declared.dynamics();
+            Ok((declared, dynamics))
         }
         Source::Checkpoint(dir) => {
-            let (_, system, model) = inputs::checkpoint(dir, &library, arguments.common.device)?;
-            let dynamics = model.to_dynamics()?;
-            Ok((system, dynamics))
+            let (_, declared, trained) =
+                inputs::checkpoint(dir, &library, arguments.common.device)?;
+            let dynamics = trained.to_dynamics()?;
+            Ok((declared, dynamics))
         }
     }
 }

@@ -91,7 +91,7 @@ fn portable(arguments: &Arguments) -> Result<ExportModel> {
 
 fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<ExportModel> {
     let device = arguments.common.device;
-    let (checkpoint, system, _) = inputs::checkpoint(dir, library, device)?;
+    let (checkpoint, model, _) = inputs::checkpoint(dir, library, device)?;
     let Manifest {
         config,
         seed,
@@ -99,7 +99,7 @@ fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result
         ..
     } = &checkpoint.manifest;
     Ok(ExportModel::new(
-        &system,
+        &model,
         checkpoint.weights.clone(),
         arguments.integrator.unwrap_or(settings.integrator),
         arguments.step.or(step_of(config)).unwrap_or(STEP_S),
@@ -115,9 +115,9 @@ fn step_of(config: &Value) -> Option<f64> {
 }
 
 fn of_file(arguments: &Arguments, file: &Path, library: &Library) -> Result<ExportModel> {
-    let system = library.model(file)?;
+    let model = library.model(file)?;
     Ok(ExportModel::of_system(
-        &system,
+        &model,
         arguments.integrator.unwrap_or(Integrator::RK4),
         arguments.step.unwrap_or(STEP_S),
         json!({"config": {"model": file}, "seed": arguments.common.seed}),

@@ -56,7 +56,7 @@ impl ModelArguments {
     }
 }
 
-/// A checkpoint, its system, and its model.
+/// A checkpoint, the declared model in it, and the trained model.
 pub(super) fn checkpoint(
     dir: &Path,
     library: &Library,
@@ -64,15 +64,15 @@ pub(super) fn checkpoint(
 ) -> Result<(Checkpoint, Model, HybridModel)> {
     let checkpoint = Checkpoint::load(dir)?;
     let file = dir.join("model.toml");
-    let system = Model::from_text(&file, &checkpoint.model_toml, library.effects())?;
-    let physics = system.dynamics();
+    let declared = Model::from_text(&file, &checkpoint.model_toml, library.effects())?;
+    let physics = declared.dynamics();
     let model = checkpoint.model(&physics, &backend.device())?;
-    Ok((checkpoint, system, model))
+    Ok((checkpoint, declared, model))
 }
 
 /// Read logs for a system and leave out the given intervals; notes go to standard error.
-pub(super) fn logs(paths: &[PathBuf], system: &Model) -> Result<Vec<Log>> {
-    Ok(system.read_logs(paths)?)
+pub(super) fn logs(paths: &[PathBuf], model: &Model) -> Result<Vec<Log>> {
+    Ok(model.read_logs(paths)?)
 }
 
 /// Apply `--leave-out` to two sets of logs at once: an entry may name a log of either.

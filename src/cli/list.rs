@@ -61,15 +61,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 fn systems(library: &Library) -> Result<(String, serde_json::Value)> {
     let (mut text, mut values) = (String::new(), Vec::new());
     for name in Library::system_names() {
-        let system: Model = library.model(Path::new(&name))?;
-        let parameters: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
+        let model: Model = library.model(Path::new(&name))?;
+        let parameters: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
         let _ = writeln!(
             text,
             "{name}: {}\n    parameters: {}",
-            system.about,
+            model.about,
             parameters.join(", ")
         );
-        values.push(json!({"name": name, "about": system.about, "joints": system.joints, "parameters": parameters}));
+        values.push(json!({"name": name, "about": model.about, "joints": model.joints, "parameters": parameters}));
     }
     Ok((text, values.into()))
 }

@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let chain = (reader.read)(file)?;
     let text = model_text(&chain);
     let name = Path::new(&chain.name);
-    let system = Model::from_text(name, &text, Library::built_in().effects())?;
+    let model = Model::from_text(name, &text, Library::built_in().effects())?;
     for note in &chain.notes {
         eprintln!("note: {note}");
     }
@@ -87,14 +87,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         write_whole(out, text.as_bytes())?;
     }
     if arguments.common.json {
-        let value = json!({"model": text, "joints": system.joints, "notes": chain.notes, "out": arguments.out});
+        let value = json!({"model": text, "joints": model.joints, "notes": chain.notes, "out": arguments.out});
         inputs::print(&format!("{value:#}\n"))?;
     } else if let Some(out) = &arguments.out {
         inputs::print(&format!(
             "{}: model of {}, joints: {}\n",
             out.display(),
-            system.name,
-            system.joints
+            model.name,
+            model.joints
         ))?;
     } else {
         inputs::print(&text)?;

@@ -18,7 +18,7 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
 
 fn of_output(error: &OutputError) -> Option<&'static str> {
     Some(match error.source.kind() {
-        ErrorKind::InvalidInput => "give the name of a file with --out",
+        ErrorKind::InvalidInput => "move it away, or give another name with --out",
         ErrorKind::NotFound => "make the folder first, or give another with --out",
         ErrorKind::StorageFull => "free some space, or give another folder with --out",
         _ => "give another folder with --out",

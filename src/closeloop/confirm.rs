@@ -9,7 +9,7 @@ use crate::model::FittedEffect;
 
 /// A selected effect that was not confirmed.
 #[derive(Debug, Clone)]
-pub struct TakenBack {
+pub struct Withdrawn {
     pub effect: FittedEffect,
     /// Why, in a sentence.
     pub reason: String,
@@ -18,32 +18,36 @@ pub struct TakenBack {
 /// The selected model without the effects that were not confirmed.
 #[derive(Debug, Clone)]
 pub struct Confirmed {
-    pub model: Fitted,
-    pub taken_back: Vec<TakenBack>,
+    pub fitted: Fitted,
+    pub withdrawn: Vec<Withdrawn>,
     /// Stretches that the choice was confirmed on; 0 where the logs left none.
     pub stretches: usize,
 }
 
-/// Test whether each effect of a model, fitted in `study`, lowers the loss on data set aside, and take back those that
+/// Test whether each effect of a model, fitted in `study`, lowers the loss on data set aside, and withdraw those that
 /// do not, the least sure first.
 ///
 /// # Errors
 /// A model that diverges on the data set aside with and without each of its effects.
-pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Result<Confirmed, FitError> {
+pub fn confirm(
+    study: &Study<'_>,
+    aside: &Study<'_>,
+    fitted: Fitted,
+) -> Result<Confirmed, FitError> {
     let members = blocks(&aside.shooting);
     let stretches = members.last().map_or(0, |last| last + 1);
     let mut confirmed = Confirmed {
-        model,
-        taken_back: Vec::new(),
+        fitted,
+        withdrawn: Vec::new(),
         stretches,
     };
     if stretches < study.settings.confirm.fewest_stretches {
         confirmed.stretches = 0;
         return Ok(confirmed);
     }
-    while let Some(least) = least_sure(study, aside, &confirmed.model, &members)? {
-        confirmed.taken_back.push(least.taken_back);
-        confirmed.model = least.without;
+    while let Some(least) = least_sure(study, aside, &confirmed.fitted, &members)? {
+        confirmed.withdrawn.push(least.withdrawn);
+        confirmed.fitted = least.without;
     }
     Ok(confirmed)
 }
@@ -51,7 +55,7 @@ pub fn confirm(study: &Study<'_>, aside: &Study<'_>, model: Fitted) -> Result<Co
 /// An effect that the data set aside do not confirm.
 struct Unconfirmed {
     p_value: f64,
-    taken_back: TakenBack,
+    withdrawn: Withdrawn,
     /// The model without it.
     without: Fitted,
 }
@@ -60,14 +64,12 @@ struct Unconfirmed {
 fn least_sure(
     study: &Study<'_>,
     aside: &Study<'_>,
-    model: &Fitted,
+    fitted: &Fitted,
     members: &[usize],
 ) -> Result<Option<Unconfirmed>, FitError> {
-    let with = losses(aside, model, model.fit.scale, members);
-    let declared = study.system.effects.len();
-    let unsure: Vec<Unconfirmed> = (declared..model.effects.len())
-        .into_par_iter()
-        .filter_map(|k| unconfirmed(study, aside, model, members, &with, k))
+    let with = losses(aside, fitted, fitted.fit.scale, members);
+    let unsure: Vec<Unconfirmed> = (study.added(&fitted.model).into_par_iter())
+        .filter_map(|k| unconfirmed(study, aside, fitted, members, &with, k))
         .collect();
     let least = (unsure.into_iter()).max_by(|a, b| a.p_value.total_cmp(&b.p_value));
     match (least, with) {
@@ -80,25 +82,21 @@ fn least_sure(
 fn unconfirmed(
     study: &Study<'_>,
     aside: &Study<'_>,
-    model: &Fitted,
+    fitted: &Fitted,
     members: &[usize],
     with: &Result<Vec<f64>, FitError>,
     k: usize,
 ) -> Option<Unconfirmed> {
-    let mut effects = model.effects.clone();
-    let effect = effects.remove(k);
-    let (locals, scale) = (model.fit.locals.clone(), model.fit.scale);
+    let effect = fitted.model.effects[k].clone();
     // A model that cannot be fitted, or diverges, without an effect needs it.
-    let without = study
-        .refit(&model.with_effects(effects), locals, Some(scale))
-        .ok()?;
+    let without = study.without_effect(fitted, k).ok()?;
     let (p_value, reason) = match with {
         Err(_) => (
             1.0,
             "with it the model diverges on stretches that it was not chosen by".to_owned(),
         ),
         Ok(with) => {
-            let less = losses(aside, &without, scale, members).ok()?;
+            let less = losses(aside, &without, fitted.fit.scale, members).ok()?;
             let (p, saved) = (p_of_gains(&less, with), gain(&less, with));
             let ConfirmSettings {
                 significance,
@@ -120,7 +118,7 @@ fn unconfirmed(
     };
     Some(Unconfirmed {
         p_value,
-        taken_back: TakenBack { effect, reason },
+        withdrawn: Withdrawn { effect, reason },
         without,
     })
 }
@@ -129,12 +127,12 @@ fn unconfirmed(
 /// has of its own where the fit has not seen the log.
 fn losses(
     aside: &Study<'_>,
-    model: &Fitted,
+    fitted: &Fitted,
     scale: f64,
     members: &[usize],
 ) -> Result<Vec<f64>, FitError> {
     let locals = aside.shooting.initial_locals(0);
-    let dynamics = model.dynamics();
+    let dynamics = fitted.model.dynamics();
     let known = Values::of(&dynamics, aside.logs).own;
     let is_known = |k: &usize| known.iter().any(|own| own.parameter == *k);
     let parameters = &dynamics.parameters;

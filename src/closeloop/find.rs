@@ -1,35 +1,40 @@
 use rand::Rng;
 
-use super::confirm::{TakenBack, confirm};
+use super::confirm::{Withdrawn, confirm};
 use super::error::StudyError;
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
-use super::select::{Rival, Round, Search, folds, left_out_losses};
+use super::select::{Rival, Round, Search, left_out_losses};
 use super::split::set_aside;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Library};
 
-/// What the logs say about what the declared model lacks.
+/// The result of searching the logs for what the declared model lacks.
 pub struct Found {
     /// The declared model, fitted.
     pub before: Fitted,
-    /// With the effects that stood, fitted.
+    pub chosen: Chosen,
+    pub unexplained: Unexplained,
+}
+
+/// What was selected on a part of the logs and confirmed on the rest.
+pub struct Chosen {
+    /// The model with the confirmed effects, fitted to all logs.
     pub after: Fitted,
     pub rounds: Vec<Round>,
     /// Effects that explain the logs as well as one that was selected.
     pub rivals: Vec<Rival>,
-    pub taken_back: Vec<TakenBack>,
+    pub withdrawn: Vec<Withdrawn>,
     /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
     pub confirmed_on: usize,
-    pub unexplained: Unexplained,
-    /// Why the selected effects were taken back, if the model with them could not be fitted.
+    /// Why the selected effects were withdrawn, if the model with them could not be fitted.
     pub failure: Option<FitError>,
 }
 
-/// Stages 3 to 5: fit the declared model, choose effects on a part of the logs, confirm them on the rest, fit what
-/// stood to all of them and test what is left.
+/// Stages 3 to 5: fit the declared model, select effects on a part of the logs, confirm them on the rest, fit the model
+/// with the confirmed ones to all logs and test its residuals.
 ///
 /// # Errors
 /// As [`Study::fit_declared`].
@@ -49,37 +54,21 @@ pub fn find(
     let share = share_left(study, &before, &chosen.after);
     if left.is_significant() && share > study.settings.confirm.masking {
         chosen
-            .taken_back
-            .extend(all_taken_back(study, &chosen.after, MASKING));
+            .withdrawn
+            .extend(all_withdrawn(study, &chosen.after, MASKING));
         chosen.after = before.clone();
         left = test(&chosen.after, rng);
     }
     Ok(Found {
         before,
-        after: chosen.after,
-        rounds: chosen.rounds,
-        rivals: chosen.rivals,
-        taken_back: chosen.taken_back,
-        confirmed_on: chosen.confirmed_on,
+        chosen,
         unexplained: left,
-        failure: chosen.failure,
     })
 }
 
-/// Why effects are taken back that leave most of the loss beside an unexplained remainder.
+/// Why effects are withdrawn that leave most of the loss and an unexplained remainder.
 const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
-
-/// What was selected on a part of the logs and confirmed on the rest.
-struct Chosen {
-    /// Fitted to all logs.
-    after: Fitted,
-    rounds: Vec<Round>,
-    rivals: Vec<Rival>,
-    taken_back: Vec<TakenBack>,
-    confirmed_on: usize,
-    failure: Option<FitError>,
-}
 
 fn choose(
     study: &Study<'_>,
@@ -94,13 +83,13 @@ fn choose(
     let selected = search.select(declared)?;
     search.tell(Stage::Confirm.into());
     let confirmed = confirm(&kept, &aside, selected.clone())
-        .and_then(|confirmed| Ok((on_all(study, before, &confirmed.model)?, confirmed)));
+        .and_then(|confirmed| Ok((on_all(study, before, &confirmed.fitted)?, confirmed)));
     Ok(match confirmed {
         Ok((after, confirmed)) => Chosen {
             after,
-            rivals: search.rivals(&confirmed.model),
+            rivals: search.rivals(&confirmed.fitted),
             rounds: search.rounds,
-            taken_back: confirmed.taken_back,
+            withdrawn: confirmed.withdrawn,
             confirmed_on: confirmed.stretches,
             failure: None,
         },
@@ -108,7 +97,7 @@ fn choose(
             after: before.clone(),
             rivals: Vec::new(),
             rounds: search.rounds,
-            taken_back: all_taken_back(
+            withdrawn: all_withdrawn(
                 study,
                 &selected,
                 &format!("the model with it cannot be fitted to all training logs: {error}"),
@@ -121,29 +110,27 @@ fn choose(
 
 /// The chosen effects fitted to all logs.
 fn on_all(study: &Study<'_>, before: &Fitted, chosen: &Fitted) -> Result<Fitted, FitError> {
-    if chosen.effects.len() == study.system.effects.len() {
+    if study.added(&chosen.model).is_empty() {
         return Ok(before.clone());
     }
-    let locals = before.fit.locals.clone();
-    study.refit(chosen, locals, None)
+    study.refit(&chosen.model, before.fit.locals.clone(), None)
 }
 
-/// All added effects of a model, taken back for one reason.
-fn all_taken_back(study: &Study<'_>, model: &Fitted, reason: &str) -> Vec<TakenBack> {
-    let added = &model.effects[study.system.effects.len()..];
-    let taken_back = |effect: &FittedEffect| TakenBack {
+/// All added effects of a model, withdrawn for one reason.
+fn all_withdrawn(study: &Study<'_>, fitted: &Fitted, reason: &str) -> Vec<Withdrawn> {
+    let added = &fitted.model.effects[study.added(&fitted.model)];
+    let withdrawn = |effect: &FittedEffect| Withdrawn {
         effect: effect.clone(),
         reason: reason.to_owned(),
     };
-    added.iter().map(taken_back).collect()
+    added.iter().map(withdrawn).collect()
 }
 
 /// Loss that the effects leave, as a share of the declared model's, on stretches left out of the fits.
 fn share_left(study: &Study<'_>, before: &Fitted, after: &Fitted) -> f64 {
-    let folds = folds(study);
     // Losses are in units of each fit's own scale.
     let loss = |model: &Fitted| {
-        left_out_losses(&model.fit, &folds).iter().sum::<f64>() * model.fit.scale.powi(2)
+        left_out_losses(study, &model.fit).iter().sum::<f64>() * model.fit.scale.powi(2)
     };
     loss(after) / loss(before).max(f64::MIN_POSITIVE)
 }

@@ -17,9 +17,9 @@ impl Study<'_> {
     pub fn fit_declared(&mut self) -> Result<Fitted, StudyError> {
         let windows = cut(self.logs, self.settings.fit.short_window_s);
         let short = Shooting::new(self.logs, windows, &self.shooting.noise);
-        let (first, held) = self.fit_and_hold(&short, self.system)?;
+        let (first, held) = self.fit_and_hold(&short, self.declared)?;
         self.hold(held);
-        let (second, held) = self.fit_and_hold(&self.shooting, &first)?;
+        let (second, held) = self.fit_and_hold(&self.shooting, &first.model)?;
         self.hold(held);
         Ok(second)
     }
@@ -35,7 +35,7 @@ impl Study<'_> {
         let locals = shooting.initial_locals(0);
         let (values, free) = fit(shooting, &dynamics, &active, locals, None)?;
         let mut verdict = identifiability(&dynamics, &values, &free);
-        // Only declared parameters are held: an effect that the file carries is asked about as it is.
+        // Only declared parameters are held: an effect that the file carries stays free.
         verdict.hold.retain(|&k| k < model.parameters.len());
         if verdict.hold.is_empty() {
             let fitted = Fitted::new(&model, &dynamics, (values, free), self.logs);

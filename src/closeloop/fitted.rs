@@ -1,25 +1,15 @@
-use std::ops::Deref;
-
 use crate::data::Log;
 use crate::identify::{Fit, Values};
-use crate::model::{Dynamics, Model};
+use crate::model::{Dynamics, FittedEffect, Model};
 use crate::sim::metric::{Trace, traces};
 
-/// A model as a fit to a study's logs left it. It is used as the model that it is.
+/// A model as a fit to a study's logs left it.
 #[derive(Debug, Clone)]
 pub struct Fitted {
     /// With the values found.
     pub model: Model,
-    /// What the fit says of them.
+    /// How the fit ended, and its normal equations there.
     pub fit: Fit,
-}
-
-impl Deref for Fitted {
-    type Target = Model;
-
-    fn deref(&self) -> &Model {
-        &self.model
-    }
 }
 
 impl Fitted {
@@ -36,9 +26,14 @@ impl Fitted {
         }
     }
 
+    /// The effects of the model and more.
+    pub(super) fn effects_and(&self, more: &[FittedEffect]) -> Vec<FittedEffect> {
+        [self.model.effects.as_slice(), more].concat()
+    }
+
     /// Predictions of a log: over consecutive windows of `horizon_s`, the motion from the logged state at the start of
     /// each under the logged torques.
     pub fn predict(&self, log: &Log, horizon_s: f64) -> Vec<Trace> {
-        traces(&self.dynamics(), log, horizon_s)
+        traces(&self.model.dynamics(), log, horizon_s)
     }
 }

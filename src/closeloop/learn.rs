@@ -1,5 +1,5 @@
-//! Stage 8: train a small network on what the refined model leaves. Whoever carries out tensors trains it: see
-//! [`ResidualLearner`].
+//! Stage 8: train a small network on the residual of the refined model. The training itself is behind a trait, since it
+//! needs tensors: see [`ResidualLearner`].
 
 use std::error::Error;
 use std::fmt::Debug;
@@ -33,7 +33,7 @@ pub struct ResidualTask {
 /// Trains residual networks.
 pub trait ResidualLearner: Debug + Sync {
     /// Train a network on what the equations leave and keep the epoch that predicts the validation stretches best; the
-    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` is told the
+    /// untrained network is among the candidates. `None` where the stretches are too short. `progress` receives the
     /// epoch.
     ///
     /// # Errors
@@ -80,22 +80,22 @@ pub(super) fn learn(
     let Some(learner) = learner else {
         return Ok(None);
     };
-    let task = task(&refined.study, &refined.model);
+    let task = task(&refined.study, &refined.after);
     learner.learn(&task, rng, &mut |text| {
         let text = format!("{}, {text}", Stage::Learn.text());
         progress(Progress::within(Stage::Learn, &text));
     })
 }
 
-fn task(study: &Study<'_>, model: &Fitted) -> ResidualTask {
+fn task(study: &Study<'_>, fitted: &Fitted) -> ResidualTask {
     let settings = study.settings.learn.clone();
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
-    let equations = model.absorbed().dynamics();
+    let equations = fitted.model.absorbed().dynamics();
     let thinning = Thinning {
         step_s: settings.step_s,
         length_s: settings.stretch_s,
     };
-    let dynamics = model.dynamics();
+    let dynamics = fitted.model.dynamics();
     let of_log = |log: &Log| trajectories(&as_modelled(&*dynamics.in_log(log), log), thinning);
     let stretches = study.logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
@@ -107,7 +107,7 @@ fn task(study: &Study<'_>, model: &Fitted) -> ResidualTask {
     }
     ResidualTask {
         equations,
-        hidden: study.system.hidden.clone(),
+        hidden: study.declared.hidden.clone(),
         training,
         validation,
         settings,

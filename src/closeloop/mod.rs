@@ -28,10 +28,10 @@ mod tests;
 mod verdict;
 
 pub use calibrate::{Calibration, DetectionLimit, Repetition, Smallest, calibrate};
-pub use confirm::TakenBack;
+pub use confirm::Withdrawn;
 pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;
-pub use find::{Found, find};
+pub use find::{Chosen, Found, find};
 pub use fitted::Fitted;
 pub use learn::{LearnError, LearnedResidual, ResidualLearner, ResidualTask};
 pub use outcome::{Effects, Given, Models, Outcome, Remainder};

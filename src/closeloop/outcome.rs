@@ -1,5 +1,5 @@
 use super::calibrate::Calibration;
-use super::confirm::TakenBack;
+use super::confirm::Withdrawn;
 use super::discriminate::Alternative;
 use super::fitted::Fitted;
 use super::learn::LearnedResidual;
@@ -63,7 +63,7 @@ pub struct Effects {
     pub findings: Vec<Finding>,
     /// What the logs do not tell from the findings.
     pub alternatives: Vec<Alternative>,
-    pub taken_back: Vec<TakenBack>,
+    pub withdrawn: Vec<Withdrawn>,
     /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
     pub confirmed_on: usize,
     /// What was tried.
@@ -83,8 +83,8 @@ pub struct Remainder {
 }
 
 impl Outcome {
-    /// The training logs as they were studied; `system` is the one that was declared.
-    pub fn study<'a>(&'a self, system: &'a Model) -> Study<'a> {
+    /// The training logs as they were studied; `declared` is the model they were studied for.
+    pub fn study<'a>(&'a self, declared: &'a Model) -> Study<'a> {
         let Given {
             train,
             audits,
@@ -94,7 +94,7 @@ impl Outcome {
         let audits = audits[..train.len()].to_vec();
         Study {
             identifiability: self.models.identifiability.clone(),
-            ..Study::audited(system, train, audits, settings)
+            ..Study::audited(declared, train, audits, settings)
         }
     }
 }

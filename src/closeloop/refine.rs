@@ -1,4 +1,4 @@
-//! Stage 7: estimate the chosen model in fine steps.
+//! Stage 7: estimate the declared and the chosen model in fine steps.
 
 use super::fitted::Fitted;
 use super::settings::RefineSettings;
@@ -6,27 +6,34 @@ use super::study::Study;
 use crate::identify::{FitError, Shooting, uncertainty};
 use crate::model::Model;
 
-/// The chosen model, estimated in fine steps.
+/// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
+/// those that effects were selected with. Their errors differ by the effects alone.
 pub(super) struct Refined<'a> {
-    /// The training logs in fine steps.
+    /// The training logs in these steps.
     pub study: Study<'a>,
-    /// With 95 % intervals.
-    pub model: Fitted,
-    /// Why the model is the chosen one as it was, if the estimate failed.
+    /// The declared model.
+    pub before: Fitted,
+    /// The chosen model, with 95 % intervals.
+    pub after: Fitted,
+    /// Why the steps are not fine, if they are not.
     pub failure: Option<FitError>,
 }
 
-/// Estimate the chosen model in fine steps.
-pub(super) fn refine<'a>(study: &Study<'a>, chosen: &Fitted) -> Refined<'a> {
+/// Estimate the declared and the chosen model in fine steps.
+pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) -> Refined<'a> {
     let fine = study.refined();
-    let (study, mut model, failure) = match fine.estimate(chosen) {
-        Ok(model) => (fine, model, None),
-        Err(error) => (study.again(), chosen.clone(), Some(error)),
-    };
-    model.model = with_intervals(&study, &model, chosen);
+    let (study, before, mut after, failure) =
+        match rayon::join(|| fine.estimate(declared), || fine.estimate(chosen)) {
+            (Ok(before), Ok(after)) => (fine, before, after, None),
+            (Err(error), _) | (_, Err(error)) => {
+                (study.again(), declared.clone(), chosen.clone(), Some(error))
+            }
+        };
+    after.model = with_intervals(&study, &after, &chosen.model);
     Refined {
         study,
-        model,
+        before,
+        after,
         failure,
     }
 }
@@ -36,7 +43,7 @@ impl Study<'_> {
     /// the model file gives stays.
     pub fn refined(&self) -> Self {
         let RefineSettings { step_s, narrower } = self.settings.refine;
-        let narrower = self.system.sign_width.as_ref().map_or(narrower, |_| 1.0);
+        let narrower = self.declared.sign_width.as_ref().map_or(narrower, |_| 1.0);
         let sign_widths: Vec<f64> = self.sign_widths.iter().map(|w| narrower * w).collect();
         let windows = self.shooting.windows.clone();
         let shooting = Shooting::new(self.logs, windows, &self.shooting.noise);
@@ -46,15 +53,6 @@ impl Study<'_> {
             ..self.again()
         }
     }
-
-    /// Estimate a chosen model anew, from the values that it has.
-    ///
-    /// # Errors
-    /// As [`Study::refit`].
-    pub fn estimate(&self, chosen: &Fitted) -> Result<Fitted, FitError> {
-        let locals = chosen.fit.locals.clone();
-        self.refit(chosen, locals, None)
-    }
 }
 
 /// A fitted model with its 95 % intervals; parameters that were not free have none. An interval reaches as much further
@@ -62,7 +60,7 @@ impl Study<'_> {
 /// what is left of their error (Richardson 1911).
 pub(super) fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &Model) -> Model {
     let uncertainty = uncertainty(&study.shooting, &fitted.fit);
-    let (values, coarse) = (fitted.values(), coarse.values());
+    let (values, coarse) = (fitted.model.values(), coarse.values());
     let mut model = fitted.model.clone();
     for (i, column) in fitted.fit.columns.iter().enumerate() {
         let k = column.parameter;

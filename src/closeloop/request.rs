@@ -6,12 +6,12 @@ use crate::data::Log;
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
-/// What closing the loop is asked for.
+/// The inputs of closing the loop.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Request<'a> {
     /// The declared model.
-    pub system: &'a Model,
+    pub model: &'a Model,
     /// The effects that it may lack.
     pub library: &'a Library,
     pub split: Split,
@@ -28,14 +28,14 @@ pub struct Reference {
     /// As the user calls it.
     pub name: String,
     /// With the same joints as the declared model.
-    pub system: Model,
+    pub model: Model,
 }
 
 impl<'a> Request<'a> {
     /// A request with the default settings, without a residual network and without reference models.
-    pub fn new(system: &'a Model, library: &'a Library, split: Split) -> Self {
+    pub fn new(model: &'a Model, library: &'a Library, split: Split) -> Self {
         Self {
-            system,
+            model,
             library,
             split,
             against: Vec::new(),
@@ -45,9 +45,9 @@ impl<'a> Request<'a> {
     }
 
     /// The same on logs of which some are set apart for the test.
-    pub fn of(system: &'a Model, library: &'a Library, logs: Vec<Log>) -> Self {
+    pub fn of(model: &'a Model, library: &'a Library, logs: Vec<Log>) -> Self {
         let split = Split::of(logs, &Settings::default().split);
-        Self::new(system, library, split)
+        Self::new(model, library, split)
     }
 
     /// # Errors

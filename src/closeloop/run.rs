@@ -3,7 +3,6 @@ use rand::Rng;
 use super::discriminate::discriminate;
 use super::error::StudyError;
 use super::find::{Found, find};
-use super::fitted::Fitted;
 use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
 use super::refine::{Refined, refine};
@@ -27,7 +26,7 @@ pub fn close_loop(
 ) -> Result<Outcome, StudyError> {
     request.check()?;
     let Request {
-        system,
+        model,
         library,
         split,
         against,
@@ -35,13 +34,13 @@ pub fn close_loop(
         learner,
     } = request;
     progress(Stage::Audit.into());
-    let mut study = Study::new(system, &split.train, &settings);
+    let mut study = Study::new(model, &split.train, &settings);
     let test_audits = split.test.iter().map(audit);
     let audits = study.audits().iter().cloned().chain(test_audits).collect();
     let found = find(&mut study, library, rng, progress)?;
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
-    let refined = refine(&study, &found.after);
+    let refined = refine(&study, &found.before, &found.chosen.after);
     let remainder = remainder(&study, &found, &refined);
     let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
@@ -50,20 +49,26 @@ pub fn close_loop(
         settings: &settings.score,
     };
     let hybrid = learned.as_ref().map(|learned| learned.hybrid());
-    let models = [&found.before, &refined.model];
-    let errors = scorer.errors(system, models, hybrid, &against, rng);
-    let findings = findings(&study, &found.after, &refined, &scorer, &errors.after);
+    let models = [&refined.before, &refined.after];
+    let errors = scorer.errors(model, models, hybrid, &against, rng);
+    let findings = findings(
+        &study,
+        &found.chosen.after,
+        &refined,
+        &scorer,
+        &errors.after,
+    );
     let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     Ok(Outcome {
         verdict,
         reason,
-        models: models_of(&study, found.before, refined),
+        models: models_of(&study, refined),
         effects: Effects {
             findings,
             alternatives,
-            taken_back: found.taken_back,
-            confirmed_on: found.confirmed_on,
-            rounds: found.rounds,
+            withdrawn: found.chosen.withdrawn,
+            confirmed_on: found.chosen.confirmed_on,
+            rounds: found.chosen.rounds,
         },
         remainder,
         errors,
@@ -75,7 +80,7 @@ pub fn close_loop(
             split: split.method,
             audits,
             settings: settings.clone(),
-            prismatic: system.prismatic.clone(),
+            prismatic: model.prismatic.clone(),
         },
     })
 }
@@ -84,22 +89,22 @@ pub fn close_loop(
 fn remainder(study: &Study<'_>, found: &Found, refined: &Refined<'_>) -> Remainder {
     let (before, after) = rayon::join(
         || ResidualForce::of(study, &found.before),
-        || ResidualForce::of(study, &found.after),
+        || ResidualForce::of(study, &found.chosen.after),
     );
     Remainder {
-        proposal: proposal(study, &refined.model, &found.unexplained),
+        proposal: proposal(study, &refined.after, &found.unexplained),
         unexplained: found.unexplained.clone(),
         before,
         after,
     }
 }
 
-fn models_of(study: &Study<'_>, before: Fitted, refined: Refined<'_>) -> Models {
-    let fitted = refined.model.absorbed().all_parameters();
+fn models_of(study: &Study<'_>, refined: Refined<'_>) -> Models {
+    let fitted = refined.after.model.absorbed().all_parameters();
     Models {
-        contradicted: contradicted(&study.system.all_parameters(), &fitted),
-        before,
-        after: refined.model,
+        contradicted: contradicted(&study.declared.all_parameters(), &fitted),
+        before: refined.before,
+        after: refined.after,
         identifiability: study.identifiability.clone(),
     }
 }

@@ -2,13 +2,18 @@
 
 use std::num::NonZeroUsize;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::sim::FINE_FIT_S;
+
 /// Declares a struct of settings, each default beside its reason.
 macro_rules! settings {
     ($(#[$about:meta])* $name:ident {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $default:expr,)*
     }) => {
         $(#[$about])*
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
         #[non_exhaustive]
         pub struct $name {
             $(
@@ -27,7 +32,7 @@ macro_rules! settings {
 }
 
 /// How the loop is closed.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 #[non_exhaustive]
 pub struct Settings {
     pub split: SplitSettings,
@@ -79,11 +84,11 @@ settings! {
     SelectSettings {
         /// Probability of a false alarm that one round admits, over all candidates and all their starting points.
         false_alarm: f64 = 0.05,
-        /// Few stretches cannot prove so much. There an effect is admitted that plainly helps if it alone is this
-        /// significant.
+        /// Few stretches cannot give so small a probability. With them an effect that plainly helps is admitted at
+        /// this level, without a correction for the number of candidates.
         significant_alone: f64 = 0.01,
         /// An effect must lower the loss on left-out stretches by this share, and thus the error by a twentieth: less
-        /// is of no use to anyone, and on real rigs it is what a wrong effect saves by standing in for others.
+        /// is of no use, and on real rigs it is what a wrong effect saves by imitating others.
         worthwhile: f64 = 0.1,
         /// An effect plainly helps that takes away this share of the loss on stretches that it was not fitted to:
         /// chance does not do that.
@@ -108,7 +113,7 @@ settings! {
 }
 
 settings! {
-    /// Stage 4, second half: which selected effects stand.
+    /// Stage 4, second half: which selected effects are confirmed.
     ConfirmSettings {
         /// With this many training logs whole ones are set aside to confirm; with fewer, the end of each.
         whole_logs: usize = 4,
@@ -116,13 +121,13 @@ settings! {
         shortest_s: f64 = 10.0,
         /// Fewer stretches than this prove nothing either way.
         fewest_stretches: usize = 4,
-        /// An effect stands that lowers the loss on data it was not selected on, with this probability of doing so by
-        /// accident: such effects are few, and each was significant over the whole library before.
+        /// An effect is confirmed that lowers the loss on data it was not selected on, with at most this probability of
+        /// doing so by chance: such effects are few, and each was significant over the whole library before.
         significance: f64 = 0.1,
         /// Where the loss changes by less than this share, the motion set aside does not show the effect.
         not_shown: f64 = 0.01,
         /// Where an unexplained remainder stays, effects that leave more than this share of the loss do not explain
-        /// it either: they would mask the real cause and are taken back.
+        /// it either: they would mask the real cause and are withdrawn.
         masking: f64 = 0.5,
     }
 }
@@ -130,7 +135,7 @@ settings! {
 settings! {
     /// Stage 5: what counts as an unexplained remainder.
     RemainderSettings {
-        /// Below this probability the remainder is no accident.
+        /// Below this probability the remainder is significant.
         significance: f64 = 0.01,
         /// Share of the residuals' variance (or of the loss, for a probe) below which a remainder is of no practical
         /// interest.
@@ -223,8 +228,8 @@ settings! {
     /// Stage 7: the final estimate. Smoothing and steps shift dry friction by a few parts in a thousand, more than the
     /// noise of long logs does.
     RefineSettings {
-        /// Longest step of the integrator in s.
-        step_s: f64 = 5e-4,
+        /// Longest step of the integrator in s: half a millisecond.
+        step_s: f64 = FINE_FIT_S,
         /// Dry friction is smoothed over this share of the width that effects were selected with, unless the model
         /// file gives the width.
         narrower: f64 = 0.5,

@@ -1,14 +1,16 @@
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
 use crate::data::{Audit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
-use crate::model::{Dynamics, Model};
+use crate::model::{Dynamics, FittedEffect, Model};
 
-/// A declared system and the logs to learn from, with what follows from both.
+/// A declared model and the logs to learn from, with what follows from both.
 pub struct Study<'a> {
-    pub system: &'a Model,
+    /// With the values in its file.
+    pub declared: &'a Model,
     pub settings: &'a Settings,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
@@ -50,14 +52,14 @@ impl<'a> Sample<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn new(system: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
+    pub fn new(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
         let audits = logs.iter().map(audit).collect();
-        Self::audited(system, logs, audits, settings)
+        Self::audited(declared, logs, audits, settings)
     }
 
     /// A study of logs with their audits.
     pub(super) fn audited(
-        system: &'a Model,
+        declared: &'a Model,
         logs: &'a [Log],
         audits: Vec<Audit>,
         settings: &'a Settings,
@@ -69,7 +71,7 @@ impl<'a> Study<'a> {
             ..
         } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
-            (0..system.joints)
+            (0..declared.joints)
                 .map(|j| (0..logs.len()).map(|l| f(l, j)).fold(0.0, f64::max))
                 .collect()
         };
@@ -94,10 +96,10 @@ impl<'a> Study<'a> {
                 .map(|speed| sign_width * speed.max(1e-6))
                 .collect()
         };
-        let sign_widths: Vec<f64> = system.sign_width.clone().unwrap_or_else(by_speed);
+        let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
         let shooting = Shooting::new(logs, cut(logs, window_s), &noise);
         Self {
-            system,
+            declared,
             settings,
             logs,
             audits: audits.into(),
@@ -110,7 +112,7 @@ impl<'a> Study<'a> {
         }
     }
 
-    /// The same system on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
+    /// The same model on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
     pub fn on<'b>(&self, logs: &'b [Log]) -> Study<'b>
     where
         'a: 'b,
@@ -118,7 +120,7 @@ impl<'a> Study<'a> {
         let windows = cut(logs, self.settings.fit.window_s);
         let shooting = Shooting::new(logs, windows, &self.shooting.noise);
         Study {
-            system: self.system,
+            declared: self.declared,
             settings: self.settings,
             logs,
             audits: OnceLock::new(),
@@ -155,26 +157,56 @@ impl<'a> Study<'a> {
         locals: Vec<Vec<f64>>,
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
-        self.fit_on(&self.shooting, model, locals, scale)
-    }
-
-    pub(super) fn fit_on(
-        &self,
-        shooting: &Shooting<'_>,
-        model: &Model,
-        locals: Vec<Vec<f64>>,
-        scale: Option<f64>,
-    ) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
         let dynamics = model.dynamics();
         let active = self.active(&dynamics);
-        let found = fit(shooting, &dynamics, &active, locals, scale)?;
+        let found = fit(&self.shooting, &dynamics, &active, locals, scale)?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
+    }
+
+    /// Fit a model anew, starting from its values; the scale of its residuals is estimated again.
+    ///
+    /// # Errors
+    /// As [`Study::fit_declared`].
+    pub fn estimate(&self, fitted: &Fitted) -> Result<Fitted, FitError> {
+        self.refit(&fitted.model, fitted.fit.locals.clone(), None)
+    }
+
+    /// Fit a model with these effects in place of its own, starting from its values, at its scale of the residuals: the
+    /// losses of the two can be compared.
+    ///
+    /// # Errors
+    /// As [`Study::fit_declared`].
+    pub(super) fn with_effects(
+        &self,
+        fitted: &Fitted,
+        effects: Vec<FittedEffect>,
+    ) -> Result<Fitted, FitError> {
+        let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
+        self.refit(&fitted.model.with_effects(effects), locals, Some(scale))
+    }
+
+    /// The same without the k-th effect of a model.
+    pub(super) fn without_effect(&self, fitted: &Fitted, k: usize) -> Result<Fitted, FitError> {
+        let mut effects = fitted.model.effects.clone();
+        effects.remove(k);
+        self.with_effects(fitted, effects)
+    }
+
+    /// Places of the effects that a model has and the declared model has not.
+    pub(super) fn added(&self, model: &Model) -> Range<usize> {
+        self.declared.effects.len()..model.effects.len()
     }
 
     /// A model with the study's smoothing of friction.
     pub(super) fn smoothed(&self, model: &Model) -> Model {
         model.with_sign_widths(self.sign_widths.clone())
+    }
+
+    /// A fitted model with more effects, compiled with the study's smoothing of friction.
+    pub(super) fn extended(&self, fitted: &Fitted, more: &[FittedEffect]) -> Dynamics {
+        let model = fitted.model.with_effects(fitted.effects_and(more));
+        self.smoothed(&model).dynamics()
     }
 
     /// Parameters that a fit may change.

@@ -10,6 +10,8 @@ use super::find::{Found, find};
 use super::fitted::Fitted;
 use super::refine::refine;
 use super::remainder::ResidualForce;
+use super::request::Request;
+use super::run::close_loop;
 use super::score::{Scorer, findings};
 use super::settings::Settings;
 use super::split::Split;
@@ -42,11 +44,11 @@ fn pendulum() -> Model {
 }
 
 /// A model that moves no window: its values are no numbers.
-fn diverging(mut model: Fitted) -> Fitted {
-    for parameter in &mut model.model.parameters {
+fn diverging(mut fitted: Fitted) -> Fitted {
+    for parameter in &mut fitted.model.parameters {
         parameter.value = f64::NAN;
     }
-    model
+    fitted
 }
 
 fn search(study: &mut Study<'_>) -> Found {
@@ -56,8 +58,8 @@ fn search(study: &mut Study<'_>) -> Found {
 
 #[test]
 fn a_model_that_diverges_has_no_residual_force() {
-    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
-    let mut study = Study::new(&system, &logs, &settings);
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let mut study = Study::new(&declared, &logs, &settings);
     let model = study.fit_declared().unwrap();
     assert!(ResidualForce::of(&study, &model).unwrap().norm() > 0.0);
     let failed = ResidualForce::of(&study, &diverging(model));
@@ -66,8 +68,8 @@ fn a_model_that_diverges_has_no_residual_force() {
 
 #[test]
 fn data_on_which_a_model_diverges_confirm_nothing() {
-    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
-    let mut study = Study::new(&system, &logs, &settings);
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let mut study = Study::new(&declared, &logs, &settings);
     let model = study.fit_declared().unwrap();
     assert!(confirm(&study, &study, model.clone()).is_ok());
     let failed = confirm(&study, &study, diverging(model));
@@ -76,35 +78,39 @@ fn data_on_which_a_model_diverges_confirm_nothing() {
 
 #[test]
 fn a_fit_that_fails_allows_no_verdict() {
-    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
     let split = Split::of(logs, &settings.split);
-    let mut study = Study::new(&system, &split.train, &settings);
+    let mut study = Study::new(&declared, &split.train, &settings);
     let mut found = search(&mut study);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let refined = refine(&study, &found.after);
+    let refined = refine(&study, &found.before, &found.chosen.after);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let models = [&found.before, &refined.model];
-    let errors = scorer.errors(&system, models, None, &[], &mut rng);
+    let models = [&refined.before, &refined.after];
+    let errors = scorer.errors(&declared, models, None, &[], &mut rng);
     let of = |found: &Found, refined: &_| verdict(&study, found, refined, &errors);
     assert_eq!(of(&found, &refined).0, Verdict::Explained);
 
-    let mut failed = refine(&study, &diverging(found.after.clone()));
+    let mut failed = refine(
+        &study,
+        &found.before,
+        &diverging(found.chosen.after.clone()),
+    );
     assert!(matches!(failed.failure, Some(FitError::Diverged { .. })));
-    failed.model = refined.model.clone();
+    failed.after = refined.after.clone();
     let (answer, reason) = of(&found, &failed);
     assert_eq!(answer, Verdict::Inconclusive);
     assert!(reason.contains("the final fit in fine steps failed"));
 
-    let mut unfinished = refine(&study, &found.after);
-    unfinished.model.fit.termination = Termination::StepLimit;
+    let mut unfinished = refine(&study, &found.before, &found.chosen.after);
+    unfinished.after.fit.termination = Termination::StepLimit;
     let (answer, reason) = of(&found, &unfinished);
     assert_eq!(answer, Verdict::Inconclusive);
     assert!(reason.contains("not converged"), "{reason}");
 
-    found.failure = failed.failure.clone();
+    found.chosen.failure = failed.failure.clone();
     assert_eq!(of(&found, &refined).0, Verdict::Inconclusive);
 }
 
@@ -115,29 +121,29 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let bounded = "sin(q1) * (1 + 1e-9*sqrt(3.6 - abs(q1)))";
     let text = pendulum().declaration.replace("sin(q1)", bounded);
     let library = Library::built_in();
-    let system = Model::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
+    let declared = Model::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
     let (mut logs, settings) = (logs(), Settings::default());
     for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
         *tau += 8.0;
     }
     let split = Split::of(logs, &settings.split);
-    let study = Study::new(&system, &split.train, &settings);
+    let study = Study::new(&declared, &split.train, &settings);
     let bias = |size: f64| FittedEffect {
         values: vec![(size, None)],
         ..FittedEffect::absent(library.effect("constant_torque").unwrap(), Joint::at(0))
     };
-    let mut start = system.with_effects(vec![bias(-8.0)]);
+    let mut start = declared.with_effects(vec![bias(-8.0)]);
     for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
         parameter.value = value;
     }
     let locals = study.shooting.initial_locals(0);
     let chosen = study.refit(&start, locals, None).unwrap();
-    let refined = refine(&study, &chosen);
+    let refined = refine(&study, &chosen, &chosen);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let with = scorer.fitted(&refined.model);
+    let with = scorer.fitted(&refined.after);
     let found = findings(&study, &chosen, &refined, &scorer, &with);
     assert_eq!(found.len(), 1);
     assert!(matches!(
@@ -149,34 +155,51 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
 
 #[test]
 fn the_error_reduction_compares_two_fine_fits() {
-    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
     let split = Split::of(logs, &settings.split);
-    let mut study = Study::new(&system, &split.train, &settings);
+    let mut study = Study::new(&declared, &split.train, &settings);
     let found = search(&mut study);
-    let refined = refine(&study, &found.after);
+    let refined = refine(&study, &found.before, &found.chosen.after);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let with = scorer.fitted(&refined.model);
-    let reported = findings(&study, &found.after, &refined, &scorer, &with);
+    let with = scorer.fitted(&refined.after);
+    let reported = findings(&study, &found.chosen.after, &refined, &scorer, &with);
     let reduction = *reported[0].error_reduction.as_ref().unwrap();
     let beside = |model: &Fitted| 1.0 - with.position_rms() / scorer.fitted(model).position_rms();
-    let mut less = found.after.model.clone();
+    let mut less = found.chosen.after.model.clone();
     less.effects.clear();
-    let (locals, scale) = (found.after.fit.locals.clone(), found.after.fit.scale);
+    let (locals, scale) = (
+        found.chosen.after.fit.locals.clone(),
+        found.chosen.after.fit.scale,
+    );
     let coarse = study.refit(&less, locals, Some(scale)).unwrap();
     let fine = refined.study.estimate(&coarse).unwrap();
     assert_eq!(reduction, beside(&fine));
     assert_ne!(reduction, beside(&coarse));
 }
 
+/// The model is the same before and after, and so is its error.
 #[test]
-fn a_setting_is_heard() {
-    let (system, logs) = (pendulum(), logs());
+fn without_effects_the_error_reduction_is_zero() {
+    let (declared, library) = (pendulum(), Library::built_in());
+    let mut request = Request::of(&declared, &library, logs());
+    request.settings.select.most_effects = 0;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let outcome = close_loop(request, &mut rng, &mut |_| {}).unwrap();
+    assert!(outcome.effects.findings.is_empty());
+    assert_eq!(outcome.errors.reduction_ci95, Some([0.0, 0.0]));
+}
+
+#[test]
+fn a_changed_setting_changes_the_search() {
+    let (declared, logs) = (pendulum(), logs());
     let named = |settings: &Settings| {
-        search(&mut Study::new(&system, &logs, settings))
+        search(&mut Study::new(&declared, &logs, settings))
+            .chosen
             .after
+            .model
             .effects
             .len()
     };
@@ -188,8 +211,8 @@ fn a_setting_is_heard() {
 
 #[test]
 fn a_result_predicts_a_log() {
-    let (system, logs, settings) = (pendulum(), logs(), Settings::default());
-    let model = Study::new(&system, &logs, &settings)
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let model = Study::new(&declared, &logs, &settings)
         .fit_declared()
         .unwrap();
     let predicted = model.predict(&logs[0], 0.5);

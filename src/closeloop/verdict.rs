@@ -28,20 +28,16 @@ pub(super) fn verdict(
     refined: &Refined<'_>,
     errors: &Errors,
 ) -> (Verdict, String) {
-    match failure(found, refined).or_else(|| inconclusive(study, found, errors)) {
+    let added = study.added(&found.chosen.after.model).len();
+    match failure(found, refined).or_else(|| inconclusive(study, added, errors)) {
         Some(reason) => (Verdict::Inconclusive, reason),
-        None => conclusion(added(study, found), &found.unexplained),
+        None => conclusion(added, &found.unexplained),
     }
-}
-
-/// Number of effects that were added to the declared model.
-fn added(study: &Study<'_>, found: &Found) -> usize {
-    found.after.effects.len() - study.system.effects.len()
 }
 
 /// Which fit failed or did not converge, if one did that the verdict rests on.
 fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
-    if let Some(error) = &found.failure {
+    if let Some(error) = &found.chosen.failure {
         return Some(format!(
             "the effects selected on a part of the training logs could not be fitted to all of them: {error}"
         ));
@@ -51,12 +47,12 @@ fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
             "the final fit in fine steps failed, the values are those of the coarser one: {error}"
         ));
     }
-    let fit = &refined.model.fit;
+    let fit = &refined.after.fit;
     (!fit.termination.has_converged()).then(|| format!("the final fit has {}", fit.termination))
 }
 
 /// Why the logs allow no conclusion, if they do not.
-fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<String> {
+fn inconclusive(study: &Study<'_>, added: usize, errors: &Errors) -> Option<String> {
     let settings = &study.settings.verdict;
     let windows = study.shooting.windows.len();
     if windows < settings.fewest_windows {
@@ -73,7 +69,7 @@ fn inconclusive(study: &Study<'_>, found: &Found, errors: &Errors) -> Option<Str
         );
     }
     let worse = errors.after.position_rms() > settings.worse * errors.before.position_rms();
-    (added(study, found) > 0 && worse).then(|| {
+    (added > 0 && worse).then(|| {
         "the effects lower the loss on left-out stretches of the training logs but raise the error on the test logs: \
          do not use them before logs of more varied motion confirm them"
             .into()

@@ -13,6 +13,14 @@ pub struct OutputError {
     pub source: io::Error,
 }
 
+impl OutputError {
+    /// The error of `path` that the system reports.
+    pub fn of(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self { path, source }
+    }
+}
+
 /// Write a file whole or not at all: under a temporary name in the same folder, which is then renamed. Symbolic links
 /// are followed, so that the file that a link points to is written and the link stays.
 ///
@@ -46,27 +54,63 @@ pub fn write_with(
         file.persist(&target).map_err(|error| error.error)?;
         Ok(())
     };
-    written().map_err(|source| OutputError {
-        path: path.to_owned(),
-        source,
-    })
+    written().map_err(OutputError::of(path))
 }
 
-/// Move the complete file `from` to `to`, as [`write_whole`] would write it there.
+/// Move all files and folders in the folder `from` into the folder `to`: each file as [`write_whole`] would write it
+/// there, each folder in place of the one of its name. Either all of them have somewhere to go, or none is moved.
 ///
 /// # Errors
-/// As [`write_whole`].
-pub fn move_to(from: &Path, to: &Path) -> Result<(), OutputError> {
+/// A file whose place is taken by what is no regular file, a folder whose place is taken by a file, or as
+/// [`write_whole`].
+pub fn move_contents(from: &Path, to: &Path) -> Result<(), OutputError> {
+    fs::create_dir_all(to).map_err(OutputError::of(to))?;
+    let entries = fs::read_dir(from).map_err(OutputError::of(from))?;
+    let pair = |entry: io::Result<fs::DirEntry>| {
+        let entry = entry.map_err(OutputError::of(from))?;
+        Ok((entry.path(), to.join(entry.file_name())))
+    };
+    let pairs: Vec<_> = entries.map(pair).collect::<Result<_, _>>()?;
+    for (from, to) in &pairs {
+        check_target(from, to).map_err(OutputError::of(to))?;
+    }
+    for (from, to) in &pairs {
+        if from.is_dir() {
+            replace_folder(from, to).map_err(OutputError::of(to))?;
+        } else {
+            move_file(from, to)?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether `from` can take the place of what is at `to`.
+fn check_target(from: &Path, to: &Path) -> io::Result<()> {
+    if !from.is_dir() {
+        return target_of(to).map(drop);
+    }
+    if to.exists() && !to.is_dir() {
+        let message = "it is not a folder";
+        return Err(io::Error::new(ErrorKind::InvalidInput, message));
+    }
+    Ok(())
+}
+
+fn replace_folder(from: &Path, to: &Path) -> io::Result<()> {
+    if to.is_dir() {
+        fs::remove_dir_all(to)?;
+    }
+    fs::rename(from, to)
+}
+
+fn move_file(from: &Path, to: &Path) -> Result<(), OutputError> {
     let moved = target_of(to).and_then(|target| fs::rename(from, target));
     match moved {
         // A link may lead to another file system, where a file can only be written anew.
         Err(error) if error.kind() == ErrorKind::CrossesDevices => write_with(to, |file| {
             io::copy(&mut fs::File::open(from)?, file).map(drop)
         }),
-        moved => moved.map_err(|source| OutputError {
-            path: to.to_owned(),
-            source,
-        }),
+        moved => moved.map_err(OutputError::of(to)),
     }
 }
 
@@ -121,7 +165,7 @@ fn with_usual_permissions() -> tempfile::Builder<'static, 'static> {
 mod tests {
     use std::fs;
 
-    use super::{ErrorKind, io, move_to, write_whole, write_with};
+    use super::{ErrorKind, io, move_contents, write_whole, write_with};
 
     #[test]
     fn a_failure_leaves_the_file_that_was_there_and_nothing_else() {
@@ -155,9 +199,9 @@ mod tests {
             write_whole(&link, contents).unwrap();
             assert_eq!(fs::read(&file).unwrap(), contents);
         }
-        let staged = folder.path().join("staged");
-        fs::write(&staged, "third").unwrap();
-        move_to(&staged, &link).unwrap();
+        let staged = tempfile::tempdir().unwrap();
+        fs::write(staged.path().join("link"), "third").unwrap();
+        move_contents(staged.path(), folder.path()).unwrap();
         assert_eq!(fs::read(&file).unwrap(), b"third");
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read_dir(elsewhere.path()).unwrap().count(), 1);
@@ -177,5 +221,28 @@ mod tests {
             assert_eq!(error.source.kind(), ErrorKind::InvalidInput);
             assert!(error.to_string().contains(kind), "{error}");
         }
+    }
+
+    #[test]
+    fn files_are_moved_where_each_has_a_place_and_else_none_is() {
+        let (from, to) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        for name in ["a", "b"] {
+            fs::write(from.path().join(name), name).unwrap();
+        }
+        fs::create_dir(from.path().join("c")).unwrap();
+        for taken in ["a", "b"] {
+            fs::create_dir(to.path().join(taken)).unwrap();
+            let error = move_contents(from.path(), to.path()).unwrap_err();
+            assert_eq!(error.path, to.path().join(taken));
+            fs::remove_dir(&error.path).unwrap();
+        }
+        fs::write(to.path().join("c"), "").unwrap();
+        let error = move_contents(from.path(), to.path()).unwrap_err();
+        assert!(error.to_string().contains("it is not a folder"), "{error}");
+        assert_eq!(fs::read_dir(to.path()).unwrap().count(), 1);
+        fs::remove_file(error.path).unwrap();
+        move_contents(from.path(), to.path()).unwrap();
+        assert_eq!(fs::read_dir(to.path()).unwrap().count(), 3);
+        assert_eq!(fs::read_dir(from.path()).unwrap().count(), 0);
     }
 }

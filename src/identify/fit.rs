@@ -1,59 +1,16 @@
-use thiserror::Error;
-
-use super::levenberg_marquardt::{Search, Termination};
-use super::normal_equations::Reduced;
+use super::levenberg_marquardt::Search;
+use super::outcome::{Fit, FitError, Termination};
 use super::sensitivity::{Local, Tangent};
-use super::shooting::{Shooting, WindowTerms};
-use super::values::{Column, Values};
+use super::shooting::Shooting;
+use super::values::Values;
 use crate::model::Dynamics;
-
-/// Why parameters could not be fitted.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum FitError {
-    #[error(
-        "the logs give no window to fit: every stretch is shorter than a window, broken by a gap or left out; record longer logs or leave out less"
-    )]
-    NoWindow,
-    #[error(
-        "with its starting values the model diverges in {diverged} of {windows} windows of the logs; give parameters nearer to the rig in the model file"
-    )]
-    Diverged { diverged: usize, windows: usize },
-}
-
-/// What a fit says beside the values that it found.
-#[derive(Debug, Clone)]
-pub struct Fit {
-    /// Which parameters were free.
-    pub active: Vec<usize>,
-    /// The free values: one column for each free parameter, or one for each log where it differs by log.
-    pub columns: Vec<Column>,
-    /// Each window's own values: its start state, then forces if they were free.
-    pub locals: Vec<Vec<f64>>,
-    /// Robust standard deviation of the normalised residuals: 1 where the model explains all but noise.
-    pub scale: f64,
-    /// Sum of the losses at that scale.
-    pub cost: f64,
-    /// The normal equations of each window in the free values, its own values eliminated.
-    pub reduced: Vec<Reduced>,
-    /// Steps that were taken.
-    pub steps: usize,
-    /// Why there were no more.
-    pub termination: Termination,
-}
-
-impl Fit {
-    /// Zero normal equations in the free values.
-    pub fn zero_equations(&self) -> WindowTerms {
-        WindowTerms::zeros(self.columns.len())
-    }
-}
 
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
 const MOST_STEPS: usize = 40;
 
 /// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `locals`, with every window's
 /// start state (and forces) free. `scale` fixes the scale of the residuals; without it, it is estimated by their median
-/// absolute deviation as the fit proceeds. Returns the values found and what the fit says of them.
+/// absolute deviation as the fit proceeds. Returns the values found and how the fit ended.
 ///
 /// # Errors
 /// No window, or a model that diverges at the starting values. A fit that does not converge is no error: its
@@ -81,7 +38,7 @@ pub fn fit(
     Ok(search.finish(termination))
 }
 
-/// A model as it stands, no value changed, and the normal equations of each window in the parameters `active` there.
+/// Evaluate a model without changing a value: the normal equations of each window in the parameters `active`.
 ///
 /// # Errors
 /// As [`fit`].

@@ -1,6 +1,6 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::fit::Fit;
+use super::outcome::Fit;
 use super::values::Values;
 use crate::model::Dynamics;
 
@@ -75,10 +75,7 @@ fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
 }
 
 fn relative_information(dynamics: &Dynamics, found: &Values, fit: &Fit) -> DMatrix<f64> {
-    let mut all = fit.zero_equations();
-    fit.reduced
-        .iter()
-        .for_each(|window| window.add_to(&mut all));
+    let all = fit.equations();
     let magnitude = |i: usize| {
         let scale = dynamics.parameters[fit.columns[i].parameter].scale;
         found.get(fit.columns[i]).abs().max(1e-3 * scale)

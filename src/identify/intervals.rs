@@ -1,7 +1,8 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::fit::Fit;
+use super::normal_equations::with_unit_diagonal;
+use super::outcome::Fit;
 use super::shooting::Shooting;
 
 /// How well a fit determines its free parameters.
@@ -51,15 +52,11 @@ pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> 
 /// loss is taken as quadratic around the joint optimum.
 pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
-    let count = blocks.last().map_or(0, |last| last + 1);
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
-    let mut all = fit.zero_equations();
-    let mut parts = vec![fit.zero_equations(); count];
-    for (window, &block) in fit.reduced.iter().zip(&blocks) {
-        window.add_to(&mut all);
-        window.add_to(&mut parts[block]);
-    }
+    let all = fit.equations();
+    let mut parts = fit.equations_by(&blocks);
+    let count = parts.len();
     let alone: Vec<usize> = (0..size)
         .filter(|&i| blocks_of[i] < 2 && fit.columns[i].log.is_some())
         .collect();
@@ -116,12 +113,8 @@ fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     if hessian.is_empty() {
         return (hessian.clone(), hessian.clone());
     }
-    // Unit diagonal, so that "flat" does not depend on units.
-    let scale = hessian
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
-    let size = hessian.nrows();
-    let scaled = DMatrix::from_fn(size, size, |i, j| hessian[(i, j)] * scale[i] * scale[j]);
+    // "Flat" does not depend on units where the diagonal is one.
+    let (scaled, scale) = with_unit_diagonal(hessian);
     let eigen = SymmetricEigen::new(scaled);
     let best = eigen
         .eigenvalues

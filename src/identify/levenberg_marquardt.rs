@@ -1,59 +1,12 @@
-use std::fmt;
-
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 
-use super::fit::{Fit, FitError};
-use super::normal_equations::{Normal, Reduced, solve_with_held};
+use super::normal_equations::{Normal, Reduced, WindowTerms, solve_with_held};
+use super::outcome::{Fit, FitError, Termination};
 use super::sensitivity::Tangent;
-use super::shooting::{Shooting, WindowTerms};
+use super::shooting::Shooting;
 use super::values::{Layout, Values};
 use crate::data::statistics::{SIGMA_PER_MAD, upper_median};
 use crate::model::Dynamics;
-
-/// Why a fit ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-#[non_exhaustive]
-pub enum Termination {
-    /// Converged: the last step lowered the cost by less than the share that matters.
-    SmallDecrease,
-    /// Converged: no step lowers the cost, and its quadratic model predicts that none would by a share that matters.
-    SmallPredictedDecrease,
-    /// Not converged: no step lowers the cost, although its quadratic model predicts a decrease.
-    NoDescent,
-    /// Not converged: the normal equations are not positive definite or not finite, however much they are damped.
-    Singular,
-    /// Not converged: the cost was still falling after the largest number of steps.
-    StepLimit,
-    /// No value was free to change but the windows' own, or none at all: the model was evaluated as it was given.
-    AsGiven,
-}
-
-impl Termination {
-    /// Whether the values may be taken as the minimum of the cost.
-    pub fn has_converged(self) -> bool {
-        match self {
-            Self::SmallDecrease | Self::SmallPredictedDecrease | Self::AsGiven => true,
-            Self::NoDescent | Self::Singular | Self::StepLimit => false,
-        }
-    }
-}
-
-impl fmt::Display for Termination {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::SmallDecrease => "converged: the last step hardly lowered the loss",
-            Self::SmallPredictedDecrease => "converged: no step lowers the loss any further",
-            Self::NoDescent => {
-                "not converged: no step lowers the loss, although its derivatives predict a decrease"
-            }
-            Self::Singular => "not converged: the normal equations cannot be solved",
-            Self::StepLimit => "not converged: the loss was still falling at the last step allowed",
-            Self::AsGiven => "evaluated as given",
-        })
-    }
-}
 
 /// A fit that estimates ends when a step lowers the cost by less than this share.
 const ENOUGH: f64 = 1e-6;
@@ -354,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_says_that_it_has_converged() {
+    fn convergence_is_reported() {
         let (termination, k) = end("k", 1.0, 40).unwrap();
         assert!(termination.has_converged(), "{termination:?}");
         assert!((k - 2.0).abs() < 1e-6, "{k}");
@@ -368,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_out_of_steps_says_so() {
+    fn a_fit_that_reaches_the_step_limit_reports_it() {
         let (termination, k) = end("exp(k)", -3.0, 1).unwrap();
         assert_eq!(termination, Termination::StepLimit);
         assert!(!termination.has_converged() && k.exp() < 1.9, "{k}");
@@ -384,7 +337,7 @@ mod tests {
 
     /// The derivative at 1 points up to 2, but off 1 the model is far away on either side.
     #[test]
-    fn a_fit_that_its_derivatives_mislead_has_not_converged() {
+    fn a_fit_without_descent_is_reported_as_not_converged() {
         let (termination, k) = end("k + 100*abs(sign(k - 1))", 1.0, 40).unwrap();
         assert_eq!((termination, k), (Termination::NoDescent, 1.0));
         assert!(!termination.has_converged());

@@ -3,9 +3,28 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::shooting::WindowTerms;
 use super::values::Layout;
 use crate::sim::Window;
+
+/// The normal equations of a window: shared parameters first, then the window's own free values.
+#[derive(Debug, Clone)]
+pub struct WindowTerms {
+    /// Sum of the Huber losses of the residuals.
+    pub cost: f64,
+    pub gradient: DVector<f64>,
+    pub hessian: DMatrix<f64>,
+}
+
+impl WindowTerms {
+    /// Zero normal equations of this many free values.
+    pub fn zeros(values: usize) -> Self {
+        Self {
+            cost: 0.0,
+            gradient: DVector::zeros(values),
+            hessian: DMatrix::zeros(values, values),
+        }
+    }
+}
 
 /// The normal equations of one window in some of a fit's free values, its own values eliminated.
 #[derive(Debug, Clone)]
@@ -145,6 +164,15 @@ pub(super) fn solve_with_held(
         step[i] = *value;
     }
     step.iter().all(|value| value.is_finite()).then_some(step)
+}
+
+/// A matrix in units in which its diagonal is one, and the size of each unit; a diagonal that is not positive stays.
+pub fn with_unit_diagonal(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let unit = matrix
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+    let scaled = |i: usize, j: usize| matrix[(i, j)] * unit[i] * unit[j];
+    (DMatrix::from_fn(unit.len(), unit.len(), scaled), unit)
 }
 
 fn scatter(part: &DVector<f64>, all: &mut DVector<f64>, places: &[usize]) {

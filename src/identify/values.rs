@@ -38,7 +38,7 @@ impl Values {
         }
     }
 
-    /// The model with these values; what it knows of other logs stays.
+    /// The model with these values; values in other logs are kept.
     pub fn put_into(&self, dynamics: &Dynamics, logs: &[Log]) -> Dynamics {
         let mut found = dynamics.clone().with_values(self.common.iter().copied());
         found

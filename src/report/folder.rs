@@ -7,7 +7,7 @@ use super::plot::PlotError;
 use super::schema::Report;
 use super::{model_file, picture, text};
 use crate::closeloop::{LearnError, Outcome};
-use crate::files::{OutputError, folder_of, move_to, write_whole};
+use crate::files::{OutputError, folder_of, move_contents, write_whole};
 use crate::model::Origin;
 
 /// Why results could not be written.
@@ -22,28 +22,36 @@ pub enum WriteError {
 }
 
 /// Write report.json, report.md, model.toml, the plots and the checkpoint into `folder`, and return the report.
-/// All is written into a folder beside it first, then moved file by file: a failure leaves `folder` as it was.
+/// All is written into a folder beside it first and moved when every file has somewhere to go: a failure leaves `folder`
+/// as it was.
 ///
 /// # Errors
-/// An unwritable folder or a full disk.
+/// A folder that cannot be written, a full disk, or a file of the report whose place is taken by what is no regular file.
 pub fn write(
     folder: impl AsRef<Path>,
     outcome: &Outcome,
     origin: &Origin,
 ) -> Result<Report, WriteError> {
     let folder = folder.as_ref();
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| OutputError { path, source }
-    };
     let parent = folder_of(folder);
-    std::fs::create_dir_all(parent).map_err(failed(parent))?;
-    let staging = tempfile::TempDir::new_in(parent).map_err(failed(folder))?;
-    let report = Report::new(outcome, origin.seed);
-    let put =
-        |name: &str, contents: &str| write_whole(&staging.path().join(name), contents.as_bytes());
+    std::fs::create_dir_all(parent).map_err(OutputError::of(parent))?;
+    let staging = tempfile::TempDir::new_in(parent).map_err(OutputError::of(folder))?;
+    let report = Report::new(outcome, origin);
+    put_all(staging.path(), &report, outcome, origin)?;
+    move_contents(staging.path(), folder)?;
+    Ok(report)
+}
+
+/// Write the files of a report into an empty folder.
+fn put_all(
+    folder: &Path,
+    report: &Report,
+    outcome: &Outcome,
+    origin: &Origin,
+) -> Result<(), WriteError> {
+    let put = |name: &str, contents: &str| write_whole(&folder.join(name), contents.as_bytes());
     let json =
-        serde_json::to_string_pretty(&report).expect("a report has only finite numbers and texts");
+        serde_json::to_string_pretty(report).expect("a report has only finite numbers and texts");
     put("report.json", &(json + "\n"))?;
     put(MODEL, &model_file(outcome))?;
     put(TEXT, &text(outcome, origin.seed))?;
@@ -60,20 +68,7 @@ pub fn write(
             model_toml: model_file(outcome),
             ..origin.clone()
         };
-        learned.save(&staging.path().join(CHECKPOINT), &origin)?;
+        learned.save(&folder.join(CHECKPOINT), &origin)?;
     }
-    std::fs::create_dir_all(folder).map_err(failed(folder))?;
-    for entry in std::fs::read_dir(staging.path()).map_err(failed(folder))? {
-        let from = entry.map_err(failed(folder))?.path();
-        let to = folder.join(from.file_name().expect("a file in a folder has a name"));
-        if from.is_dir() {
-            if to.is_dir() {
-                std::fs::remove_dir_all(&to).map_err(failed(&to))?;
-            }
-            std::fs::rename(&from, &to).map_err(failed(&to))?;
-        } else {
-            move_to(&from, &to)?;
-        }
-    }
-    Ok(report)
+    Ok(())
 }

@@ -4,12 +4,11 @@ use super::calibration::CalibrationEntry;
 use super::schema::{
     AlternativeEntry, AuditEntry, ContenderEntry, ContradictedEntry, EffectEntry, EffectName,
     ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry, LogsEntry,
-    ModelError, NormEntry, OmnibusEntry, ParameterEntry, ProposalEntry, Report, TakenBackEntry,
-    TriedEntry, UnexplainedEntry,
+    ModelError, NormEntry, ParameterEntry, Report, TriedEntry, UnexplainedEntry, WithdrawnEntry,
 };
-use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, TakenBack};
-use crate::identify::Fit;
-use crate::model::{FittedEffect, OwnValue, Parameter};
+use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, Withdrawn};
+use crate::identify::{Fit, FitError};
+use crate::model::{FittedEffect, Origin, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
@@ -19,13 +18,15 @@ pub(super) const CHECKPOINT: &str = "checkpoint";
 pub(super) const PLOTS: [&str; 3] = ["predictions.svg", "residual.svg", "errors.svg"];
 
 impl Report {
-    /// The outcome of a run with this seed.
-    pub fn new(outcome: &Outcome, seed: u64) -> Self {
-        let model = outcome.models.after.absorbed();
+    /// The outcome of a run of this origin.
+    pub fn new(outcome: &Outcome, origin: &Origin) -> Self {
+        let model = outcome.models.after.model.absorbed();
         Self {
             schema: 1,
             version: env!("CARGO_PKG_VERSION"),
-            seed,
+            seed: origin.seed,
+            configuration: origin.config.clone(),
+            settings: outcome.given.settings.clone(),
             system: model.name.clone(),
             joints: model.joints,
             verdict: outcome.verdict,
@@ -37,7 +38,7 @@ impl Report {
                 .iter()
                 .map(alternative)
                 .collect(),
-            taken_back: outcome.effects.taken_back.iter().map(taken_back).collect(),
+            withdrawn: outcome.effects.withdrawn.iter().map(withdrawn).collect(),
             confirmed_on: outcome.effects.confirmed_on,
             unexplained: left(outcome),
             parameters: model.parameters.iter().map(parameter).collect(),
@@ -54,18 +55,8 @@ impl Report {
             },
             error: errors(outcome),
             residual_norm: NormEntry {
-                before: outcome
-                    .remainder
-                    .before
-                    .as_ref()
-                    .ok()
-                    .map(ResidualForce::norm),
-                after: outcome
-                    .remainder
-                    .after
-                    .as_ref()
-                    .ok()
-                    .map(ResidualForce::norm),
+                before: norm(&outcome.remainder.before),
+                after: norm(&outcome.remainder.after),
             },
             logs: logs(outcome),
             audit: outcome
@@ -137,10 +128,10 @@ fn effect_name(effect: &FittedEffect) -> EffectName {
     }
 }
 
-fn taken_back(taken_back: &TakenBack) -> TakenBackEntry {
-    TakenBackEntry {
-        effect: effect_name(&taken_back.effect),
-        reason: taken_back.reason.clone(),
+fn withdrawn(withdrawn: &Withdrawn) -> WithdrawnEntry {
+    WithdrawnEntry {
+        effect: effect_name(&withdrawn.effect),
+        reason: withdrawn.reason.clone(),
     }
 }
 
@@ -160,28 +151,17 @@ fn shifted(effect: &FittedEffect) -> Option<String> {
 }
 
 fn left(outcome: &Outcome) -> UnexplainedEntry {
-    let left = &outcome.remainder.unexplained;
+    let remainder = &outcome.remainder;
     UnexplainedEntry {
-        fraction: left.fraction,
-        p_value: left.p_value,
-        place: left.place.clone(),
-        omnibus: OmnibusEntry {
-            p_value: left.omnibus.p_value,
-            share: left.omnibus.shares.clone(),
-        },
-        probes: left.probes.clone(),
-        curves: (outcome.remainder.after.as_ref())
+        left: remainder.unexplained.clone(),
+        curves: (remainder.after.as_ref())
             .map_or_else(|_| Vec::new(), |force| force.curves.clone()),
-        proposal: outcome
-            .remainder
-            .proposal
-            .as_ref()
-            .map(|proposal| ProposalEntry {
-                joint: proposal.joint,
-                formula: proposal.formula.clone(),
-                explains: proposal.explains,
-            }),
+        proposal: remainder.proposal.clone(),
     }
+}
+
+fn norm(force: &Result<ResidualForce, FitError>) -> Option<f64> {
+    force.as_ref().ok().map(ResidualForce::norm)
 }
 
 fn ended(fit: &Fit) -> FitEntry {
@@ -194,7 +174,7 @@ fn ended(fit: &Fit) -> FitEntry {
 
 fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
     let verdict = &outcome.models.identifiability;
-    let name = |k: &usize| outcome.models.before.parameters[*k].name.clone();
+    let name = |k: &usize| outcome.models.before.model.parameters[*k].name.clone();
     IdentifiabilityEntry {
         free: verdict.free,
         determined: verdict.determined,
@@ -204,7 +184,7 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
 }
 
 fn errors(outcome: &Outcome) -> ErrorEntry {
-    let joints = outcome.models.after.joints;
+    let joints = outcome.models.after.model.joints;
     let model = |assessment: &Assessment| model_error(summarise(&assessment.horizons, joints));
     let contender = |(name, assessment): &(String, Assessment)| ContenderEntry {
         name: name.clone(),

@@ -1,5 +1,6 @@
 //! What closing the loop found, for people and for programs.
 
+mod accuracy;
 mod calibration;
 mod film;
 mod folder;
@@ -7,6 +8,7 @@ mod json;
 mod model_file;
 mod picture;
 pub mod plot;
+mod remainder;
 mod schema;
 mod summary;
 mod tensorboard;

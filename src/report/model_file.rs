@@ -6,6 +6,6 @@ pub fn model_file(outcome: &Outcome) -> String {
     format!(
         "# Fitted by residyn {}; the declared equations, then the effects that were found.\n\n{}",
         env!("CARGO_PKG_VERSION"),
-        outcome.models.after.absorbed().file_text()
+        outcome.models.after.model.absorbed().file_text()
     )
 }

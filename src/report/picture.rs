@@ -26,8 +26,8 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let horizon = horizons.fold(0.0, f64::max);
     let fitted = &outcome.models;
     let mut models: Vec<(Role, &str, Dynamics)> = vec![
-        (Role::Before, FITTED, fitted.before.dynamics()),
-        (Role::After, WITH_EFFECTS, fitted.after.dynamics()),
+        (Role::Before, FITTED, fitted.before.model.dynamics()),
+        (Role::After, WITH_EFFECTS, fitted.after.model.dynamics()),
     ];
     if let Some(learned) = &outcome.learned {
         models.push((Role::Hybrid, WITH_NETWORK, learned.hybrid().clone()));
@@ -43,7 +43,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
             }))
             .collect(),
     };
-    let panels: Vec<Panel> = Joint::all(outcome.models.after.joints).map(panel).collect();
+    let panels: Vec<Panel> = Joint::all(outcome.models.after.model.joints)
+        .map(panel)
+        .collect();
     let title = format!(
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
@@ -92,7 +94,9 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
             shape(Role::After, WITH_EFFECTS, joint, with_effects),
         ],
     };
-    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.joints).map(panel).collect();
+    let panels: Vec<ShapePanel> = Joint::all(outcome.models.after.model.joints)
+        .map(panel)
+        .collect();
     super::plot::residual_shape(
         &panels,
         "Residual force: what each model leaves unexplained",
@@ -132,7 +136,7 @@ fn shape(
 /// Open-loop errors at each horizon, of the fitted models and of those scored as they are. The declared model
 /// as written is left to the tables: its values may be guesses, beside which no other bar could be read.
 pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
-    let joints = outcome.models.after.joints;
+    let joints = outcome.models.after.model.joints;
     let errors = &outcome.errors;
     let named = |role: Role, label: &str, model: &Assessment| {
         let rmse = summarise(&model.horizons, joints).position_rmse;

@@ -5,14 +5,14 @@
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::calibration::CalibrationEntry;
-use crate::closeloop::{Curve, Probed, Separation, SplitMethod, Verdict};
+use crate::closeloop::{Curve, Proposal, Separation, Settings, SplitMethod, Unexplained, Verdict};
 use crate::data::{Finding as AuditFinding, Joint};
 
 /// The JSON schema (draft 2020-12) of [`Report`].
-pub fn schema() -> serde_json::Value {
+pub fn schema() -> Value {
     let settings = SchemaSettings::draft2020_12().for_serialize();
     let mut schema = settings.into_generator().into_root_schema_for::<Report>();
     schema.insert(
@@ -31,6 +31,10 @@ pub struct Report {
     /// version of the program
     pub(super) version: &'static str,
     pub(super) seed: u64,
+    /// the command with its arguments as resolved; of a program that calls the library, what it gives
+    pub(super) configuration: Value,
+    /// every tuning constant of closing the loop
+    pub(super) settings: Settings,
     /// name of the declared system
     pub(super) system: String,
     #[schemars(range(min = 1))]
@@ -43,7 +47,8 @@ pub struct Report {
     /// other explanations that these logs do not rule out
     pub(super) alternatives: Vec<AlternativeEntry>,
     /// effects that were selected and then withdrawn
-    pub(super) taken_back: Vec<TakenBackEntry>,
+    #[serde(rename = "taken_back")]
+    pub(super) withdrawn: Vec<WithdrawnEntry>,
     /// number of stretches of two seconds, not used to select the effects, that confirm them
     pub(super) confirmed_on: usize,
     pub(super) unexplained: UnexplainedEntry,
@@ -131,7 +136,7 @@ pub(super) struct AlternativeEntry {
 }
 
 #[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct TakenBackEntry {
+pub(super) struct WithdrawnEntry {
     #[serde(flatten)]
     pub effect: EffectName,
     pub reason: String,
@@ -139,32 +144,12 @@ pub(super) struct TakenBackEntry {
 
 #[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct UnexplainedEntry {
-    /// share of the residual variance above the sensor's noise that is left
-    #[schemars(range(min = 0))]
-    pub fraction: f64,
-    #[schemars(range(min = 0, max = 1))]
-    pub p_value: f64,
-    /// what the rest depends on: q1, qd1, tau1, t, products of them such as q1*qd1, unknown where it is none of them,
-    /// none where nothing that matters is left
-    #[serde(rename = "where")]
-    pub place: String,
-    pub omnibus: OmnibusEntry,
-    /// flexible shapes that name no effect
-    pub probes: Vec<Probed>,
+    #[serde(flatten)]
+    pub left: Unexplained,
     /// residual generalised force as a function of each variable alone, with a pointwise 95 % band
     pub curves: Vec<Curve>,
     /// null where nothing is left or nothing fits it
-    pub proposal: Option<ProposalEntry>,
-}
-
-/// whether the residuals are more than the sensor's noise, whatever they depend on
-#[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct OmnibusEntry {
-    #[schemars(range(min = 0, max = 1))]
-    pub p_value: f64,
-    /// share of the residual variance that is no white noise, one a joint
-    #[schemars(inner(range(min = 0, max = 1)))]
-    pub share: Vec<f64>,
+    pub proposal: Option<Proposal>,
 }
 
 /// the fit of the declared model, and the final one with the effects
@@ -181,16 +166,6 @@ pub(super) struct FitEntry {
     pub termination: String,
     /// steps that were taken
     pub steps: usize,
-}
-
-/// a formula for what is left, no finding
-#[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct ProposalEntry {
-    pub joint: Joint,
-    pub formula: String,
-    /// share of the remainder that it takes away on stretches held out of its fit
-    #[schemars(range(max = 1))]
-    pub explains: f64,
 }
 
 /// what the logs determine of the declared parameters

@@ -1,7 +1,8 @@
 use std::fmt::Write;
 
 use super::calibration::line;
-use super::text::{headline, proposal_line};
+use super::remainder::proposal_line;
+use super::text::headline;
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
 use crate::data::Joint;
@@ -27,13 +28,13 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
     for &k in &outcome.models.identifiability.hold {
-        let name = &outcome.models.before.parameters[k].name;
+        let name = &outcome.models.before.model.parameters[k].name;
         let _ = writeln!(
             out,
             "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
-    let joints = outcome.models.after.joints;
+    let joints = outcome.models.after.model.joints;
     let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
     let (before, after) = (
         numbers(&outcome.errors.before),
@@ -68,7 +69,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
 
 /// `joint 1 0.00942, 0.157, 0.375 rad at 0.1, 0.5, 1 s`
 fn errors(outcome: &Outcome, model: &Assessment) -> String {
-    let joints = outcome.models.after.joints;
+    let joints = outcome.models.after.model.joints;
     let Summary {
         horizons_s,
         position_rmse,

@@ -19,7 +19,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// What tells this run from a `saved` one, in words; none where they are the same.
+    /// How this run differs from a `saved` one, in words; none where they are the same.
     pub fn difference(&self, saved: &Self) -> Option<String> {
         let input = || {
             let mut names = saved.inputs.keys().chain(self.inputs.keys());

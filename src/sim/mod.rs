@@ -21,5 +21,5 @@ pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme, Stage};
 pub use sensors::{Sensors, as_modelled, with_own_angles};
 pub use simulator::{Hold, Simulator};
 pub use stepper::Stepper;
-pub use substeps::{FIT_S, PREDICTION_S, RIG_S, substeps};
+pub use substeps::{FINE_FIT_S, FIT_S, PREDICTION_S, RIG_S, substeps};
 pub use window::{Window, cut, initial_state};

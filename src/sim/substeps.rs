@@ -5,6 +5,8 @@ use crate::lanes::Row;
 /// In fits, and in motions that are designed for them: at 2 ms the classical Runge-Kutta method stays stable and
 /// accurate with dry friction smoothed to a fraction of a percent of the top speed.
 pub const FIT_S: f64 = 2e-3;
+/// In the final estimate of a model that has been chosen.
+pub const FINE_FIT_S: f64 = 5e-4;
 /// In the first integration of an open-loop error, whose steps are then halved until it no longer changes, and in
 /// pictures of predictions.
 pub const PREDICTION_S: f64 = 1e-3;

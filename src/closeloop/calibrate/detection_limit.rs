@@ -1,13 +1,11 @@
-use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::{candidates, starts};
-use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::select::{candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::split::set_aside;
 use crate::closeloop::study::Study;
-use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty};
+use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty, with_unit_diagonal};
 use crate::model::{Effect, FittedEffect};
 
 /// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
@@ -56,7 +54,7 @@ pub(super) fn detection_limits(
     let mut part = study.on(&chosen_by);
     part.identifiability = study.identifiability.clone();
     let baseline = Baseline::new(&part, accepted)?;
-    let all = candidates(&part, library, &accepted.effects);
+    let all = candidates(&part, library, &accepted.model.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
     #[allow(clippy::cast_precision_loss)] // few trials
     let level = study.settings.select.false_alarm / trials.max(1) as f64;
@@ -84,14 +82,14 @@ struct Baseline<'a> {
 
 impl<'a> Baseline<'a> {
     fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let dynamics = accepted.dynamics();
+        let dynamics = accepted.model.dynamics();
         let scale = accepted.fit.scale;
         let states = study.shooting.initial_locals(0);
         let (_, free) = fit(&study.shooting, &dynamics, &[], states, Some(scale))?;
         let locals = free.locals;
         let active = &accepted.fit.active;
         let fit = as_it_stands(&study.shooting, &dynamics, active, locals.clone(), scale)?;
-        let loss = left_out_losses(&fit, &folds(study)).iter().sum();
+        let loss = left_out_losses(study, &fit).iter().sum();
         Ok(Self {
             study,
             accepted,
@@ -178,10 +176,7 @@ impl<'a> Baseline<'a> {
     /// The accepted model with one more free value, a switch of the effect, at zero.
     fn with(&self, start: &FittedEffect, switch: usize) -> Result<Fit, FitError> {
         let accepted = self.accepted;
-        let mut effects = accepted.effects.clone();
-        effects.push(start.clone());
-        let model = self.study.smoothed(&accepted.with_effects(effects));
-        let dynamics = model.dynamics();
+        let dynamics = self.study.extended(accepted, std::slice::from_ref(start));
         let switch = dynamics.parameters.len() - start.values.len() + switch;
         as_it_stands(
             &self.study.shooting,
@@ -196,21 +191,14 @@ impl<'a> Baseline<'a> {
 /// Information on the last free value, the others free as well; `None` where it is no more than rounding.
 fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     let last = fit.columns.len() - 1;
-    let mut terms = fit.zero_equations();
-    fit.reduced
-        .iter()
-        .for_each(|window| window.add_to(&mut terms));
-    let all = terms.hessian;
-    // Unit diagonal, so that rounding does not depend on units.
-    let unit = all
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-    let scaled = |i: usize, j: usize| all[(i, j)] * unit[i] * unit[j];
-    let others = DMatrix::from_fn(last, last, scaled);
-    let cross = DVector::from_fn(last, |i, _| scaled(i, last));
+    let all = fit.equations().hessian;
+    // Rounding does not depend on units where the diagonal is one.
+    let (scaled, _) = with_unit_diagonal(&all);
+    let others = scaled.view((0, 0), (last, last)).into_owned();
+    let cross = scaled.view((0, last), (last, 1)).into_owned();
     let explained = cross.dot(&(others.pseudo_inverse(1e-12).ok()? * &cross));
     let own = 1.0 - explained;
-    (own > least && unit[last] > 0.0).then(|| own * all[(last, last)])
+    (own > least && all[(last, last)] > 0.0).then(|| own * all[(last, last)])
 }
 
 /// Standard deviations from zero at which one of so many switches are significant at level `p`: the threshold of

@@ -73,7 +73,7 @@ fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
         .then_some(hidden)
 }
 
-/// Where the work stands, for a progress display.
+/// Progress of the work, for a display.
 #[derive(Debug, Clone, Copy)]
 pub struct Repetition<'s> {
     pub number: usize,
@@ -153,7 +153,7 @@ struct Repeat<'a> {
 impl Repeat<'_> {
     fn find(&mut self, logs: &[Log], rng: &mut impl Rng, text: &str) -> Result<Found, StudyError> {
         let mut study = Study {
-            system: &self.declared,
+            declared: &self.declared,
             ..self.study.on(logs)
         };
         let (number, of) = (self.done, self.of);
@@ -170,6 +170,6 @@ impl Repeat<'_> {
     }
 
     fn named(&self, found: &Found) -> Vec<FittedEffect> {
-        found.after.effects[self.declared.effects.len()..].to_vec()
+        found.chosen.after.model.effects[self.declared.effects.len()..].to_vec()
     }
 }

@@ -30,7 +30,7 @@ impl<'a> SimulatedLogs<'a> {
     pub fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
         let apart = apart(study);
         let rig = study.on(&apart);
-        let dynamics = accepted.dynamics();
+        let dynamics = accepted.model.dynamics();
         let values = Values::of(&dynamics, &apart);
         let states = rig.shooting.initial_locals(0);
         let scale = Some(accepted.fit.scale);
@@ -51,9 +51,7 @@ impl<'a> SimulatedLogs<'a> {
     /// sign of each block drawn at random (the wild cluster bootstrap of Cameron, Gelbach and Miller
     /// 2008): colour, rounding and size stay, whatever is systematic goes. `None` where the motion diverges.
     pub fn draw(&self, more: &[FittedEffect], rng: &mut impl Rng) -> Option<Vec<Log>> {
-        let effects = [self.accepted.effects.as_slice(), more].concat();
-        let model = self.study.smoothed(&self.accepted.with_effects(effects));
-        let dynamics = model.dynamics();
+        let dynamics = self.study.extended(self.accepted, more);
         let values = Values::of(&dynamics, &self.apart);
         let rig = self.study.on(&self.apart);
         let motion = rig.shooting.residuals(&dynamics, &values, &self.locals);

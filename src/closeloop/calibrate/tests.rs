@@ -50,10 +50,10 @@ fn pendulum() -> Model {
 }
 
 #[test]
-fn the_windows_of_the_logs_are_found_again() {
-    let (system, logs) = (pendulum(), logs("", 0));
+fn simulated_logs_have_the_windows_of_the_original_logs() {
+    let (declared, logs) = (pendulum(), logs("", 0));
     let settings = Settings::default();
-    let mut study = Study::new(&system, &logs, &settings);
+    let mut study = Study::new(&declared, &logs, &settings);
     let accepted = study.fit_declared().unwrap();
     let simulated = SimulatedLogs::new(&study, &accepted).unwrap();
     let drawn = simulated
@@ -66,7 +66,7 @@ fn the_windows_of_the_logs_are_found_again() {
     let residuals = |study: &Study<'_>| {
         let states = study.shooting.initial_locals(0);
         let scale = Some(accepted.fit.scale);
-        let dynamics = &accepted.dynamics();
+        let dynamics = &accepted.model.dynamics();
         let (values, found) =
             crate::identify::fit(&study.shooting, dynamics, &[], states, scale).unwrap();
         study.shooting.residuals(dynamics, &values, &found.locals)
@@ -88,10 +88,10 @@ fn the_windows_of_the_logs_are_found_again() {
 }
 
 #[test]
-fn nothing_is_named_where_nothing_is_missing_and_the_hidden_is() {
-    let (system, library, logs) = (pendulum(), Library::built_in(), logs("", 0));
+fn complete_models_raise_no_false_alarm_and_hidden_effects_are_named() {
+    let (declared, library, logs) = (pendulum(), Library::built_in(), logs("", 0));
     let settings = Settings::default();
-    let mut study = Study::new(&system, &logs, &settings);
+    let mut study = Study::new(&declared, &logs, &settings);
     let accepted = study.fit_declared().unwrap();
     let repeat = |runs: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
@@ -113,12 +113,12 @@ fn nothing_is_named_where_nothing_is_missing_and_the_hidden_is() {
 }
 
 #[test]
-fn friction_is_named_from_about_its_smallest_size_on() {
+fn friction_is_named_above_its_detection_limit() {
     const SEEDS: u64 = 4;
-    let (system, library) = (pendulum(), Library::built_in());
+    let (declared, library) = (pendulum(), Library::built_in());
     let bare = logs("", 0);
     let settings = Settings::default();
-    let mut study = Study::new(&system, &bare, &settings);
+    let mut study = Study::new(&declared, &bare, &settings);
     let accepted = study.fit_declared().unwrap();
     let limits = detection_limits(&study, &accepted, library.effects()).unwrap();
     let friction = |limit: &&DetectionLimit| limit.effect.effect.name == "coulomb_friction";
@@ -130,10 +130,10 @@ fn friction_is_named_from_about_its_smallest_size_on() {
     let named = |level: f64| {
         let named = |seed: &u64| {
             let logs = logs(&coulomb(level), 100 + seed);
-            let mut study = Study::new(&system, &logs, &settings);
+            let mut study = Study::new(&declared, &logs, &settings);
             let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
             let found = find(&mut study, &library, rng, &mut |_| {}).unwrap();
-            let effects = found.after.effects.iter();
+            let effects = found.chosen.after.model.effects.iter();
             effects.map(FittedEffect::label).collect::<Vec<_>>() == ["coulomb_friction on joint 1"]
         };
         (0..SEEDS).filter(named).count()

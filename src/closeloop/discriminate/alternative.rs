@@ -28,19 +28,19 @@ pub enum NotSimulated {
     Diverged,
 }
 
-/// The sets of effects that do as well as the one that stood, the best first; those of which a part was taken back
-/// are none. For the best of them the experiment that tells them from it is simulated.
+/// The sets of effects that explain the logs as well as the confirmed one, the best first; sets that replace a
+/// withdrawn effect are left out. For the best of them the experiment that tells the two apart is simulated.
 pub(in crate::closeloop) fn discriminate(
     study: &Study<'_>,
     found: &Found,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Vec<Alternative> {
-    let model = &found.after;
+    let fitted = &found.chosen.after;
     let stands = |effect: &FittedEffect| {
         let same = |other: &FittedEffect| other.label() == effect.label();
-        model.effects.iter().any(same)
+        fitted.model.effects.iter().any(same)
     };
-    let mut rivals: Vec<&Rival> = (found.rivals.iter())
+    let mut rivals: Vec<&Rival> = (found.chosen.rivals.iter())
         .filter(|rival| stands(&rival.instead_of))
         .collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -50,7 +50,7 @@ pub(in crate::closeloop) fn discriminate(
         }
         let text = format!("simulating experiments against {}", rival.effect.label());
         progress(Progress::within(Stage::Discriminate, &text));
-        let separation = separation(study, model, rival).ok_or(NotSimulated::Diverged);
+        let separation = separation(study, fitted, rival).ok_or(NotSimulated::Diverged);
         Alternative::of(rival, separation)
     };
     rivals.into_iter().enumerate().map(alternative).collect()
@@ -70,7 +70,7 @@ impl Alternative {
             )
         };
         Self {
-            effects: rival.model.effects.clone(),
+            effects: rival.fitted.model.effects.clone(),
             effect: rival.effect.clone(),
             reason,
             separation,

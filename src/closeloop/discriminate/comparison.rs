@@ -26,15 +26,21 @@ impl Hypothesis {
         }
     }
 
-    /// The rival without effects that were taken back from the model since.
-    pub fn of_rival(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Self {
+    /// The rival without effects that were withdrawn from the model since.
+    pub fn of_rival(study: &Study<'_>, fitted: &Fitted, rival: &Rival) -> Self {
         let stands = |effect: &&FittedEffect| {
-            let mut known = model.effects.iter().chain([&rival.effect]);
+            let mut known = fitted.model.effects.iter().chain([&rival.effect]);
             known.any(|other| other.label() == effect.label())
         };
-        let effects: Vec<FittedEffect> =
-            rival.model.effects.iter().filter(stands).cloned().collect();
-        Self::new(study, &rival.model.with_effects(effects))
+        let effects: Vec<FittedEffect> = rival
+            .fitted
+            .model
+            .effects
+            .iter()
+            .filter(stands)
+            .cloned()
+            .collect();
+        Self::new(study, &rival.fitted.model.with_effects(effects))
     }
 
     fn with(&self, payload: Option<&Payload>) -> Self {
@@ -98,18 +104,18 @@ impl<'a> Comparison<'a> {
     /// `model` is fitted to the study's logs: its start states are theirs. `None` where the truth cannot follow them.
     pub fn new(
         study: &'a Study<'a>,
-        model: &Fitted,
+        fitted: &Fitted,
         truth: Hypothesis,
         other: Hypothesis,
     ) -> Option<Self> {
         let settings = &study.settings.discriminate;
         let noise = &study.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
-            .map(|noise| (noise * model.fit.scale).max(settings.finest))
+            .map(|noise| (noise * fitted.fit.scale).max(settings.finest))
             .collect();
         let motions: Vec<Motion> = spread(study.shooting.windows.len(), settings.present_windows)
             .into_iter()
-            .map(|w| window_of(study, model, w))
+            .map(|w| window_of(study, fitted, w))
             .collect();
         let present = truth.simulate(study, &motions)?;
         let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
@@ -121,7 +127,7 @@ impl<'a> Comparison<'a> {
         let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
         let differences = differences(&shooting, &other, &values, &found.locals, 0);
         Some(Self {
-            inflation: inflation(study, model).max(too_sure),
+            inflation: inflation(study, fitted).max(too_sure),
             other: Hypothesis {
                 dynamics: values.put_into(&other.dynamics, &present.logs),
                 ..other
@@ -137,12 +143,12 @@ impl<'a> Comparison<'a> {
     }
 
     /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
-    pub fn trials(&self, model: &Fitted, joints: &[Joint]) -> Vec<Trial> {
-        let changes = experiments(self.study, model, joints);
+    pub fn trials(&self, fitted: &Fitted, joints: &[Joint]) -> Vec<Trial> {
+        let changes = experiments(self.study, fitted, joints);
         let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
         let payloads = self.payloads();
         let loaded = (payloads.par_iter())
-            .filter_map(|payload| self.test(&self.loaded(model, payload), Some(payload)));
+            .filter_map(|payload| self.test(&self.loaded(fitted, payload), Some(payload)));
         changes.chain(loaded).collect()
     }
 
@@ -153,7 +159,7 @@ impl<'a> Comparison<'a> {
     fn payloads(&self) -> Vec<Payload> {
         let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
-        let declared = self.study.system.parameters.len();
+        let declared = self.study.declared.parameters.len();
         let truth = &self.truth;
         Payload::all(
             &truth.dynamics,
@@ -163,8 +169,8 @@ impl<'a> Comparison<'a> {
         )
     }
 
-    fn loaded(&self, model: &Fitted, payload: &Payload) -> Experiment {
-        let mut motions = as_logged(self.study, model);
+    fn loaded(&self, fitted: &Fitted, payload: &Payload) -> Experiment {
+        let mut motions = as_logged(self.study, fitted);
         for time in motions.iter_mut().flat_map(|motion| &mut motion.time) {
             *time += payload.delay_s;
         }
@@ -216,13 +222,13 @@ impl<'a> Comparison<'a> {
 }
 
 /// The motion of one window of the logs.
-fn window_of(study: &Study<'_>, model: &Fitted, w: usize) -> Motion {
+fn window_of(study: &Study<'_>, fitted: &Fitted, w: usize) -> Motion {
     let window = study.shooting.windows[w];
     let log = &study.logs[window.log];
     let rows = window.first..=window.last;
     Motion {
         log: window.log,
-        start: model.fit.locals[w].clone(),
+        start: fitted.fit.locals[w].clone(),
         time: log.time[rows.clone()].to_vec(),
         tau: rows
             .map(|row| log.tau.iter().map(|tau| tau[row]).collect())
@@ -263,13 +269,10 @@ fn differences(
 
 /// How much more the estimates of a fit scatter than independent normal residuals of its scale would let them, as a
 /// ratio of variances, at least 1: residuals of measured logs are correlated.
-fn inflation(study: &Study<'_>, model: &Fitted) -> f64 {
-    let size = model.fit.columns.len();
-    let covariance = uncertainty(&study.shooting, &model.fit).covariance;
-    let mut all = model.fit.zero_equations();
-    for window in &model.fit.reduced {
-        window.add_to(&mut all);
-    }
+fn inflation(study: &Study<'_>, fitted: &Fitted) -> f64 {
+    let size = fitted.fit.columns.len();
+    let covariance = uncertainty(&study.shooting, &fitted.fit).covariance;
+    let all = fitted.fit.equations();
     #[allow(clippy::cast_precision_loss)] // few parameters
     let mean = (covariance * all.hessian).trace() / size.max(1) as f64;
     mean.max(1.0)

@@ -132,7 +132,7 @@ pub(super) struct Experiment {
 
 /// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
 /// states are where motions begin.
-pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -> Vec<Experiment> {
+pub(super) fn experiments(study: &Study<'_>, fitted: &Fitted, joints: &[Joint]) -> Vec<Experiment> {
     let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
     let mut all = Vec::new();
     for item in &MENU {
@@ -146,7 +146,7 @@ pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -
             .filter(|joint| item.is_possible(study, **joint));
         all.extend(able.map(|&joint| Experiment {
             text: item.words(study, joint),
-            motions: item.motions(study, model, joint),
+            motions: item.motions(study, fitted, joint),
             turns: item.turns.then_some(joint),
         }));
     }
@@ -154,8 +154,8 @@ pub(super) fn experiments(study: &Study<'_>, model: &Fitted, joints: &[Joint]) -
 }
 
 /// Motions under the logged torque, for an experiment that changes the rig.
-pub(super) fn as_logged(study: &Study<'_>, model: &Fitted) -> Vec<Motion> {
-    AS_LOGGED.motions(study, model, Joint::at(0))
+pub(super) fn as_logged(study: &Study<'_>, fitted: &Fitted) -> Vec<Motion> {
+    AS_LOGGED.motions(study, fitted, Joint::at(0))
 }
 
 impl MenuItem {
@@ -171,11 +171,11 @@ impl MenuItem {
             .all(|log| log.median_step() >= study.settings.discriminate.fastest_sampling_s);
         (undriven || driven)
             && (self.finer == 1 || coarse)
-            && !(self.turns && (study.system.prismatic[joint] || goes_round(study, joint)))
+            && !(self.turns && (study.declared.prismatic[joint] || goes_round(study, joint)))
     }
 
     fn words(&self, study: &Study<'_>, joint: Joint) -> String {
-        let (force, length) = if study.system.prismatic[joint] {
+        let (force, length) = if study.declared.prismatic[joint] {
             ("N", "m")
         } else {
             ("N m", "rad")
@@ -194,7 +194,7 @@ impl MenuItem {
             .replace("{speed}", &format!("{speed:.1} {length}/s"))
     }
 
-    fn motions(&self, study: &Study<'_>, model: &Fitted, joint: Joint) -> Vec<Motion> {
+    fn motions(&self, study: &Study<'_>, fitted: &Fitted, joint: Joint) -> Vec<Motion> {
         let motions = study.settings.discriminate.motions;
         let windows = &study.shooting.windows;
         let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
@@ -207,7 +207,7 @@ impl MenuItem {
         };
         starts
             .into_iter()
-            .map(|w| self.motion(study, w, &model.fit.locals[w], joint))
+            .map(|w| self.motion(study, w, &fitted.fit.locals[w], joint))
             .collect()
     }
 
@@ -260,7 +260,7 @@ impl MenuItem {
 
     fn state(&self, study: &Study<'_>, logged: &[f64], joint: Joint) -> Vec<f64> {
         let mut state = logged.to_vec();
-        let velocities = &mut state[study.system.joints..];
+        let velocities = &mut state[study.declared.joints..];
         match self.start {
             Start::Logged(factor) => velocities.iter_mut().for_each(|v| *v *= factor),
             Start::TopSpeed(factor) => {

@@ -36,18 +36,18 @@ pub struct Separation {
 /// together, all its parameters and start states free, and the remaining difference is compared with the noise.
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
-pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Option<Separation> {
+pub(super) fn separation(study: &Study<'_>, fitted: &Fitted, rival: &Rival) -> Option<Separation> {
     let settings = &study.settings.discriminate;
-    let chosen = Hypothesis::new(study, model);
-    let other = Hypothesis::of_rival(study, model, rival);
+    let chosen = Hypothesis::new(study, &fitted.model);
+    let other = Hypothesis::of_rival(study, fitted, rival);
     let comparison = if rival.contains_chosen() {
-        Comparison::new(study, model, other, chosen)
+        Comparison::new(study, fitted, other, chosen)
     } else {
-        Comparison::new(study, model, chosen, other)
+        Comparison::new(study, fitted, chosen, other)
     }?;
     let mut joints = vec![rival.effect.joint, rival.instead_of.joint];
     joints.dedup();
-    let trials: Vec<Trial> = comparison.trials(model, &joints);
+    let trials: Vec<Trial> = comparison.trials(fitted, &joints);
     let telling = trials.iter().filter(|trial| trial.tells(settings));
     let best = telling.min_by(|a, b| a.worth(settings).total_cmp(&b.worth(settings)));
     let widest = (trials.iter()).max_by(|a, b| a.deviation().total_cmp(&b.deviation()))?;
@@ -59,7 +59,7 @@ pub(super) fn separation(study: &Study<'_>, model: &Fitted, rival: &Rival) -> Op
         present_difference_rad: shown.present,
         noise_rad: shown.noise,
         seconds: best.map(|trial| trial.worth(settings).ceil()),
-        slides: study.system.prismatic[shown.joint],
+        slides: study.declared.prismatic[shown.joint],
     })
 }
 

@@ -27,20 +27,20 @@ pub struct ForceSample {
 /// Logs without a stretch, or a model that diverges over one of them.
 pub(super) fn residual_force(
     study: &Study<'_>,
-    model: &Fitted,
+    fitted: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {
-    let joints = study.system.joints;
+    let joints = study.declared.joints;
     let windows = cut(study.logs, study.settings.remainder.stretch_s);
     let shooting = Shooting::new(study.logs, windows, &study.shooting.noise);
     let locals = shooting.initial_locals(joints);
-    let (_, found) = fit(&shooting, &model.dynamics(), &[], locals, None)?;
+    let (_, found) = fit(&shooting, &fitted.model.dynamics(), &[], locals, None)?;
     let stretches = shooting.windows.iter().zip(&found.locals);
     let mut samples: Vec<ForceSample> = stretches
         .map(|(window, local)| {
             ForceSample::over(window, &study.logs[window.log], &local[2 * joints..])
         })
         .collect();
-    within_turn(&mut samples, &study.system.prismatic);
+    within_turn(&mut samples, &study.declared.prismatic);
     Ok(samples)
 }
 

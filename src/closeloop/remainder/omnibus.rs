@@ -5,6 +5,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::RemainderSettings;
@@ -14,13 +16,17 @@ use crate::data::{Audit, Joint};
 use crate::identify::Values;
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Omnibus {
     /// Probability of residuals so smooth in time if they were noise.
+    #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
+    #[serde(rename = "share")]
+    #[schemars(inner(range(min = 0, max = 1)))]
     pub shares: Vec<f64>,
     /// Share of the declared model's residual variance above noise that remains.
+    #[serde(skip)]
     pub fraction: f64,
 }
 
@@ -52,7 +58,7 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
             Energies::of(&windows, |window| window.noise(&mut rng))
         })
         .collect();
-    let joints = study.system.joints;
+    let joints = study.declared.joints;
     let nulls: Vec<NoiseShare> = (0..joints).map(|j| NoiseShare::of(&simulated, j)).collect();
     let excess = |energies: &Energies| {
         let each = (0..joints).map(|j| nulls[j].excess(energies.shares[j]));
@@ -95,22 +101,22 @@ struct Window {
     sensor: Vec<[f64; 2]>,
 }
 
-fn windows(study: &Study<'_>, model: &Fitted) -> Vec<Window> {
+fn windows(study: &Study<'_>, fitted: &Fitted) -> Vec<Window> {
     let RemainderSettings {
         slow_waves,
         start_step,
         ..
     } = study.settings.remainder;
-    let joints = study.system.joints;
+    let joints = study.declared.joints;
     let shooting = &study.shooting;
-    let dynamics = model.dynamics();
+    let dynamics = fitted.model.dynamics();
     let values = Values::of(&dynamics, study.logs);
     let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
     let sensors = sensors(study);
-    let at = residuals(&model.fit.locals);
+    let at = residuals(&fitted.fit.locals);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
         .map(|k| {
-            let mut locals = model.fit.locals.clone();
+            let mut locals = fitted.fit.locals.clone();
             locals.iter_mut().for_each(|local| local[k] += start_step);
             residuals(&locals)
         })

@@ -2,26 +2,27 @@ use std::fmt::Write;
 use std::path::Path;
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::best_start;
-use crate::closeloop::select::gain;
-use crate::closeloop::select::{folds, left_out_losses};
+use crate::closeloop::select::{best_start, gain, left_out_losses};
 use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// A formula for the remainder: a proposal, not a finding. Supported only by its fit.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Proposal {
-    /// Counted from 0.
     pub joint: Joint,
     /// Force in N m (or N), such as `-0.0012 * qd1^3`.
     pub formula: String,
     /// Share of the loss above noise that it takes away, on stretches left out of its fit.
+    #[schemars(range(max = 1))]
     pub explains: f64,
     /// The formula as an effect file, for a folder of a library.
+    #[serde(skip)]
     pub file: String,
 }
 
@@ -66,20 +67,19 @@ const TERMS: [Term; 31] = [
 /// A short sum of terms for the force that `model` lacks on the joint with the largest remainder: terms are added while
 /// they lower the loss on stretches left out of the fit. `None` where the remainder is not significant, or no term fits
 /// it.
-pub fn proposal(study: &Study<'_>, model: &Fitted, left: &Unexplained) -> Option<Proposal> {
+pub fn proposal(study: &Study<'_>, fitted: &Fitted, left: &Unexplained) -> Option<Proposal> {
     if !left.is_significant() {
         return None;
     }
-    let folds = folds(study);
     let noteworthy = study.settings.remainder.noteworthy;
-    let without = left_out_losses(&model.fit, &folds);
+    let without = left_out_losses(study, &fitted.fit);
     let mut found: Option<Sum> = None;
     for _ in 0..study.settings.proposal.most_terms {
         let (terms, losses) = match &found {
             Some(sum) => (sum.terms.as_slice(), &sum.losses),
             None => (&[][..], &without),
         };
-        let longer = longer(study, model, left.joint, terms, &folds)?;
+        let longer = longer(study, fitted, left.joint, terms)?;
         if gain(losses, &longer.losses) < noteworthy {
             break;
         }
@@ -103,13 +103,7 @@ struct Sum {
 }
 
 /// The sum with one more term, the one that lowers the loss most.
-fn longer(
-    study: &Study<'_>,
-    model: &Fitted,
-    joint: Joint,
-    terms: &[Term],
-    folds: &[usize],
-) -> Option<Sum> {
+fn longer(study: &Study<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Option<Sum> {
     let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = TERMS
         .par_iter()
         .filter(|term| !terms.contains(term))
@@ -125,13 +119,12 @@ fn longer(
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {
-            let longer = model.with_effects([model.effects.as_slice(), &[start]].concat());
-            let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-            let fitted = study.refit(&longer, locals, scale).ok()?;
+            let longer = model.effects_and(&[start]);
+            let fitted = study.with_effects(model, longer).ok()?;
             Some(Sum {
                 terms,
-                losses: left_out_losses(&fitted.fit, folds),
-                effect: fitted.effects.last()?.clone(),
+                losses: left_out_losses(study, &fitted.fit),
+                effect: fitted.model.effects.last()?.clone(),
             })
         })
         .collect();
@@ -231,14 +224,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_term_is_a_formula() {
+    fn every_term_is_a_valid_effect_formula() {
         for term in TERMS {
             assert_eq!(effect(&[term]).parameters.len(), 1);
         }
     }
 
     #[test]
-    fn units_belong_to_forces() {
+    fn coefficients_have_units_that_give_a_force() {
         let units = [
             ([0, 0, 0, 0], "N m"),
             ([0, 3, 0, 0], "N m s^3/rad^3"),
@@ -255,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_keep_three_digits() {
+    fn numbers_have_three_significant_digits() {
         assert_eq!(digits(-0.001_234_5), "-0.00123");
         assert_eq!(digits(1234.5), "1234");
     }

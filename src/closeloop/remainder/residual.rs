@@ -16,10 +16,10 @@ pub struct ResidualForce {
 impl ResidualForce {
     /// # Errors
     /// Logs without a stretch, or a model that diverges over one of them.
-    pub(in crate::closeloop) fn of(study: &Study<'_>, model: &Fitted) -> Result<Self, FitError> {
-        let samples = residual_force(study, model)?;
+    pub(in crate::closeloop) fn of(study: &Study<'_>, fitted: &Fitted) -> Result<Self, FitError> {
+        let samples = residual_force(study, fitted)?;
         Ok(Self {
-            curves: curves(&samples, &study.system.prismatic, &study.settings.curves),
+            curves: curves(&samples, &study.declared.prismatic, &study.settings.curves),
             samples,
         })
     }

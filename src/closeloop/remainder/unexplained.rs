@@ -5,28 +5,31 @@ use serde::Serialize;
 
 use super::omnibus::{Omnibus, omnibus};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::acting;
-use crate::closeloop::select::{folds, left_out_losses};
-use crate::closeloop::select::{gain, p_value};
+use crate::closeloop::select::{acting, gain, left_out_losses, p_value};
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// The unexplained remainder: what the residuals hold beyond noise when no effect helps any more.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Unexplained {
     /// Share of the declared model's residual variance above the sensor's noise that remains.
+    #[schemars(range(min = 0))]
     pub fraction: f64,
     /// Probability of so much structure in noise alone: the smaller of the omnibus test's and that of the probes
     /// which save something that matters, times two.
+    #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
     /// The variable that most of it depends on: `q1`, `qd2`, `tau1`, `t`, products of them such as `q1*qd1`,
     /// `unknown` where it depends on none of them, `none` where it is not significant.
+    #[serde(rename = "where")]
     pub place: String,
-    /// The joint (counted from 0) with the largest remainder.
+    /// The joint with the largest remainder.
+    #[serde(skip)]
     pub joint: Joint,
     pub omnibus: Omnibus,
+    /// Flexible shapes, which name no effect.
     pub probes: Vec<Probed>,
 }
 
@@ -66,7 +69,7 @@ pub fn unexplained(
     rng: &mut impl Rng,
 ) -> Unexplained {
     let omnibus = omnibus(study, before, after, rng);
-    let losses = left_out_losses(&after.fit, &folds(study));
+    let losses = left_out_losses(study, &after.fit);
     let probed: Vec<Probed> = acting(study, probes)
         .into_par_iter()
         .filter_map(|probe| ask(study, after, probe, &losses))
@@ -90,22 +93,14 @@ pub fn unexplained(
 
 fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -> Option<Probed> {
     let (place, joint) = (variables(&probe), probe.joint);
-    let mut effects = model.effects.clone();
-    effects.push(probe);
-    let scale = Some(model.fit.scale);
-    let fitted = study
-        .refit(
-            &model.with_effects(effects),
-            model.fit.locals.clone(),
-            scale,
-        )
-        .ok()?;
-    let without = left_out_losses(&fitted.fit, &folds(study));
+    let effects = model.effects_and(&[probe]);
+    let fitted = study.with_effects(model, effects).ok()?;
+    let with = left_out_losses(study, &fitted.fit);
     Some(Probed {
         place,
         joint,
-        p_value: p_value(study, &fitted, fitted.effects.len() - 1)?,
-        gain: gain(losses, &without),
+        p_value: p_value(study, &fitted, fitted.model.effects.len() - 1)?,
+        gain: gain(losses, &with),
     })
 }
 

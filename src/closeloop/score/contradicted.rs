@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn comparisons_are_in_words() {
+    fn ratios_are_written_in_words() {
         let says = |declared: f64, value: f64| {
             let fitted = fitted(value, None);
             Contradicted { declared, fitted }.comparison()

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 use super::errors::Scorer;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::refine::Refined;
-use crate::closeloop::select::{folds, left_out_losses, p_of_gains, p_value};
+use crate::closeloop::select::{left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Model, OwnValue, Parameter};
@@ -25,7 +25,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// What it says of each parameter: its value or, where it has one per log, its values in single logs.
+    /// The value of each parameter or, where it has one per log, its values in single logs.
     pub fn rows(&self) -> Vec<(Parameter, Option<&OwnValue>)> {
         let of_parameter = |(k, parameter): (usize, &Parameter)| {
             if !parameter.per_log {
@@ -56,37 +56,33 @@ pub(in crate::closeloop) fn findings(
     scorer: &Scorer<'_>,
     with: &Assessment,
 ) -> Vec<Finding> {
-    let declared = study.system.effects.len();
     let finding = |k: usize| {
         // The refit without an effect takes the same two steps as the model with it: coarse, then refined.
-        let coarse = without(study, chosen, k);
+        let coarse = study.without_effect(chosen, k);
         let fine = coarse
             .clone()
             .and_then(|less| refined.study.estimate(&less));
         let reduction = |less: Fitted| {
             1.0 - with.position_rms() / scorer.fitted(&less).position_rms().max(f64::MIN_POSITIVE)
         };
-        let (expression, parameters) = described(study.system, &refined.model, k);
+        let (expression, parameters) = described(study.declared, &refined.after.model, k);
         Finding {
-            effect: refined.model.effects[k].clone(),
+            effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
-            p_value: p_value(&refined.study, &refined.model, k)
+            p_value: p_value(&refined.study, &refined.after, k)
                 .or_else(|| Some(p_of_refit(study, chosen, coarse.as_ref().ok()?)))
                 .unwrap_or(1.0),
             error_reduction: fine.map(reduction),
         }
     };
-    (declared..refined.model.effects.len())
-        .into_par_iter()
-        .map(finding)
-        .collect()
+    let added = study.added(&refined.after.model);
+    added.into_par_iter().map(finding).collect()
 }
 
 /// The signed-rank p-value of a model beside the refit without one of its effects.
 fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted) -> f64 {
-    let folds = folds(study);
-    let losses = |model: &Fitted| left_out_losses(&model.fit, &folds);
+    let losses = |model: &Fitted| left_out_losses(study, &model.fit);
     p_of_gains(&losses(without), &losses(chosen))
 }
 
@@ -105,12 +101,4 @@ fn described(declared: &Model, model: &Model, k: usize) -> (String, Vec<Paramete
             (effect.expression(&names), own)
         }
     }
-}
-
-/// The model refitted without its k-th effect, its residuals on the same scale.
-fn without(study: &Study<'_>, model: &Fitted, k: usize) -> Result<Fitted, FitError> {
-    let mut less = model.model.clone();
-    less.effects.remove(k);
-    let (locals, scale) = (model.fit.locals.clone(), Some(model.fit.scale));
-    study.refit(&less, locals, scale)
 }

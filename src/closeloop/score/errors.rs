@@ -40,7 +40,7 @@ impl Scorer<'_> {
         against: &[Reference],
         rng: &mut impl Rng,
     ) -> Errors {
-        let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.system));
+        let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
         let (before, after) = rayon::join(|| self.fitted(before), || self.fitted(after));
         Errors {
             declared: self.as_it_is(declared),
@@ -53,8 +53,8 @@ impl Scorer<'_> {
     }
 
     /// The error of a fitted model.
-    pub fn fitted(&self, model: &Fitted) -> Assessment {
-        self.dynamics(&model.dynamics())
+    pub fn fitted(&self, fitted: &Fitted) -> Assessment {
+        self.dynamics(&fitted.model.dynamics())
     }
 
     fn as_it_is(&self, model: &Model) -> Assessment {

@@ -13,7 +13,7 @@ pub fn candidates(
     library: &[Effect],
     present: &[FittedEffect],
 ) -> Vec<FittedEffect> {
-    let mut all: Vec<FittedEffect> = study.system.shifts();
+    let mut all: Vec<FittedEffect> = study.declared.shifts();
     all.extend(acting(study, library));
     all.retain(|new| !present.iter().any(|old| old.excludes(new)));
     all
@@ -23,9 +23,9 @@ pub fn candidates(
 pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
     for effect in effects {
-        for joint in Joint::all(study.system.joints) {
+        for joint in Joint::all(study.declared.joints) {
             if is_driven_enough(study, effect, joint)
-                && study.system.can_carry(effect, joint).is_ok()
+                && study.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
                 all.push(FittedEffect::absent(
@@ -64,14 +64,14 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
 /// on a sample of the windows where there are several, and predicted on all of them.
 pub fn best_start(
     study: &Study<'_>,
-    model: &Fitted,
+    fitted: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<(FittedEffect, f64)> {
     let mut starts = starts(candidate);
     if starts.len() > 1 {
-        let locals = study.sample.locals(&model.fit.locals);
+        let locals = study.sample.locals(&fitted.fit.locals);
         let promised = |start: FittedEffect| {
-            let cost = promised(study, &study.sample.shooting, model, &start, &locals)?;
+            let cost = promised(study, &study.sample.shooting, fitted, &start, &locals)?;
             Some((start, cost))
         };
         let promised: Vec<(FittedEffect, f64)> =
@@ -80,7 +80,7 @@ pub fn best_start(
         starts = vec![best.0];
     }
     let start = starts.pop()?;
-    let cost = promised(study, &study.shooting, model, &start, &model.fit.locals)?;
+    let cost = promised(study, &study.shooting, fitted, &start, &fitted.fit.locals)?;
     Some((start, cost))
 }
 
@@ -88,36 +88,28 @@ pub fn best_start(
 fn promised(
     study: &Study<'_>,
     shooting: &Shooting<'_>,
-    model: &Fitted,
+    fitted: &Fitted,
     start: &FittedEffect,
     locals: &[Vec<f64>],
 ) -> Option<f64> {
-    let mut effects = model.effects.clone();
-    effects.push(start.clone());
-    let dynamics = study.smoothed(&model.with_effects(effects)).dynamics();
-    let (active, scale) = (study.active(&dynamics), model.fit.scale);
+    let dynamics = study.extended(fitted, std::slice::from_ref(start));
+    let (active, scale) = (study.active(&dynamics), fitted.fit.scale);
     predicted_cost(shooting, &dynamics, &active, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
 /// them. `None` if the model has an effect that contains the candidate.
-pub fn beside(study: &Study<'_>, model: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
+pub fn beside(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
     let contains = |a: &FittedEffect, b: &FittedEffect| {
         a.joint == b.joint && a.effect.contains.contains(&b.effect.name)
     };
-    if model
-        .effects
-        .iter()
-        .any(|present| contains(present, candidate))
-    {
+    let mut present = fitted.model.effects.iter();
+    if present.any(|present| contains(present, candidate)) {
         return None;
     }
-    let mut beside = model.clone();
-    let found = beside.model.effects.split_off(study.system.effects.len());
-    beside.model.effects.extend(
-        found
-            .into_iter()
-            .filter(|present| !contains(candidate, present)),
-    );
+    let mut beside = fitted.clone();
+    let mut added = beside.model.effects.split_off(study.declared.effects.len());
+    added.retain(|present| !contains(candidate, present));
+    beside.model.effects.extend(added);
     Some(beside)
 }

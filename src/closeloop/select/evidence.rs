@@ -12,7 +12,7 @@ use crate::model::FittedEffect;
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// The model with this candidate, fitted.
-    pub model: Fitted,
+    pub fitted: Fitted,
     /// The candidate with its fitted values.
     pub effect: FittedEffect,
     /// Fall of the loss on stretches left out of the fit, as a share of what it was.
@@ -26,36 +26,31 @@ pub struct Evidence {
 impl Evidence {
     /// Number of values, one a log where they differ by log, then of the simpler effects that it contains.
     pub(super) fn complexity(&self) -> (usize, usize) {
-        let model = &self.model;
+        let Fitted { model, fit } = &self.fitted;
         let range = model.place_of(model.effects.len() - 1);
-        let columns = model.fit.columns.iter();
+        let columns = fit.columns.iter();
         let of_logs = columns.filter(|c| c.log.is_some() && range.contains(&c.parameter));
         let per_log = (self.effect.effect.parameters.iter()).filter(|p| p.per_log);
         let values = range.len() - per_log.count() + of_logs.count();
         (values, self.effect.effect.contains.len())
     }
 
-    /// Judge a model whose last effect is the candidate against the one without it, by their losses on `folds`.
+    /// Judge a model whose last effect is the candidate against the one without it, by their losses on left-out stretches.
     /// `None` where the fitted values are inconsistent with each other.
-    pub(super) fn of(
-        study: &Study<'_>,
-        model: Fitted,
-        folds: &[usize],
-        without: &[f64],
-    ) -> Option<Self> {
-        let effect = model.effects.last().cloned()?;
+    pub(super) fn of(study: &Study<'_>, fitted: Fitted, without: &[f64]) -> Option<Self> {
+        let effect = fitted.model.effects.last().cloned()?;
         let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
         if !effect.effect.is_valid(&values) {
             return None;
         }
-        let losses = left_out_losses(&model.fit, folds);
-        let p_value = p_value(study, &model, model.effects.len() - 1)
+        let losses = left_out_losses(study, &fitted.fit);
+        let p_value = p_value(study, &fitted, fitted.model.effects.len() - 1)
             .unwrap_or_else(|| p_of_gains(without, &losses));
         Some(Self {
             gain: gain(without, &losses),
             p_value,
             effect,
-            model,
+            fitted,
             losses,
         })
     }
@@ -76,20 +71,20 @@ pub fn gain(before: &[f64], after: &[f64]) -> f64 {
 
 /// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent.
 /// `None` for an effect that no value of a parameter switches off.
-pub fn p_value(study: &Study<'_>, model: &Fitted, k: usize) -> Option<f64> {
-    let effect = &model.effects[k].effect;
-    let range = model.place_of(k);
+pub fn p_value(study: &Study<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
+    let effect = &fitted.model.effects[k].effect;
+    let range = fitted.model.place_of(k);
     let is_switch = |parameter: usize| {
         range.contains(&parameter) && effect.parameters[parameter - range.start].is_switch()
     };
-    let columns = &model.fit.columns;
+    let columns = &fitted.fit.columns;
     let switches: Vec<usize> = (0..columns.len())
         .filter(|&i| is_switch(columns[i].parameter))
         .collect();
     if switches.is_empty() {
         return None;
     }
-    let uncertainty = uncertainty(&study.shooting, &model.fit);
+    let uncertainty = uncertainty(&study.shooting, &fitted.fit);
     let covariance = uncertainty
         .covariance
         .select_rows(&switches)
@@ -98,7 +93,7 @@ pub fn p_value(study: &Study<'_>, model: &Fitted, k: usize) -> Option<f64> {
         switches.len(),
         switches.iter().map(|&i| {
             let log = columns[i].log.map(|log| &study.logs[log]);
-            model.value_of(columns[i].parameter, log)
+            fitted.model.value_of(columns[i].parameter, log)
         }),
     );
     let inverse = covariance.pseudo_inverse(1e-300).ok()?;

@@ -1,10 +1,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::closeloop::study::Study;
-use crate::identify::{Fit, blocks};
+use crate::identify::{Fit, blocks, with_unit_diagonal};
 
 /// For each window the fold that it is left out with: its trajectory or, where there are few, a stretch of it.
-pub fn folds(study: &Study<'_>) -> Vec<usize> {
+fn folds(study: &Study<'_>) -> Vec<usize> {
     let shooting = &study.shooting;
     if shooting.logs.len() >= study.settings.select.whole_logs {
         shooting.windows.iter().map(|window| window.log).collect()
@@ -13,16 +13,12 @@ pub fn folds(study: &Study<'_>) -> Vec<usize> {
     }
 }
 
-/// The loss on each fold of the parameters fitted without it. The fit is not repeated: each window's loss
-/// is taken as quadratic around the joint optimum, where leaving out a fold moves the parameters by
-/// (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own: no other log
-/// could tell them.
-pub fn left_out_losses(fit: &Fit, folds: &[usize]) -> Vec<f64> {
-    let count = folds.iter().max().map_or(0, |last| last + 1);
-    let mut parts = vec![fit.zero_equations(); count];
-    for (window, &fold) in fit.reduced.iter().zip(folds) {
-        window.add_to(&mut parts[fold]);
-    }
+/// The loss on each fold of a study's windows, with the parameters that a fit to the other folds would give. The fit is not
+/// repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a fold moves the
+/// parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since no other
+/// log determines them.
+pub fn left_out_losses(study: &Study<'_>, fit: &Fit) -> Vec<f64> {
+    let parts = fit.equations_by(&folds(study));
     let mut all = fit.zero_equations();
     for part in &parts {
         all.gradient += &part.gradient;
@@ -49,12 +45,7 @@ fn free_step(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
         return right.clone();
     }
     // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
-    let scale = matrix
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-    let scaled = DMatrix::from_fn(right.len(), right.len(), |i, j| {
-        matrix[(i, j)] * scale[i] * scale[j]
-    });
+    let (scaled, scale) = with_unit_diagonal(matrix);
     let inverse = scaled
         .pseudo_inverse(1e-10)
         .unwrap_or_else(|_| DMatrix::zeros(right.len(), right.len()));

@@ -9,6 +9,6 @@ mod simpler;
 pub(super) use self::candidate::{acting, best_start, candidates, starts};
 pub use self::evidence::Evidence;
 pub(super) use self::evidence::{gain, p_of_gains, p_value};
-pub(super) use self::folds::{folds, left_out_losses};
+pub(super) use self::folds::left_out_losses;
 pub(super) use self::search::Search;
 pub use self::search::{Rival, Round};

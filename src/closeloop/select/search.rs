@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::{beside, best_start, candidates, starts};
 use super::evidence::Evidence;
-use super::folds::{folds, left_out_losses};
+use super::folds::left_out_losses;
 use super::simpler::simpler;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
@@ -27,7 +27,7 @@ pub struct Round {
 /// A set of effects that explains the logs as well as the chosen one: it has `effect` in place of `instead_of`.
 #[derive(Debug, Clone)]
 pub struct Rival {
-    pub model: Fitted,
+    pub fitted: Fitted,
     pub effect: FittedEffect,
     pub instead_of: FittedEffect,
     /// Fall of the left-out loss by either, beside the other effects.
@@ -56,7 +56,6 @@ fn key(effects: &[FittedEffect]) -> Key {
 pub struct Search<'a, 'p> {
     study: &'a Study<'a>,
     library: &'a [Effect],
-    folds: Vec<usize>,
     /// Rounds so far, by the effects of the model.
     known_rounds: HashMap<Key, Round>,
     /// Models that the search has visited.
@@ -67,7 +66,7 @@ pub struct Search<'a, 'p> {
 }
 
 impl<'a, 'p> Search<'a, 'p> {
-    /// `progress` hears what is being tried.
+    /// `progress` receives what is being tried.
     pub fn new(
         study: &'a Study<'a>,
         library: &'a [Effect],
@@ -76,7 +75,6 @@ impl<'a, 'p> Search<'a, 'p> {
         Self {
             study,
             library,
-            folds: folds(study),
             known_rounds: HashMap::new(),
             passed: Vec::new(),
             rounds: Vec::new(),
@@ -90,22 +88,24 @@ impl<'a, 'p> Search<'a, 'p> {
     /// # Errors
     /// A selected model that cannot be fitted again.
     pub fn select(&mut self, declared: Fitted) -> Result<Fitted, FitError> {
-        let mut model = declared;
-        while model.effects.len() < self.declared() + self.study.settings.select.most_effects {
-            let round = self.round(&model, None);
+        let mut fitted = declared;
+        let most = self.study.settings.select.most_effects;
+        while self.study.added(&fitted.model).len() < most {
+            let round = self.round(&fitted, None);
             self.rounds.push(round.clone());
             let next = match round.chosen {
-                Some(chosen) => Some(round.evidence[chosen].model.clone()),
-                None => self.exchanged(&model),
+                Some(chosen) => Some(round.evidence[chosen].fitted.clone()),
+                None => self.exchanged(&fitted),
             };
             let Some(next) = next else { break };
-            let next = self.simplified(self.rescaled(&next)?);
+            // The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
+            let next = self.simplified(self.study.estimate(&next)?);
             if self.has_passed(&next) {
                 break;
             }
-            model = next;
+            fitted = next;
         }
-        Ok(model)
+        Ok(fitted)
     }
 
     /// Report progress.
@@ -117,33 +117,33 @@ impl<'a, 'p> Search<'a, 'p> {
         self.tell(Progress::within(Stage::Select, text));
     }
 
-    fn has_passed(&mut self, model: &Fitted) -> bool {
-        let key = key(&model.effects);
+    fn has_passed(&mut self, fitted: &Fitted) -> bool {
+        let key = key(&fitted.model.effects);
         let known = self.passed.contains(&key);
         self.passed.push(key);
         known
     }
 
     /// Fit and rank the candidates that could join `model`; `wanted` is among them whatever its predicted decrease.
-    fn round(&mut self, model: &Fitted, wanted: Option<&FittedEffect>) -> Round {
-        let at = key(&model.effects);
+    fn round(&mut self, fitted: &Fitted, wanted: Option<&FittedEffect>) -> Round {
+        let at = key(&fitted.model.effects);
         let is_wanted = |c: &FittedEffect| wanted.is_some_and(|wanted| wanted.label() == c.label());
         if let Some(known) = self.known_rounds.get(&at)
             && (wanted.is_none() || known.evidence.iter().any(|e| is_wanted(&e.effect)))
         {
             return known.clone();
         }
-        let all = candidates(self.study, self.library, &model.effects);
-        let mut screened = self.screened(model, &all);
-        let fitted = self.study.settings.select.fitted;
-        let rest = screened.split_off(fitted.min(screened.len()));
+        let all = candidates(self.study, self.library, &fitted.model.effects);
+        let mut screened = self.screened(fitted, &all);
+        let most = self.study.settings.select.fitted;
+        let rest = screened.split_off(most.min(screened.len()));
         screened.extend(rest.into_iter().filter(is_wanted));
-        let losses = left_out_losses(&model.fit, &self.folds);
+        let losses = left_out_losses(self.study, &fitted.fit);
         self.say(&format!("fitting {} effects", screened.len()));
-        let (study, folds) = (self.study, self.folds.as_slice());
+        let study = self.study;
         let mut evidence: Vec<Evidence> = screened
             .into_par_iter()
-            .filter_map(|start| weigh(study, folds, model, start, &losses))
+            .filter_map(|start| weigh(study, fitted, start, &losses))
             .collect();
         evidence.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
@@ -157,13 +157,13 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Candidates at their best starting points, by predicted cost.
-    fn screened(&mut self, model: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
+    fn screened(&mut self, fitted: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
         self.say(&format!("screening {} effects", all.len()));
         let study = self.study;
         let mut screened: Vec<(FittedEffect, f64)> = all
             .par_iter()
             .filter_map(|candidate| {
-                let beside = beside(study, model, candidate)?;
+                let beside = beside(study, fitted, candidate)?;
                 best_start(study, &beside, candidate)
             })
             .collect();
@@ -177,48 +177,46 @@ impl<'a, 'p> Search<'a, 'p> {
         screened.into_iter().map(|(start, _)| start).collect()
     }
 
-    /// The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
-    fn rescaled(&self, model: &Fitted) -> Result<Fitted, FitError> {
-        let locals = model.fit.locals.clone();
-        self.study.refit(model, locals, None)
-    }
-
     /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
-    fn simplified(&self, model: Fitted) -> Fitted {
-        let (study, folds) = (self.study, self.folds.as_slice());
-        let with: f64 = left_out_losses(&model.fit, folds).iter().sum();
-        let simpler = simpler(self.library, &model.effects, self.declared());
-        let first = simpler.par_iter().find_map_first(|effects| {
-            let less = refit(study, &model, effects)?;
-            let without: f64 = left_out_losses(&less.fit, folds).iter().sum();
-            (without < with * (1.0 + study.settings.select.simpler)).then_some(less)
+    fn simplified(&self, fitted: Fitted) -> Fitted {
+        let study = self.study;
+        let loss = |fitted: &Fitted| left_out_losses(study, &fitted.fit).iter().sum::<f64>();
+        let most = loss(&fitted) * (1.0 + study.settings.select.simpler);
+        let simpler = simpler(
+            self.library,
+            &fitted.model.effects,
+            study.added(&fitted.model),
+        );
+        let first = simpler.into_par_iter().find_map_first(|effects| {
+            let less = study.with_effects(&fitted, effects).ok()?;
+            (loss(&less) < most).then_some(less)
         });
         match first {
             Some(less) => self.simplified(less),
-            None => model,
+            None => fitted,
         }
     }
 
-    /// Weigh every effect of the model again, beside all others: early ones were chosen without those that followed. The
-    /// first other model that the evidence supports.
-    fn exchanged(&mut self, model: &Fitted) -> Option<Fitted> {
-        (self.declared()..model.effects.len()).find_map(|k| {
-            let (present, without) = self.without(model, k)?;
+    /// Test each effect of the model again in the presence of all others, since early ones were selected without those
+    /// that followed. Returns the first other model that the evidence supports.
+    fn exchanged(&mut self, fitted: &Fitted) -> Option<Fitted> {
+        self.study.added(&fitted.model).find_map(|k| {
+            let (present, without) = self.without(fitted, k)?;
             let round = self.round(&without, Some(&present));
             match round.chosen.map(|chosen| &round.evidence[chosen]) {
                 None => Some(without),
                 Some(best) if best.effect.label() == present.label() => None,
-                Some(best) => Some(best.model.clone()),
+                Some(best) => Some(best.fitted.clone()),
             }
         })
     }
 
     /// Effects that explain the logs as well as one of a model's effects does, beside its others.
-    pub fn rivals(&mut self, model: &Fitted) -> Vec<Rival> {
+    pub fn rivals(&mut self, fitted: &Fitted) -> Vec<Rival> {
         let settings = &self.study.settings.select;
         let mut rivals = Vec::new();
-        for k in self.declared()..model.effects.len() {
-            let Some((present, without)) = self.without(model, k) else {
+        for k in self.study.added(&fitted.model) {
+            let Some((present, without)) = self.without(fitted, k) else {
                 continue;
             };
             let round = self.round(&without, Some(&present));
@@ -231,7 +229,7 @@ impl<'a, 'p> Search<'a, 'p> {
                 others
                     .filter(|e| e.is_as_good_as(chosen, settings))
                     .map(|e| Rival {
-                        model: e.model.clone(),
+                        fitted: e.fitted.clone(),
                         effect: e.effect.clone(),
                         instead_of: present.clone(),
                         gain: e.gain,
@@ -243,42 +241,23 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// The k-th effect, and the model refitted without it.
-    fn without(&self, model: &Fitted, k: usize) -> Option<(FittedEffect, Fitted)> {
-        let mut effects = model.effects.clone();
-        let present = effects.remove(k);
-        Some((present, refit(self.study, model, &effects)?))
-    }
-
-    /// Effects that the file declares stay.
-    fn declared(&self) -> usize {
-        self.study.system.effects.len()
+    fn without(&self, fitted: &Fitted, k: usize) -> Option<(FittedEffect, Fitted)> {
+        let present = fitted.model.effects[k].clone();
+        Some((present, self.study.without_effect(fitted, k).ok()?))
     }
 }
 
 /// Fit a candidate and judge it.
 fn weigh(
     study: &Study<'_>,
-    folds: &[usize],
     model: &Fitted,
     start: FittedEffect,
     without: &[f64],
 ) -> Option<Evidence> {
     let mut effects = beside(study, model, &start)?.model.effects;
     effects.push(start);
-    let fitted = refit(study, model, &effects)?;
-    Evidence::of(study, fitted, folds, without)
-}
-
-/// Other effects from the values of a model, at its scale.
-fn refit(study: &Study<'_>, model: &Fitted, effects: &[FittedEffect]) -> Option<Fitted> {
-    let locals = model.fit.locals.clone();
-    study
-        .refit(
-            &model.with_effects(effects.to_vec()),
-            locals,
-            Some(model.fit.scale),
-        )
-        .ok()
+    let fitted = study.with_effects(model, effects).ok()?;
+    Evidence::of(study, fitted, without)
 }
 
 /// Whether some value of a parameter switches the effect off, so that it can start from absent.

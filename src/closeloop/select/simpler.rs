@@ -1,14 +1,16 @@
+use std::ops::Range;
+
 use crate::model::{Effect, FittedEffect};
 
 /// Every set of effects that is one step simpler: one effect less, or one replaced by some of those that it
-/// contains, fewest first. The first `declared` ones stay.
+/// contains, fewest first. Only effects at the places `added` change.
 pub(super) fn simpler(
     library: &[Effect],
     effects: &[FittedEffect],
-    declared: usize,
+    added: Range<usize>,
 ) -> Vec<Vec<FittedEffect>> {
     let mut all = Vec::new();
-    for k in declared..effects.len() {
+    for k in added {
         let mut without = effects.to_vec();
         let old = without.remove(k);
         for parts in parts_of(library, &old.effect) {

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn clipping_is_told_from_turning_round() {
+    fn clipping_is_distinguished_from_reversal() {
         assert_eq!(saturated(&sine(1.0)), 0.0);
         let clipped: Vec<f64> = sine(1.0)
             .iter()

@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_too_small_or_too_dull_to_audit() {
+    fn short_and_constant_logs_are_audited() {
         for rows in [2, 3, 5, 10, 30] {
             let still = one_joint(
                 uniform(rows, 0.01),

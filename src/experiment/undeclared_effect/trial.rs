@@ -88,7 +88,7 @@ impl Closed {
             episodes,
             verdict: outcome.verdict,
             effects: outcome.effects.findings.iter().map(named).collect(),
-            parameters: (outcome.models.after.absorbed().parameters.iter())
+            parameters: (outcome.models.after.model.absorbed().parameters.iter())
                 .map(parameter)
                 .collect(),
         }
@@ -137,7 +137,7 @@ impl Session {
                     source,
                 })?;
             closed.push(Closed::new(episodes, &outcome));
-            best = self.predictor(outcome.models.after.dynamics());
+            best = self.predictor(outcome.models.after.model.dynamics());
             scores.push(score(PlanningModel::Closed, episodes, &best)?);
             let hybrid = self.hybrid(&learner, &logs, seed).map_err(failed)?;
             scores.push(score(PlanningModel::Hybrid, episodes, &hybrid)?);

@@ -225,7 +225,7 @@ pub(in crate::report) fn remark(area: Area, content: &str) -> svg::node::element
     text(content, area.right(), area.y - 8.0, Anchor::End, SMALL_SIZE).set("fill", FAINT_INK)
 }
 
-/// What stands in a frame without data.
+/// The text in a frame without data.
 pub(in crate::report) fn no_data(area: Area) -> svg::node::element::Text {
     let (x, y) = (area.x + area.width / 2.0, area.y + area.height / 3.0);
     text("no data", x, y, Anchor::Middle, TEXT_SIZE).set("fill", FAINT_INK)

@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_data_is_drawn() {
+    fn degenerate_data_are_drawn() {
         let nan = f64::NAN;
         for scale in [Scale::Linear, Scale::Logarithmic] {
             for points in [

@@ -10,7 +10,7 @@ const SAMPLE_PX: f64 = 30.0;
 const ROW_PX: f64 = 21.0;
 const ENTRY_GAP_PX: f64 = 26.0;
 
-/// What stands beside a name.
+/// The sample drawn beside a name.
 #[derive(Clone, Copy, PartialEq)]
 pub(in crate::report) enum Sample {
     Line(Stroke),

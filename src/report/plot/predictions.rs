@@ -22,7 +22,7 @@ const LEAST_REACH: f64 = 0.1;
 pub struct Track {
     /// Name in the legend.
     pub label: String,
-    /// What the curve stands for.
+    /// What the curve shows.
     pub role: Role,
     /// Time in s and position in rad or m, piece by piece. A prediction that is restarted from the log has a piece
     /// for each start.
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_data_is_drawn() {
+    fn degenerate_data_are_drawn() {
         let cases = [
             vec![],
             vec![(0.0, 1.0)],

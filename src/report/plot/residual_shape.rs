@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_data_is_drawn() {
+    fn degenerate_data_are_drawn() {
         for residuals in [
             vec![],
             vec![0.0; 50],

@@ -1,6 +1,6 @@
 //! Colours, line styles and sizes, the same in every figure.
 
-/// What a curve, a cloud of points or a bar stands for.
+/// What a curve, a cloud of points or a bar shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// The log.

@@ -85,7 +85,7 @@ mod tests {
     use super::splines;
 
     #[test]
-    fn splines_add_up_to_one() {
+    fn splines_sum_to_one() {
         for place in [0.0, 0.123, 0.5, 0.999, 1.0, 2.0] {
             assert!((splines(place).iter().sum::<f64>() - 1.0).abs() < 1e-12);
         }

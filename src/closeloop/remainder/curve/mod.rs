@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_variable_that_does_not_vary_has_no_curve() {
+    fn a_constant_variable_has_no_curve() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let found = curves(
             &samples(|q, _| q, 0.1, &mut rng),
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_band_holds_the_force_and_no_variable_borrows_it() {
+    fn bands_cover_the_force_and_each_curve_shows_its_own_variable() {
         let force = |_: f64, qd: f64| -0.002 * qd.powi(3) + 0.05 * (1.3 * qd).sin();
         let (mut held, mut all, mut off) = (0, 0, 0.0_f64);
         for seed in 0..30 {

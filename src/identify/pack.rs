@@ -1,0 +1,183 @@
+//! Windows integrated side by side, one a lane.
+
+use super::normal_equations::WindowTerms;
+use super::sensitivity::{LANES, Lane, Tangent, TangentStepper};
+use super::sums::Sums;
+use super::values::Values;
+use crate::data::Log;
+use crate::lanes::Row;
+use crate::model::Dynamics;
+use crate::sim::{Commands, FIT_S, Hold, Point, RK4, Simulator, Window, substeps};
+
+/// Up to [`LANES`] windows integrated side by side. Shorter windows are padded with steps of zero length and rows of
+/// zero weight.
+pub(super) struct Pack {
+    pub windows: Vec<usize>,
+    /// The log of each lane.
+    logs: [usize; LANES],
+    /// `[row][lane]`: the row of the lane's log.
+    at: Vec<[usize; LANES]>,
+    time: Vec<Lane>,
+    dt: Vec<Lane>,
+    substeps: Vec<usize>,
+    /// `[row][joint]`
+    tau: Vec<Vec<Lane>>,
+    pub q: Vec<Vec<Lane>>,
+    /// `[row][joint]`: 1 / noise, or 0 where the lane has no such row.
+    pub weight: Vec<Vec<Lane>>,
+}
+
+impl Pack {
+    pub fn new(logs: &[Log], windows: &[Window], members: &[usize], noise: &[f64]) -> Self {
+        let n = noise.len();
+        let rows = members
+            .iter()
+            .map(|&w| windows[w].rows())
+            .max()
+            .unwrap_or(0);
+        let zeros = || vec![vec![Row::splat(0.0); n]; rows];
+        let mut pack = Self {
+            windows: members.to_vec(),
+            logs: std::array::from_fn(|lane| windows[members[lane.min(members.len() - 1)]].log),
+            at: vec![[0; LANES]; rows],
+            time: vec![Row::splat(0.0); rows],
+            dt: vec![Row::splat(0.0); rows],
+            substeps: Vec::new(),
+            tau: zeros(),
+            q: zeros(),
+            weight: zeros(),
+        };
+        for lane in 0..LANES {
+            // Empty lanes repeat the last window, without weight.
+            let window = windows[members[lane.min(members.len() - 1)]];
+            let log = &logs[window.log];
+            for row in 0..rows {
+                let at = (window.first + row).min(window.last);
+                pack.at[row][lane] = at;
+                pack.time[row][lane] = log.time[at];
+                pack.dt[row][lane] = if at < window.last {
+                    log.time[at + 1] - log.time[at]
+                } else {
+                    0.0
+                };
+                for j in 0..n {
+                    pack.tau[row][j][lane] = log.tau[j][at];
+                    pack.q[row][j][lane] = log.q[j][at];
+                    let counts = lane < members.len() && row < window.rows();
+                    pack.weight[row][j][lane] = if counts { 1.0 / noise[j] } else { 0.0 };
+                }
+            }
+        }
+        pack.cut(FIT_S);
+        pack
+    }
+
+    /// Cut the steps between rows into substeps of at most `longest_s`.
+    pub fn cut(&mut self, longest_s: f64) {
+        self.substeps = self.dt.iter().map(|dt| substeps(dt, longest_s)).collect();
+    }
+
+    fn rows(&self) -> usize {
+        self.time.len()
+    }
+
+    /// The local values of the pack's windows, one row per value.
+    fn gather(&self, locals: &[Vec<f64>]) -> Vec<Lane> {
+        let lane_of = |lane: usize| &locals[self.windows[lane.min(self.windows.len() - 1)]];
+        (0..lane_of(0).len())
+            .map(|k| Row(std::array::from_fn(|lane| lane_of(lane)[k])))
+            .collect()
+    }
+
+    /// Call `set(parameter, lane, value)` for every value that belongs to the log of a single lane.
+    fn own_values(&self, values: &Values, mut set: impl FnMut(usize, usize, f64)) {
+        for own in &values.own {
+            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
+                set(own.parameter, lane, own.value);
+            }
+        }
+    }
+
+    /// The hold from `row` to the next. `force` holds the windows' own forces, if they have any.
+    fn hold<'a>(
+        &'a self,
+        commands: &'a [Commands<'a>],
+        row: usize,
+        force: &'a [Lane],
+    ) -> Hold<'a, LANES> {
+        Hold {
+            commands: self.logs.map(|log| &commands[log]),
+            held: &self.tau[row],
+            force,
+            from: self.time[row],
+            to: *self.time.get(row + 1).unwrap_or(&self.time[row]),
+            length: self.dt[row],
+            substeps: self.substeps[row],
+        }
+    }
+
+    /// The torque that acted just before `row`.
+    fn torque_before(&self, commands: &[Commands<'_>], row: usize) -> Vec<Lane> {
+        Commands::just_before(self.logs.map(|log| &commands[log]), self.at[row])
+    }
+
+    /// Integrate the windows, calling `see(row, angles)` with the measured angles at each row.
+    pub fn roll(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        commands: &[Commands<'_>],
+        locals: &[Vec<f64>],
+        mut see: impl FnMut(usize, &[Lane]),
+    ) {
+        let mut state = self.gather(locals);
+        let forces = state.split_off(dynamics.states());
+        let model = Point::new(dynamics, values.common.as_slice());
+        let mut simulator = Simulator::<LANES>::new(&model, RK4);
+        simulator.state = state;
+        self.own_values(values, |parameter, lane, value| {
+            simulator.set_in_lane(parameter, lane, value);
+        });
+        for row in 0..self.rows() {
+            let at = self.logs.map(|log| &commands[log]);
+            let [angles, _] = simulator.shown(at, self.at[row]);
+            see(row, angles);
+            simulator.advance(&self.hold(commands, row, &forces));
+        }
+    }
+
+    pub fn linearise(
+        &self,
+        tangent: &Tangent,
+        values: &Values,
+        commands: &[Commands<'_>],
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<(usize, WindowTerms)> {
+        let (n, columns) = (tangent.joints, tangent.columns());
+        let states = self.gather(locals);
+        let mut sums = Sums::new(columns);
+        let mut stepper = TangentStepper::new(tangent, &values.common, RK4);
+        self.own_values(values, |parameter, lane, value| {
+            stepper.set_in_lane(parameter, lane, value);
+        });
+        stepper.start(&states);
+        for row in 0..self.rows() {
+            let before = || self.torque_before(commands, row);
+            let (angles, slopes) = stepper.shown(before, self.time[row]);
+            for j in 0..n {
+                let weight = Row(self.weight[row][j].map(|w| w / scale));
+                let residual = Row(std::array::from_fn(|l| {
+                    (angles[j][l] - self.q[row][j][l]) * weight[l]
+                }));
+                sums.add(&residual, &slopes[j * columns..][..columns], &weight);
+            }
+            stepper.advance(&self.hold(commands, row, &states[2 * n..]));
+        }
+        self.windows
+            .iter()
+            .enumerate()
+            .map(|(lane, &window)| (window, sums.lane(lane)))
+            .collect()
+    }
+}

@@ -1,0 +1,169 @@
+//! The sections of `report.md` on errors and on the values of the declared parameters.
+
+use std::fmt::Write;
+
+use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, amount, small, value};
+use crate::closeloop::Outcome;
+use crate::data::Joint;
+use crate::sim::metric::{Summary, summarise};
+
+/// The unit of positions: that of all joints, or both.
+fn position_unit(outcome: &Outcome) -> &'static str {
+    let sliding = outcome
+        .given
+        .prismatic
+        .iter()
+        .filter(|slides| **slides)
+        .count();
+    match sliding {
+        0 => "rad",
+        all if all == outcome.given.prismatic.len() => "m",
+        _ => "rad or m",
+    }
+}
+
+/// Every model that was scored on the test logs, with its name in a table.
+fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
+    let errors = &outcome.errors;
+    let mut models = vec![
+        (AS_WRITTEN, &errors.declared),
+        (FITTED, &errors.before),
+        (WITH_EFFECTS, &errors.after),
+    ];
+    let hybrid = errors.hybrid.iter();
+    models.extend(hybrid.map(|m| (WITH_NETWORK, m)));
+    models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
+    let joints = outcome.models.after.model.joints;
+    models
+        .into_iter()
+        .map(|(name, model)| (name, summarise(&model.horizons, joints)))
+        .collect()
+}
+
+pub(super) fn errors(outcome: &Outcome) -> String {
+    let models = scored(outcome);
+    let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
+    let mut out = format!(
+        "## Open-loop error on the test logs\n\nRoot mean square of the position error in {}; in brackets the median over \
+         windows. \"Fitted\" is the declared model with its own parameters fitted to the training logs and no effect added: \
+         the fair \"before\" of every comparison in this report.{}\n\n\
+         | horizon | joint | windows | {} | with effects / fitted |\n|---|---|---|{}---|\n",
+        position_unit(outcome),
+        if outcome.errors.against.is_empty() {
+            ""
+        } else {
+            " The last models are other files, scored as they are."
+        },
+        names.join(" | "),
+        "---|".repeat(names.len())
+    );
+    let (before, after) = (&models[1].1, &models[2].1);
+    for (h, horizon) in before.horizons_s.iter().enumerate() {
+        for joint in Joint::all(outcome.models.after.model.joints) {
+            let rmse = |s: &Summary| s.position_rmse[h][joint];
+            let cell = |(_, s): &(&str, Summary)| {
+                format!(
+                    "{} ({})",
+                    small(rmse(s)),
+                    small(s.position_median[h][joint])
+                )
+            };
+            let cells: Vec<String> = models.iter().map(cell).collect();
+            let _ = writeln!(
+                out,
+                "| {horizon} s | {joint} | {} | {} | {:.2} |",
+                before.windows[h],
+                cells.join(" | "),
+                rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
+            );
+        }
+    }
+    for (name, model) in &models {
+        let diverged: usize = model.diverged.iter().sum();
+        if diverged > 0 {
+            let _ = writeln!(
+                out,
+                "\n{name}: {diverged} windows diverged; each counts with the error reached by then."
+            );
+        }
+    }
+    if let Some([low, high]) = outcome.errors.reduction_ci95 {
+        let _ = writeln!(
+            out,
+            "\nThe effects remove {:.0} to {:.0} % of the fitted declared model's error at {} s (95 % interval, bootstrap over parts of the test logs).",
+            100.0 * low,
+            100.0 * high,
+            before.horizons_s[before.horizons_s.len() / 2]
+        );
+    }
+    out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
+}
+
+pub(super) fn parameters(outcome: &Outcome) -> String {
+    let mut out = String::from("## Parameters of the declared equations\n\n");
+    let after = outcome.models.after.model.absorbed();
+    for (parameter, before) in after
+        .parameters
+        .iter()
+        .zip(&outcome.models.before.model.parameters)
+    {
+        let _ = writeln!(
+            out,
+            "- {}; fitted without the effects: {:.5}",
+            value(parameter),
+            before.value
+        );
+    }
+    let verdict = &outcome.models.identifiability;
+    let _ = writeln!(
+        out,
+        "\nThe logs determine {} of {} free parameters.",
+        verdict.determined, verdict.free
+    );
+    for (name, model) in [
+        (FITTED, &outcome.models.before),
+        (WITH_EFFECTS, &outcome.models.after),
+    ] {
+        let (steps, termination) = (model.fit.steps, model.fit.termination);
+        let _ = writeln!(out, "- Fit ({name}): {termination} ({steps} steps).");
+    }
+    for &k in &verdict.hold {
+        let name = &outcome.models.before.model.parameters[k].name;
+        let _ = writeln!(
+            out,
+            "- `{name}` is held: the logs determine it only in combination with others. \
+             Fitted values of the others, and of effects, are relative to it."
+        );
+    }
+    out + "\n"
+}
+
+/// Which numbers of the model file do not hold for these logs.
+pub(super) fn contradicted(outcome: &Outcome) -> String {
+    if outcome.models.contradicted.is_empty() {
+        return String::new();
+    }
+    let errors = &outcome.errors;
+    let (written, fitted) = (errors.declared.position_rms(), errors.before.position_rms());
+    let mut out = format!(
+        "## Declared values that these logs contradict\n\nOn the test logs, {} s ahead, the position error of the declared model \
+         is {} {unit} with the values in its file and {} {unit} with its parameters fitted to the training logs. These declared \
+         values lie outside the 95 % intervals of the final fit, which includes the effects found:\n\n",
+        errors.before.middle().horizon_s,
+        small(written),
+        small(fitted),
+        unit = position_unit(outcome),
+    );
+    for one in &outcome.models.contradicted {
+        let _ = writeln!(
+            out,
+            "- {}: declared {}, fitted {}: {}",
+            one.fitted.name,
+            one.declared,
+            amount(&one.fitted),
+            one.comparison()
+        );
+    }
+    out + "\nmodel.toml holds the fitted values. If a declared value comes from another log, check that log with `residyn audit`; \
+           if it comes from a drawing, look for a wrong unit, gear ratio or torque constant.\n\n"
+}
