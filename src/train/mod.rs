@@ -21,6 +21,7 @@ mod segments;
 mod settings;
 mod stacked;
 mod sweep;
+mod variant;
 
 #[cfg(test)]
 mod tests;
@@ -41,4 +42,5 @@ pub use penalty::Penalty;
 pub use residual::ResidualTrainer;
 pub use segments::{Columns, Segments};
 pub use settings::{Batching, FitSettings, LearningRates};
-pub use sweep::{Sweep, SweepProgress, Trained, Variant};
+pub use sweep::Sweep;
+pub use variant::{SweepProgress, Trained, Variant};

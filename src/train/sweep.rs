@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use rand_chacha::ChaCha8Rng;
-
 use super::stacked::StackedSweep;
-use super::{Backend, FitSettings, HybridModel, Segments, TrainError, Training};
+use super::{
+    Backend, FitSettings, HybridModel, Segments, SweepProgress, TrainError, Trained, Training,
+    Variant,
+};
 use crate::model::MlpWeights;
 
 /// A run of many models of one structure.
@@ -17,39 +18,6 @@ pub struct Sweep {
     model: HybridModel,
     settings: FitSettings,
     variants: Vec<Variant>,
-}
-
-/// What distinguishes one model of a sweep.
-#[derive(Debug, Clone)]
-pub struct Variant {
-    /// In place of the network of the sweep's model.
-    pub network: MlpWeights,
-    /// alpha, or the first lambda.
-    pub penalty_weight: f64,
-    /// Orders the minibatches.
-    pub order: ChaCha8Rng,
-}
-
-/// A model of a sweep after its training.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trained {
-    /// Prediction error on the training segments.
-    pub error: f64,
-    /// ||F_r||; 0 in a model without a residual.
-    pub residual_norm: f64,
-    /// Values of the physical parameters, in their order and units.
-    pub parameters: Vec<f64>,
-    /// The loss became infinite or no number. All else here is then of the last step before or not finite.
-    pub diverged: bool,
-}
-
-/// The progress of a sweep.
-#[derive(Debug, Clone, Copy)]
-pub struct SweepProgress {
-    /// Calls of the observer so far, of the [`Sweep::rounds`].
-    pub round: usize,
-    /// Models that had diverged when last counted.
-    pub diverged: usize,
 }
 
 impl Sweep {
@@ -157,18 +125,5 @@ impl Sweep {
         };
         let model = self.model.with_weights(&weights)?;
         Training::new(model, settings, variant.order.clone())
-    }
-}
-
-impl Trained {
-    /// The end of a run that did not diverge.
-    pub(super) fn of(run: &Training) -> Self {
-        let last = run.history().last().expect("a run records its end");
-        Self {
-            error: last.error,
-            residual_norm: last.residual_norm,
-            parameters: last.parameters.clone(),
-            diverged: false,
-        }
     }
 }
