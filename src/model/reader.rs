@@ -95,6 +95,8 @@ impl Document {
     }
 }
 
+type Value<'a> = Spanned<DeValue<'a>>;
+
 /// One table of the file.
 pub(super) struct Section<'a> {
     document: &'a Document,
@@ -107,9 +109,7 @@ pub(super) struct Section<'a> {
 impl<'a> Section<'a> {
     /// The table `key`, if it is there.
     pub fn section(&self, key: &str) -> Result<Option<Section<'a>>, FileError> {
-        self.get(key)
-            .map(|value| self.table_of(key, value))
-            .transpose()
+        self.optional(key, Self::table_of)
     }
 
     /// The table `key`.
@@ -120,14 +120,8 @@ impl<'a> Section<'a> {
 
     /// The array of tables `key`, empty if it is not there.
     pub fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, FileError> {
-        let Some(value) = self.get(key) else {
-            return Ok(Vec::new());
-        };
-        let items = value
-            .get_ref()
-            .as_array()
-            .ok_or_else(|| self.wrong(value, key, "tables, written [[..]]"))?;
-        items.iter().map(|item| self.table_of(key, item)).collect()
+        let tables = self.list(key, "tables, written [[..]]", Self::table_of)?;
+        Ok(tables.unwrap_or_default())
     }
 
     /// Every key, in the order of the file.
@@ -137,34 +131,16 @@ impl<'a> Section<'a> {
 
     /// Every key with its table, in the order of the file.
     pub fn named_sections(&self) -> Result<Vec<(String, Section<'a>)>, FileError> {
-        self.table
-            .iter()
-            .map(|(key, value)| {
-                Ok((
-                    key.get_ref().to_string(),
-                    self.table_of(key.get_ref(), value)?,
-                ))
-            })
-            .collect()
+        self.entries(Self::table_of)
     }
 
     /// Every key with its text, in the order of the file.
     pub fn named_texts(&self) -> Result<Vec<(String, Located<String>)>, FileError> {
-        self.table
-            .iter()
-            .map(|(key, value)| {
-                Ok((
-                    key.get_ref().to_string(),
-                    self.text_of(key.get_ref(), value)?,
-                ))
-            })
-            .collect()
+        self.entries(Self::text_of)
     }
 
     pub fn text(&self, key: &str) -> Result<Option<Located<String>>, FileError> {
-        self.get(key)
-            .map(|value| self.text_of(key, value))
-            .transpose()
+        self.optional(key, Self::text_of)
     }
 
     pub fn required_text(&self, key: &str) -> Result<Located<String>, FileError> {
@@ -182,9 +158,7 @@ impl<'a> Section<'a> {
     }
 
     pub fn number(&self, key: &str) -> Result<Option<f64>, FileError> {
-        self.get(key)
-            .map(|value| self.number_of(key, value))
-            .transpose()
+        self.optional(key, Self::number_of)
     }
 
     pub fn required_number(&self, key: &str) -> Result<f64, FileError> {
@@ -216,10 +190,7 @@ impl<'a> Section<'a> {
     }
 
     pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, FileError> {
-        let items = self.items(key, "a list of numbers")?;
-        items
-            .map(|items| items.iter().map(|item| self.number_of(key, item)).collect())
-            .transpose()
+        self.list(key, "a list of numbers", Self::number_of)
     }
 
     /// The admissible range that `positive` and `bounds` declare.
@@ -254,25 +225,15 @@ impl<'a> Section<'a> {
     }
 
     pub fn texts(&self, key: &str) -> Result<Option<Vec<Located<String>>>, FileError> {
-        let items = self.items(key, "a list of texts")?;
-        items
-            .map(|items| items.iter().map(|item| self.text_of(key, item)).collect())
-            .transpose()
+        self.list(key, "a list of texts", Self::text_of)
     }
 
     /// A list of lists of texts.
     pub fn matrix(&self, key: &str) -> Result<Option<Vec<Vec<Located<String>>>>, FileError> {
-        let Some(rows) = self.items(key, "a list of rows")? else {
-            return Ok(None);
-        };
-        let row = |row: &Spanned<DeValue<'a>>| {
-            let items = row
-                .get_ref()
-                .as_array()
-                .ok_or_else(|| self.wrong(row, key, "a list of rows"))?;
-            items.iter().map(|item| self.text_of(key, item)).collect()
-        };
-        rows.iter().map(row).collect::<Result<_, _>>().map(Some)
+        let rows = "a list of rows";
+        self.list(key, rows, |section, key, row| {
+            section.list_of(key, row, rows, Self::text_of)
+        })
     }
 
     /// Refuse keys other than `known`.
@@ -319,7 +280,7 @@ impl<'a> Section<'a> {
             .is_some_and(|value| value.get_ref().is_table())
     }
 
-    fn get(&self, key: &str) -> Option<&Spanned<DeValue<'a>>> {
+    fn get(&self, key: &str) -> Option<&Value<'a>> {
         self.table
             .iter()
             .find(|(k, _)| k.get_ref() == key)
@@ -330,7 +291,7 @@ impl<'a> Section<'a> {
         self.error(format!("`{key}` is missing in [{}]", self.name))
     }
 
-    fn wrong(&self, value: &Spanned<DeValue<'a>>, key: &str, wanted: &str) -> FileError {
+    fn wrong(&self, value: &Value<'a>, key: &str, wanted: &str) -> FileError {
         let found = value.get_ref().type_str();
         self.document.error(
             value.span().start,
@@ -338,20 +299,51 @@ impl<'a> Section<'a> {
         )
     }
 
-    fn items(
+    /// What `of` reads from the value of `key`, if it is there.
+    fn optional<T>(
+        &self,
+        key: &str,
+        of: impl Fn(&Self, &str, &Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Option<T>, FileError> {
+        self.get(key).map(|value| of(self, key, value)).transpose()
+    }
+
+    /// What `of` reads from every value, in the order of the file.
+    fn entries<T>(
+        &self,
+        of: impl Fn(&Self, &str, &Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Vec<(String, T)>, FileError> {
+        let entries = self.table.iter();
+        entries
+            .map(|(key, value)| Ok((key.get_ref().to_string(), of(self, key.get_ref(), value)?)))
+            .collect()
+    }
+
+    /// What `of` reads from each item of the list `key`, if it is there.
+    fn list<T>(
         &self,
         key: &str,
         wanted: &str,
-    ) -> Result<Option<Vec<Spanned<DeValue<'a>>>>, FileError> {
-        self.get(key)
-            .map(|value| match value.get_ref().as_array() {
-                Some(items) => Ok(items.iter().cloned().collect()),
-                None => Err(self.wrong(value, key, wanted)),
-            })
-            .transpose()
+        of: impl Fn(&Self, &str, &Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Option<Vec<T>>, FileError> {
+        self.optional(key, |section, key, value| {
+            section.list_of(key, value, wanted, &of)
+        })
     }
 
-    fn table_of(&self, key: &str, value: &Spanned<DeValue<'a>>) -> Result<Section<'a>, FileError> {
+    fn list_of<T>(
+        &self,
+        key: &str,
+        value: &Value<'a>,
+        wanted: &str,
+        of: impl Fn(&Self, &str, &Value<'a>) -> Result<T, FileError>,
+    ) -> Result<Vec<T>, FileError> {
+        let items = value.get_ref().as_array();
+        let items = items.ok_or_else(|| self.wrong(value, key, wanted))?;
+        items.iter().map(|item| of(self, key, item)).collect()
+    }
+
+    fn table_of(&self, key: &str, value: &Value<'a>) -> Result<Section<'a>, FileError> {
         let table = value
             .get_ref()
             .as_table()
@@ -369,11 +361,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    fn text_of(
-        &self,
-        key: &str,
-        value: &Spanned<DeValue<'a>>,
-    ) -> Result<Located<String>, FileError> {
+    fn text_of(&self, key: &str, value: &Value<'a>) -> Result<Located<String>, FileError> {
         let text = value
             .get_ref()
             .as_str()
@@ -384,7 +372,7 @@ impl<'a> Section<'a> {
         })
     }
 
-    fn number_of(&self, key: &str, value: &Spanned<DeValue<'a>>) -> Result<f64, FileError> {
+    fn number_of(&self, key: &str, value: &Value<'a>) -> Result<f64, FileError> {
         let written = match value.get_ref() {
             DeValue::Float(number) => number.as_str(),
             DeValue::Integer(number) => number.as_str(),

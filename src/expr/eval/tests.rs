@@ -57,69 +57,28 @@ fn plain(program: &Program, inputs: &[f64], unit: f64) -> Vec<(f64, f64)> {
     let mut known: Vec<(f64, f64)> = Vec::new();
     for op in program.ops() {
         let at = |node: Node| known[node.index()];
-        let decided = |a: f64, off: f64, then: f64| {
-            if a.abs() > off || off == 0.0 {
-                then
-            } else {
-                f64::INFINITY
-            }
-        };
         let (value, spread) = match *op {
             Op::Const(value) => (value, 0.0),
             Op::Input(k) => (inputs[k as usize], 0.0),
             Op::Unary(op, a) => {
                 let (a, off) = at(a);
                 let value = op.apply(a);
-                let spread = match op {
-                    Unary::Neg | Unary::Abs | Unary::Sin | Unary::Cos | Unary::Tanh => off,
-                    Unary::Tan => off * (1.0 + value * value),
-                    Unary::Exp => off * value,
-                    Unary::Log => decided(a, 10.0 * off, off / a.abs()),
-                    Unary::Sqrt => decided(a, 10.0 * off, off / value),
-                    Unary::Sign => decided(a, off, 0.0),
+                let spread = if off == 0.0 || value.is_nan() && a.abs() > off {
+                    0.0
+                } else {
+                    spread_of_unary(op, a, off, value)
                 };
-                (
-                    value,
-                    if off == 0.0 || value.is_nan() && a.abs() > off {
-                        0.0
-                    } else {
-                        spread
-                    },
-                )
+                (value, spread)
             }
             Op::Binary(op, a, b) => {
                 let ((a, off_a), (b, off_b)) = (at(a), at(b));
                 let value = op.apply(a, b);
-                let spread = match op {
-                    Binary::Add | Binary::Sub => off_a + off_b,
-                    Binary::Mul => a.abs() * off_b + b.abs() * off_a,
-                    Binary::Div => {
-                        decided(b, 10.0 * off_b, (off_a + value.abs() * off_b) / b.abs())
-                    }
-                    Binary::Pow => {
-                        let parts = b * off_a / a.abs() + a.abs().ln() * off_b;
-                        // Of a negative number only whole powers are numbers.
-                        let fragile = a <= 10.0 * off_a || off_b > 0.0 && a < 0.0;
-                        if fragile && off_a + off_b > 0.0 {
-                            f64::INFINITY
-                        } else {
-                            4.0 * (parts * value).abs()
-                        }
-                    }
-                    Binary::Atan2 => {
-                        let round = off_a + off_b;
-                        // Behind the origin the angle jumps.
-                        let fragile = b < 0.0 && a.abs() <= off_a || a.hypot(b) <= 10.0 * round;
-                        if fragile && round > 0.0 {
-                            f64::INFINITY
-                        } else {
-                            round / a.hypot(b)
-                        }
-                    }
-                    Binary::Min | Binary::Max => off_a.max(off_b),
-                    Binary::Less => decided(a - b, off_a + off_b, 0.0),
+                let spread = if off_a + off_b == 0.0 {
+                    0.0
+                } else {
+                    spread_of_binary(op, [a, b], [off_a, off_b], value)
                 };
-                (value, if off_a + off_b == 0.0 { 0.0 } else { spread })
+                (value, spread)
             }
             Op::Where(c, a, b) => {
                 let ((c, off), (a, off_a), (b, off_b)) = (at(c), at(a), at(b));
@@ -135,6 +94,58 @@ fn plain(program: &Program, inputs: &[f64], unit: f64) -> Vec<(f64, f64)> {
         known.push((value, spread + rounding));
     }
     known
+}
+
+/// `then` where the sign of `a`, which is off by so much, is certain.
+fn decided(a: f64, off: f64, then: f64) -> f64 {
+    if a.abs() > off || off == 0.0 {
+        then
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// How far the value of `op` at `a` may be off where `a` is off by `off`.
+fn spread_of_unary(op: Unary, a: f64, off: f64, value: f64) -> f64 {
+    match op {
+        Unary::Neg | Unary::Abs | Unary::Sin | Unary::Cos | Unary::Tanh => off,
+        Unary::Tan => off * (1.0 + value * value),
+        Unary::Exp => off * value,
+        Unary::Log => decided(a, 10.0 * off, off / a.abs()),
+        Unary::Sqrt => decided(a, 10.0 * off, off / value),
+        Unary::Sign => decided(a, off, 0.0),
+    }
+}
+
+/// The same for two operands.
+fn spread_of_binary(op: Binary, [a, b]: [f64; 2], [off_a, off_b]: [f64; 2], value: f64) -> f64 {
+    match op {
+        Binary::Add | Binary::Sub => off_a + off_b,
+        Binary::Mul => a.abs() * off_b + b.abs() * off_a,
+        Binary::Div => decided(b, 10.0 * off_b, (off_a + value.abs() * off_b) / b.abs()),
+        Binary::Pow => {
+            let parts = b * off_a / a.abs() + a.abs().ln() * off_b;
+            // Of a negative number only whole powers are numbers.
+            let fragile = a <= 10.0 * off_a || off_b > 0.0 && a < 0.0;
+            if fragile && off_a + off_b > 0.0 {
+                f64::INFINITY
+            } else {
+                4.0 * (parts * value).abs()
+            }
+        }
+        Binary::Atan2 => {
+            let round = off_a + off_b;
+            // Behind the origin the angle jumps.
+            let fragile = b < 0.0 && a.abs() <= off_a || a.hypot(b) <= 10.0 * round;
+            if fragile && round > 0.0 {
+                f64::INFINITY
+            } else {
+                round / a.hypot(b)
+            }
+        }
+        Binary::Min | Binary::Max => off_a.max(off_b),
+        Binary::Less => decided(a - b, off_a + off_b, 0.0),
+    }
 }
 
 /// Compare the tape with the plain values; how many could be compared.
