@@ -106,10 +106,7 @@ impl StackedSweep {
                     .filter(|diverged| *diverged)
                     .count();
             }
-            observer(SweepProgress {
-                round: epoch,
-                diverged,
-            });
+            observer(SweepProgress { diverged });
         }
         Ok(self.evaluate(&whole))
     }

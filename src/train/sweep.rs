@@ -76,15 +76,10 @@ impl Sweep {
                 .run(segments, observer);
         }
         let mut trained: Vec<Trained> = Vec::new();
-        for (k, variant) in self.variants.iter().enumerate() {
+        for variant in &self.variants {
             let diverged = trained.iter().filter(|model| model.diverged).count();
-            let mut each = |epoch: usize| {
-                observer(SweepProgress {
-                    round: k * self.settings.epochs + epoch,
-                    diverged,
-                });
-            };
-            trained.push(self.alone(variant, segments, &mut each)?);
+            let mut after_epoch = || observer(SweepProgress { diverged });
+            trained.push(self.alone(variant, segments, &mut after_epoch)?);
         }
         Ok(trained)
     }
@@ -93,11 +88,11 @@ impl Sweep {
         &self,
         variant: &Variant,
         segments: &Segments,
-        after_epoch: &mut dyn FnMut(usize),
+        after_epoch: &mut dyn FnMut(),
     ) -> Result<Trained, TrainError> {
         let mut run = self.training(variant)?;
-        let ended = run.run(segments, None, &mut |at| {
-            after_epoch(at.epoch);
+        let ended = run.run(segments, None, &mut |_| {
+            after_epoch();
             ControlFlow::Continue(())
         });
         match ended {

@@ -32,8 +32,6 @@ pub struct Trained {
 /// The progress of a sweep.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepProgress {
-    /// Calls of the observer so far, of the rounds of the sweep.
-    pub round: usize,
     /// Models that had diverged when last counted.
     pub diverged: usize,
 }
