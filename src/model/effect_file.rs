@@ -5,7 +5,7 @@ use std::path::Path;
 use super::effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 use super::filter::CommandFilter;
 use super::reader::{Document, FileError, Located, Section};
-use crate::expr::Formula;
+use crate::expr::{Formula, Graph, Scope};
 
 const EFFECT_KEYS: &[&str] = &[
     "name",
@@ -152,13 +152,12 @@ fn check_names(
     parameters: &[EffectParameter],
 ) -> Result<(), FileError> {
     let parameters = parameters.iter().map(|p| p.name.as_str());
-    let program = formula
-        .value
-        .program(names.iter().copied().chain(parameters));
-    match program {
-        Ok(_) => Ok(()),
-        Err(error) => Err(document.formula_error(formula.at, &error)),
-    }
+    let mut graph = Graph::new();
+    let scope = Scope::of_inputs(&mut graph, names.iter().copied().chain(parameters));
+    let lowered = scope.lower(&mut graph, &formula.value);
+    lowered
+        .map(|_| ())
+        .map_err(|error| document.formula_error(formula.at, &error))
 }
 
 fn parameter(name: String, section: &Section<'_>) -> Result<EffectParameter, FileError> {
