@@ -37,7 +37,7 @@ impl Backend {
     pub fn device(self) -> Device {
         let device = match self {
             // Deprecated upstream in favour of burn-flex, which doubles the build time and trains no faster: the
-            // fused operation does the work on either.
+            // fused loss does the work on either.
             #[allow(deprecated)]
             Self::NdArray => Device::ndarray(),
             #[cfg(feature = "cuda")]

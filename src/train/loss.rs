@@ -24,7 +24,7 @@ pub struct Objective {
 /// What evaluates losses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Implementation {
-    /// One operation for the whole loss, on the processor; devices without it compose the loss.
+    /// One pass over rollout, networks and penalty, on the processor; other devices compose the loss.
     Fused,
     /// Burn's operations on every device.
     Composed,
@@ -35,7 +35,7 @@ enum Implementation {
 pub enum Batch {
     /// For Burn's operations.
     Columns(Columns),
-    /// For the fused operation.
+    /// For the fused loss.
     Blocks(Arc<Blocks>),
 }
 
