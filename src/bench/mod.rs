@@ -18,6 +18,7 @@ mod machine;
 mod mechanics;
 mod motion;
 mod recording;
+pub mod rigs;
 mod table;
 mod told;
 mod transmission;

@@ -48,6 +48,7 @@ pub use settings::{
     LearnSettings, ProposalSettings, RefineSettings, RemainderSettings, ScoreSettings,
     SelectSettings, Settings, SplitSettings, VerdictSettings,
 };
+pub(crate) use split::between;
 pub use split::{Split, SplitMethod};
 pub use stage::{Progress, Stage};
 pub use study::Study;

@@ -116,7 +116,7 @@ impl SplitSettings {
 }
 
 /// The rows of a log from `start_s` to `end_s`.
-fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
+pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
     let rows =
         log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
     let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();
