@@ -6,6 +6,7 @@
 mod against;
 mod bad_input;
 mod bench;
+mod bench_rigs;
 mod clients;
 mod common;
 mod control;
