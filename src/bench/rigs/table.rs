@@ -136,11 +136,12 @@ impl<'a> Lines<'a> {
             .filter_map(|(what, entry)| Some((what.to_string(), entry.error()?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let after = error(&Scored::After);
-        let said: Vec<&Said> = self
-            .of(&folds, Method::CloseLoop)
-            .filter_map(said)
+        let closed: Vec<&Line> = folds
+            .iter()
+            .filter_map(|fold| self.of(fold, Method::CloseLoop))
             .collect();
-        let seconds = self.of(&folds, Method::CloseLoop).map(|line| line.seconds);
+        let said: Vec<&Said> = closed.iter().filter_map(|line| line.said()).collect();
+        let seconds: Vec<f64> = closed.iter().map(|line| line.seconds).collect();
         Row {
             rig: self.rig.rig.name.clone(),
             group: group.map(str::to_owned),
@@ -154,7 +155,7 @@ impl<'a> Lines<'a> {
             best,
             named: counts(said.iter().flat_map(|said| said.names.clone())),
             verdicts: counts(said.iter().map(|said| word(said.verdict))),
-            seconds: median(&seconds.collect::<Vec<_>>()),
+            seconds: median(&seconds),
             models: models.into_iter().map(|(_, entry)| entry).collect(),
         }
     }
@@ -169,18 +170,12 @@ impl<'a> Lines<'a> {
         self.rig.folds.iter().filter(in_group).collect()
     }
 
-    /// The results of a method in these folds.
-    fn of(self, folds: &[&'a Fold], method: Method) -> impl Iterator<Item = &'a Line> {
-        let name = &self.rig.rig.name;
-        let of_fold = move |fold: &&Fold| {
-            let is_it =
-                |line: &&Line| line.rig == *name && line.fold == fold.name && line.method == method;
-            self.lines.iter().find(is_it)
-        };
-        folds
-            .to_vec()
-            .into_iter()
-            .filter_map(move |fold| of_fold(&fold))
+    /// The result of a method in a fold.
+    fn of(self, fold: &Fold, method: Method) -> Option<&'a Line> {
+        let rig = &self.rig.rig.name;
+        let is_it =
+            |line: &&Line| line.rig == *rig && line.fold == fold.name && line.method == method;
+        self.lines.iter().find(is_it)
     }
 
     fn entry(
@@ -192,8 +187,8 @@ impl<'a> Lines<'a> {
     ) -> Entry {
         let mut logs: Vec<(String, &LogErrors)> = Vec::new();
         let mut failed = 0;
-        for (fold, line) in folds.iter().zip(self.of(folds, method)) {
-            let Some(errors) = line.errors(what) else {
+        for fold in folds {
+            let Some(errors) = self.of(fold, method).and_then(|line| line.errors(what)) else {
                 failed += 1;
                 continue;
             };
@@ -215,6 +210,10 @@ impl<'a> Lines<'a> {
 }
 
 impl Line {
+    fn said(&self) -> Option<&Said> {
+        self.found.as_ref().ok()?.said.as_ref()
+    }
+
     fn errors(&self, what: &Scored) -> Option<&[LogErrors]> {
         let errors = &self.found.as_ref().ok()?.errors;
         errors
@@ -250,10 +249,6 @@ fn horizons(logs: &[&LogErrors]) -> Vec<Horizon> {
         }
     };
     horizons_s.into_iter().enumerate().map(horizon).collect()
-}
-
-fn said(line: &Line) -> Option<&Said> {
-    line.found.as_ref().ok()?.said.as_ref()
 }
 
 fn counts(all: impl Iterator<Item = String>) -> BTreeMap<String, usize> {
