@@ -3,10 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::bench::rigs::{RigsError, read};
-use residyn::bench::{Cell, read as grid};
+use residyn::bench::rigs::{Fold, Line, Measured, Method, RigsError, Tools, read, summarise};
+use residyn::bench::{Cell, Source, read as grid};
 use residyn::model::Library;
 use serde_json::Value;
+use tempfile::TempDir;
 
 use crate::support::{refuses, residyn, succeeds, text};
 
@@ -16,10 +17,14 @@ fn config(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Two logs of a pendulum with dry friction, and a third one.
-fn record(folder: &Path) {
+/// Three logs of a pendulum with dry friction.
+fn record(folder: &Path, seconds: f64) {
     fs::create_dir_all(folder).unwrap();
-    let cell: &Cell = &grid(&config("smoke.toml")).unwrap()[0];
+    let mut cell: Cell = grid(&config("smoke.toml")).unwrap().remove(0);
+    let Source::Simulated(simulation) = &mut cell.source else {
+        panic!("the grid's rigs are simulated")
+    };
+    simulation.condition.seconds = seconds;
     let model = Library::built_in().model(&cell.model).unwrap();
     for log in cell.record(&model).unwrap().0 {
         log.write(folder.join(&log.path)).unwrap();
@@ -42,14 +47,15 @@ published = [{ name = "1.0", model = "pendulum", parameters = { C_g = -19.62, C_
 also = { third = ["log3.csv"] }
 "#;
 
+/// A folder with a file of rigs and three logs of 6 s.
 struct Bench {
-    folder: tempfile::TempDir,
+    folder: TempDir,
 }
 
 impl Bench {
     fn new(rigs: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        record(&folder.path().join("logs"));
+        record(&folder.path().join("logs"), 6.0);
         fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
         Self { folder }
     }
@@ -58,24 +64,21 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    fn arguments(&self) -> Vec<String> {
-        let named = |name: &str| text(&self.path(name)).to_owned();
-        let mut all: Vec<String> = ["bench", "rigs", "--json"].map(str::to_owned).into();
-        for (flag, name) in [("--rigs", "rigs.toml"), ("--data", ""), ("--out", "out")] {
-            all.extend([flag.to_owned(), named(name)]);
-        }
-        all
-    }
-
-    fn run(&self) -> Value {
-        let arguments = self.arguments();
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-        serde_json::from_str(&succeeds(&arguments)).unwrap()
-    }
-
-    fn refused(&self) -> String {
-        let arguments = self.arguments();
-        refuses(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    /// Run the command with these flags too.
+    fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
+        let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
+        let data = text(self.folder.path());
+        let rigs = [
+            "bench",
+            "rigs",
+            "--rigs",
+            text(&rigs),
+            "--data",
+            data,
+            "--out",
+            text(&out),
+        ];
+        run(&[rigs.as_slice(), more].concat());
     }
 }
 
@@ -87,9 +90,33 @@ fn error(row: &Value, model: &str) -> f64 {
 }
 
 #[test]
-fn each_log_is_left_out_in_turn_and_a_second_run_repeats_nothing() {
+fn each_log_is_left_out_in_turn_and_the_errors_are_pooled() {
     let bench = Bench::new(RIGS);
-    let summary = bench.run();
+    record(&bench.path("logs"), 12.0);
+    let library = Library::built_in();
+    let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+    let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
+    let tools = Tools {
+        library: &library,
+        learner: None,
+        seed: 0,
+    };
+    let run = |fold: &Fold, method: Method| Line {
+        rig: rig.rig.name.clone(),
+        fold: fold.name.clone(),
+        method,
+        configuration: String::new(),
+        program: String::new(),
+        seconds: 1.0,
+        found: Ok(method.run(&rig, fold, &tools, &mut |_| ()).unwrap()),
+    };
+    let lines = rig
+        .folds
+        .iter()
+        .flat_map(|fold| Method::ALL.map(|method| run(fold, method)));
+    let lines: Vec<Line> = lines.collect();
+    let summary = summarise(std::slice::from_ref(&rig), &lines);
+    let summary = serde_json::to_value(summary).unwrap();
     let rows = summary["rows"].as_array().unwrap();
     assert_eq!(
         (rows.len(), &rows[0]["folds"], &rows[1]["folds"]),
@@ -103,11 +130,10 @@ fn each_log_is_left_out_in_turn_and_a_second_run_repeats_nothing() {
         for frictionless in ["declared, fitted", "published 1.0"] {
             assert!(after < 0.2 * error(row, frictionless), "{row}");
         }
-        assert!(
-            error(row, "declared") > error(row, "published 1.0"),
-            "{row}"
+        assert_eq!(
+            (&row["best"][0], &row["hybrid_ratio"]),
+            (&"plain structure".into(), &1.0.into())
         );
-        assert_eq!(row["best"][0], "plain structure");
     }
     let logs = &rows[0]["models"][0]["logs"];
     assert_eq!(
@@ -116,52 +142,52 @@ fn each_log_is_left_out_in_turn_and_a_second_run_repeats_nothing() {
     );
     let windows = |log: usize| logs[log][1][1]["windows"].as_u64().unwrap();
     assert!(windows(1) < windows(0), "left-out windows are not scored");
-    let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
-    assert!(table.contains("\n| rig, third | 1 |"), "{table}");
-
-    // A fold that failed counts as failed, in the table and in the exit status; the others are not run again.
-    let path = bench.path("out/rig/log1.csv/closeloop.json");
-    let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
-    line["found"] = serde_json::json!({"Err": "the fit diverged"});
-    fs::write(&path, line.to_string()).unwrap();
-    let output = residyn(
-        &bench
-            .arguments()
-            .iter()
-            .map(String::as_str)
-            .collect::<Vec<_>>(),
-    );
-    assert_eq!(output.status.code(), Some(1));
-    let again: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(again["failures"][0][2], "the fit diverged");
-    assert_eq!(again["rows"][0]["ratio"], Value::Null);
-    assert_eq!(again["rows"][1], rows[1]);
-    let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
-    assert!(table.contains("| 1 failed |"), "{table}");
-    // Another result is not used for other logs.
-    let log = fs::read_to_string(bench.path("logs/log3.csv")).unwrap();
-    fs::write(
-        bench.path("logs/log3.csv"),
-        log.trim_end().rsplit_once('\n').unwrap().0,
-    )
-    .unwrap();
-    assert_eq!(bench.run()["failures"].as_array().unwrap().len(), 0);
 }
 
 #[test]
-fn the_halves_of_a_single_log_train_and_test() {
+fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
     let rigs = RIGS.replace("[\"log1.csv\", \"log2.csv\"]", "[\"log2.csv\"]");
     let bench = Bench::new(&rigs.replace("each_log", "halves").replace("also", "#"));
-    let summary = bench.run();
-    let row = &summary["rows"][0];
-    assert_eq!(
-        (summary["rows"].as_array().unwrap().len(), &row["folds"]),
-        (1, &2.into())
-    );
-    assert!(
-        error(row, "after") < 0.5 * error(row, "declared, fitted"),
-        "{row}"
-    );
+    bench.command(&["--json"], |arguments| {
+        let summary: Value = serde_json::from_str(&succeeds(arguments)).unwrap();
+        assert_eq!(summary["rows"].as_array().unwrap().len(), 1);
+        assert_eq!(summary["rows"][0]["folds"], 2);
+    });
+    let path = bench.path("out/rig/first half/closeloop.json");
+    let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    line["found"] = serde_json::json!({"Err": "the fit diverged"});
+    fs::write(&path, line.to_string()).unwrap();
+    // Stored results are used again.
+    bench.command(&["--json"], |arguments| {
+        let output = residyn(arguments);
+        assert_eq!(output.status.code(), Some(1));
+        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(summary["failures"][0][2], "the fit diverged");
+        assert_eq!(summary["rows"][0]["ratio"], Value::Null);
+    });
+    let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
+    assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
+    assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
+}
+
+#[test]
+fn results_of_other_logs_or_models_are_not_used_again() {
+    let bench = Bench::new(RIGS);
+    let fingerprint = || {
+        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+        let library = Library::built_in();
+        Measured::open(rig, bench.folder.path(), &library)
+            .unwrap()
+            .fingerprint
+    };
+    let first = fingerprint();
+    assert_eq!(first, fingerprint());
+    let log = fs::read_to_string(bench.path("logs/log3.csv")).unwrap();
+    let shorter = log.trim_end().rsplit_once('\n').unwrap().0;
+    fs::write(bench.path("logs/log3.csv"), shorter).unwrap();
+    let second = fingerprint();
+    fs::write(bench.path("rigs.toml"), RIGS.replace("5.0", "5.1")).unwrap();
+    assert!(first != second && second != fingerprint());
 }
 
 #[test]
@@ -245,8 +271,10 @@ fn what_the_models_and_logs_of_a_rig_lack_is_told() {
             "pendulam",
         ),
     ] {
-        let message = Bench::new(&RIGS.replace(from, to)).refused();
-        assert!(message.contains(part), "{to}: {message}");
+        Bench::new(&RIGS.replace(from, to)).command(&[], |arguments| {
+            let message = refuses(arguments);
+            assert!(message.contains(part), "{to}: {message}");
+        });
     }
     let message = refuses(&[
         "bench",
