@@ -169,6 +169,7 @@ impl File {
             let sound = condition.rate_hz > 0.0
                 && condition.noise >= 0.0
                 && condition.quantum >= 0.0
+                && !condition.drive.is_empty()
                 && condition.logs >= 2
                 && condition.seconds * condition.rate_hz >= 10.0;
             if !sound {

@@ -18,9 +18,11 @@ mod machine;
 mod mechanics;
 mod motion;
 mod recording;
+mod sensors;
 mod table;
 mod told;
 mod transmission;
+mod wires;
 
 pub use cell::{Errors, Findings};
 pub use files::recorded;
@@ -30,4 +32,5 @@ pub use judge::{Answer, Coverage, Estimate, Judgement, Named, Truth, judge};
 pub use machine::{Machine, State};
 pub use mechanics::{Mechanics, Pair};
 pub use recording::{Condition, Driving, Loop};
+pub use sensors::Flaws;
 pub use table::{Line, Rate, Row, Summary, markdown, summarise};
