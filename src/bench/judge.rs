@@ -54,6 +54,13 @@ pub struct Answer {
     pub left_where: String,
 }
 
+impl Answer {
+    fn estimates(&self) -> Vec<(Label, Vec<Estimate>)> {
+        let of = |named: &Named| (named.label.clone(), named.parameters.clone());
+        self.named.iter().map(of).collect()
+    }
+}
+
 /// Whether a 95 % interval holds the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
@@ -76,7 +83,7 @@ pub struct Judgement {
     pub missed: Vec<Label>,
     /// A significant remainder is reported.
     pub flagged: bool,
-    /// Named effects that cut less than half of the error.
+    /// Effects that were named, are absent, and cut less than half of the error.
     pub weak: Vec<Label>,
     /// Of the parameters of true effects that were named; of effects by `name`, of declared parameters as
     /// they are called.
@@ -146,10 +153,11 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
         .iter()
         .filter(|effect| effect.error_reduction.is_none_or(|share| share < HALF))
         .map(labels)
+        .filter(|label| wrong.contains(label))
         .collect();
     let passed = match group {
-        Group::Single | Group::Pair => exact,
-        Group::None => named.is_empty(),
+        Group::Single | Group::Pair | Group::Several | Group::Told => exact,
+        Group::None => named.is_empty() && !flagged,
         Group::Outside => flagged && weak.is_empty(),
     };
     Judgement {
@@ -159,7 +167,10 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
         missed,
         flagged,
         weak,
-        coverage: coverage(truth, answer, exact),
+        coverage: match exact {
+            true => coverage(truth, &answer.estimates(), &answer.declared),
+            false => Vec::new(),
+        },
         passed,
     }
 }
@@ -172,16 +183,17 @@ fn without(a: &[Label], b: &[Label]) -> Vec<Label> {
         .collect()
 }
 
-/// Intervals are only meaningful for the true structure; others are not evaluated.
-fn coverage(truth: &Truth, answer: &Answer, exact: bool) -> Vec<Coverage> {
-    if !exact {
-        return Vec::new();
-    }
+/// Which intervals hold the truth, of these effects and of declared parameters. Intervals are only meaningful for the
+/// true structure.
+pub fn coverage(
+    truth: &Truth,
+    effects: &[(Label, Vec<Estimate>)],
+    declared: &[Estimate],
+) -> Vec<Coverage> {
     let mut all = Vec::new();
     for (label, values) in &truth.effects {
-        let named = answer.named.iter().filter(|named| named.label == *label);
-        for named in named {
-            let mut estimates = named.parameters.clone();
+        for (_, estimates) in effects.iter().filter(|(of, _)| of == label) {
+            let mut estimates = estimates.clone();
             if label.starts_with("cogging_torque") {
                 turn_ripple(&mut estimates, values);
             }
@@ -191,8 +203,7 @@ fn coverage(truth: &Truth, answer: &Answer, exact: bool) -> Vec<Coverage> {
             }));
         }
     }
-    let declared = answer.declared.iter();
-    all.extend(declared.filter_map(|estimate| {
+    all.extend(declared.iter().filter_map(|estimate| {
         let truth = *truth.declared.get(&estimate.name)?;
         Coverage::of(&estimate.name, truth, estimate)
     }));

@@ -6,6 +6,7 @@
 
 mod answer;
 mod cell;
+mod draw;
 mod drive;
 mod excitation;
 mod files;
@@ -24,7 +25,8 @@ mod told;
 mod transmission;
 mod wires;
 
-pub use cell::{Errors, Findings};
+pub use cell::{Errors, Findings, KnownStructure, Searched};
+pub use draw::{Drawn, Recipe, Rules};
 pub use files::recorded;
 pub use grid::{Cell, GridError, Group, Simulation, Source, cells, read};
 pub use hidden::{Hidden, Label};

@@ -65,6 +65,27 @@ pub struct Condition {
     pub flaws: Flaws,
 }
 
+impl Condition {
+    /// Whether logs can be taken so.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn check(&self) -> Result<(), String> {
+        let sound = self.rate_hz > 0.0
+            && self.noise >= 0.0
+            && self.quantum >= 0.0
+            && !self.drive.is_empty()
+            && self.logs >= 2
+            && self.seconds * self.rate_hz >= 10.0;
+        let needs = "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, two logs, ten rows";
+        if sound {
+            self.flaws.check()
+        } else {
+            Err(needs.to_owned())
+        }
+    }
+}
+
 fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Loop>, D::Error> {
     #[derive(Deserialize)]
     #[serde(untagged)]
@@ -361,6 +382,24 @@ mod tests {
         for row in 1..noisy.rows() {
             let difference = (noisy.q[0][row] - noisy.q[0][row - 1]) / 0.01;
             assert!((noisy.qd[0][row] - difference).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn lost_rows_are_missing_while_the_rig_goes_on() {
+        let machine = Machine::bare(pendulum());
+        let mut closed = condition(Loop::Closed);
+        let whole = record(&machine, &closed, 0.0);
+        (closed.flaws.dropped, closed.flaws.burst) = (0.1, 4);
+        let lossy = record(&machine, &closed, 0.0);
+        let lost = whole.rows() - lossy.rows();
+        assert!((20..70).contains(&lost), "{lost}");
+        assert_eq!(lossy.duration(), whole.duration());
+        // What is left is what was there: the controller has seen the lost rows, and the rig has moved under it.
+        for (row, time) in lossy.time.iter().enumerate() {
+            let there = whole.time.iter().position(|t| t == time).unwrap();
+            let of = |log: &Log, row: usize| [log.q[0][row], log.qd[0][row], log.tau[0][row]];
+            assert_eq!(of(&lossy, row), of(&whole, there));
         }
     }
 }

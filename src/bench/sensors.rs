@@ -24,6 +24,25 @@ pub struct Flaws {
 }
 
 impl Flaws {
+    /// Whether a logger can have them.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn check(&self) -> Result<(), String> {
+        let sizes = [
+            self.jitter,
+            self.torque_noise,
+            self.torque_quantum,
+            self.filter_s,
+        ];
+        let sound = sizes.iter().all(|size| *size >= 0.0)
+            && (0.0..0.5).contains(&self.dropped)
+            && (self.dropped == 0.0 || self.burst > 0);
+        let needs =
+            "`flaws` needs numbers not below zero, `dropped` below a half, and `burst` with it";
+        if sound { Ok(()) } else { Err(needs.to_owned()) }
+    }
+
     /// What is logged of a commanded torque \[N m\].
     pub fn torque(&self, command: f64, rng: &mut impl Rng) -> f64 {
         match (self.torque_noise, self.torque_quantum) {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
 
-use super::cell::Findings;
+use super::cell::{Findings, KnownStructure, Searched};
 use super::grid::{Cell, Group};
 use super::judge::{Coverage, Judgement};
 use crate::closeloop::Verdict;
@@ -116,10 +116,24 @@ const AS_GOOD: f64 = 1.1;
 /// A cell on which closing the loop failed counts as not passed wherever it counts.
 struct Done<'l> {
     cell: &'l Cell,
-    findings: Option<&'l Findings>,
+    findings: Option<&'l Searched>,
+    told: Option<&'l KnownStructure>,
 }
 
-impl Done<'_> {
+impl<'l> Done<'l> {
+    fn of(line: &'l Line) -> Self {
+        let (findings, told) = match &line.findings {
+            Ok(Findings::Searched(searched)) => (Some(&**searched), None),
+            Ok(Findings::Told(told)) => (None, Some(told)),
+            Err(_) => (None, None),
+        };
+        Self {
+            cell: &line.cell,
+            findings,
+            told,
+        }
+    }
+
     fn shows(&self, what: impl Fn(&Judgement) -> bool) -> bool {
         self.findings.is_some_and(|f| what(&f.judgement))
     }
@@ -128,27 +142,28 @@ impl Done<'_> {
         self.findings?.errors.ratio()
     }
 
+    /// Of the effects that were named, or of those that the fit was told.
     fn coverage(&self) -> &[Coverage] {
-        self.findings.map_or(&[], |f| &f.judgement.coverage)
+        let named = self.findings.map(|f| &f.judgement.coverage);
+        let told = self.told.map(|told| &told.coverage);
+        named.or(told).map_or(&[], Vec::as_slice)
+    }
+
+    fn is_told(&self) -> bool {
+        self.cell.group == Group::Told
     }
 }
 
 /// Count.
 pub fn summarise(lines: &[Line]) -> Summary {
-    let done: Vec<Done<'_>> = lines
-        .iter()
-        .map(|line| Done {
-            cell: &line.cell,
-            findings: line.findings.as_ref().ok(),
-        })
-        .collect();
+    let done: Vec<Done<'_>> = lines.iter().map(Done::of).collect();
     let failed = lines.iter().filter_map(|line| {
         let error = line.findings.as_ref().err()?;
         Some((line.cell.id.clone(), error.clone()))
     });
     let known: Vec<&Done<'_>> = done
         .iter()
-        .filter(|d| matches!(d.cell.group, Group::Single | Group::Pair))
+        .filter(|d| matches!(d.cell.group, Group::Single | Group::Pair | Group::Several))
         .collect();
     let ratios: Vec<f64> = known.iter().filter_map(|d| d.ratio()).collect();
     Summary {
@@ -180,12 +195,7 @@ fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
     let flagged_in_vain = |d: &Done<'_>| !d.shows(|j| !j.flagged);
     let flagged = |d: &Done<'_>| d.shows(|j| j.flagged);
     let passed = |d: &Done<'_>| d.shows(|j| j.passed);
-    let covered = |of_effects: bool| {
-        let all = done.iter().flat_map(Done::coverage);
-        let wanted = all.filter(|c| c.name.contains('.') == of_effects);
-        Rate::count(wanted.map(|c| c.covered))
-    };
-    vec![
+    let mut rows = vec![
         Row::new("one effect: exact", of(Group::Single, &exact)),
         Row::new(
             "one effect: exact or a listed alternative",
@@ -196,34 +206,112 @@ fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
             "two effects: exact or listed alternatives",
             of(Group::Pair, &within),
         ),
+    ];
+    rows.extend(rows_of_several(done));
+    rows.extend([
         Row::new("no effect: something is named", of(Group::None, &named)),
         Row::new(
             "no effect: something is flagged",
             of(Group::None, &flagged_in_vain),
         ),
+        Row::new(
+            "no effect: nothing is named, nothing flagged",
+            of(Group::None, &passed),
+        ),
         Row::new("outside the library: flagged", of(Group::Outside, &flagged)),
         Row::new(
-            "outside the library: flagged, and no name that cuts less than half of the error",
+            "outside the library: flagged, and no false name that cuts less than half of the error",
             of(Group::Outside, &passed),
         ),
+    ]);
+    rows.extend(rows_of_intervals(done));
+    rows.push(Row::new(
+        "error after within a tenth of that of the true structure",
+        Rate::count(ratios.iter().map(|ratio| *ratio <= AS_GOOD)),
+    ));
+    rows
+}
+
+/// Rigs that hide several effects: how many were named completely, and how many of the effects.
+fn rows_of_several(done: &[Done<'_>]) -> Vec<Row> {
+    let several: Vec<&Done<'_>> = done
+        .iter()
+        .filter(|d| d.cell.group == Group::Several)
+        .collect();
+    let exact = |joints: usize| {
+        let on = several.iter().filter(|d| d.cell.joints() == Some(joints));
+        Rate::count(on.map(|d| d.shows(|j| j.exact)))
+    };
+    let within = several.iter().map(|d| d.shows(|j| j.within));
+    // A cell that could not be run has named nothing.
+    let hidden = several.iter().flat_map(|d| {
+        let found = |label: &String| d.shows(|j| !j.missed.contains(label));
+        d.cell
+            .effects
+            .iter()
+            .map(move |effect| found(&effect.label()))
+    });
+    let named = several.iter().filter_map(|d| d.findings).flat_map(|f| {
+        let wrong = &f.judgement.wrong;
+        f.answer
+            .named
+            .iter()
+            .map(|named| !wrong.contains(&named.label))
+    });
+    vec![
+        Row::new("several effects, one joint: exact", exact(1)),
+        Row::new("several effects, two joints: exact", exact(2)),
+        Row::new(
+            "several effects: exact or listed alternatives",
+            Rate::count(within),
+        ),
+        Row::new(
+            "several effects: hidden ones that are named",
+            Rate::count(hidden),
+        ),
+        Row::new(
+            "several effects: named ones that are hidden",
+            Rate::count(named),
+        ),
+    ]
+}
+
+/// Intervals that hold the truth: of what was named and, apart from it, of structures that were told.
+fn rows_of_intervals(done: &[Done<'_>]) -> Vec<Row> {
+    let covered = |told: bool, of_effects: bool| {
+        let cells = done.iter().filter(|d| d.is_told() == told);
+        let all = cells.flat_map(Done::coverage);
+        let wanted = all.filter(|c| c.name.contains('.') == of_effects);
+        Rate::count(wanted.map(|c| c.covered))
+    };
+    let fitted = done
+        .iter()
+        .filter(|d| d.is_told())
+        .map(|d| d.told.is_some());
+    vec![
         Row::new(
             "95 % intervals of effects that hold the truth",
-            covered(true),
+            covered(false, true),
         ),
         Row::new(
             "95 % intervals of declared parameters that hold the truth",
-            covered(false),
+            covered(false, false),
+        ),
+        Row::new("told the structure: fitted", Rate::count(fitted)),
+        Row::new(
+            "told the structure: 95 % intervals of effects that hold the truth",
+            covered(true, true),
         ),
         Row::new(
-            "error after within a tenth of that of the true structure",
-            Rate::count(ratios.iter().map(|ratio| *ratio <= AS_GOOD)),
+            "told the structure: 95 % intervals of declared parameters that hold the truth",
+            covered(true, false),
         ),
     ]
 }
 
 fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
-    for d in done {
+    for d in done.iter().filter(|d| !d.is_told()) {
         for key in keys(d) {
             groups.entry(key).or_default().push(d.shows(|j| j.passed));
         }
@@ -254,7 +342,7 @@ fn counted(groups: BTreeMap<String, Vec<bool>>) -> Vec<Row> {
 
 /// `None` for a passed cell, and for one that could not be run, which is listed by its error.
 fn failure(d: &Done<'_>) -> Option<Failure> {
-    let Findings {
+    let Searched {
         answer,
         judgement,
         errors,

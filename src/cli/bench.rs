@@ -144,7 +144,11 @@ impl Store {
     fn add(&self, cell: &Cell, library: &Library) -> Result<Line> {
         let begun = Instant::now();
         // A panic is a result of the bench: it is recorded, and the run continues.
-        let run = std::panic::AssertUnwindSafe(|| cell.run(library));
+        let mut settled = cell.clone();
+        let run = std::panic::AssertUnwindSafe(|| {
+            settled = cell.settled(library)?;
+            settled.run(library)
+        });
         let findings = match std::panic::catch_unwind(run) {
             Ok(findings) => findings.map_err(|error| told(&error)),
             Err(_) => Err("the program panicked".to_owned()),
@@ -153,7 +157,7 @@ impl Store {
             configuration: configuration(cell)?,
             program: self.program.clone(),
             seconds: begun.elapsed().as_secs_f64(),
-            cell: cell.clone(),
+            cell: settled,
             findings,
         };
         let mut file = OpenOptions::new()

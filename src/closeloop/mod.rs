@@ -35,6 +35,7 @@ pub use find::{Chosen, Found, find};
 pub use fitted::Fitted;
 pub use learn::{LearnError, LearnedResidual, ResidualLearner, ResidualTask};
 pub use outcome::{Effects, Given, Models, Outcome, Remainder};
+pub use refine::with_intervals;
 pub use remainder::{
     Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, proposal,
     unexplained,
