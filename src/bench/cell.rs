@@ -173,11 +173,11 @@ impl Cell {
     /// A model file or log that cannot be read, or logs on which closing the loop fails.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
         let model = self.declared(library)?;
-        let (logs, truth) = self.record(&model)?;
+        let (logs, mut truth) = self.record(&model)?;
         let split = last_is_test(logs);
         let settings = Settings::default();
-        let known = &truth.declared;
-        let told = Told::fit(&model, library, &split, &settings, &self.effects, known);
+        let (effects, known) = (&self.effects, &truth.declared);
+        let told = Told::fit(&model, library, &split, &settings, effects, known);
         if self.group == Group::Told {
             let told = told.context("the true structure cannot be fitted")?;
             return Ok(Findings::Told(KnownStructure {
@@ -185,6 +185,9 @@ impl Cell {
                 coverage: told.coverage(&truth)?,
                 truth,
             }));
+        }
+        if self.group == Group::Several {
+            truth.twins = told.as_ref().map(Told::twins).unwrap_or_default();
         }
         let outcome = close(&model, library, split.clone(), self.seed)?;
         let answer = answer(&outcome);

@@ -18,6 +18,9 @@ pub struct Truth {
     pub effects: Vec<(Label, BTreeMap<String, f64>)>,
     /// True values of declared parameters, where the rig fixes them.
     pub declared: BTreeMap<String, f64>,
+    /// Other sets of effects that the logs do not tell from these: as right.
+    #[serde(default)]
+    pub twins: Vec<Vec<Label>>,
 }
 
 /// A value with its 95 % interval.
@@ -73,7 +76,7 @@ pub struct Coverage {
 /// The answer compared with the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judgement {
-    /// The true effects were named, each on its joint, and nothing else.
+    /// The true effects, or a set that the logs do not tell from them, were named, each on its joint, and nothing else.
     pub exact: bool,
     /// The same after swapping named effects for alternatives that were listed with them.
     pub within: bool,
@@ -120,7 +123,15 @@ impl Truth {
                 .map(|effect| (effect.label(), values(effect, offsets)))
                 .collect(),
             declared,
+            twins: Vec::new(),
         }
+    }
+
+    /// Of the true set of effects and its twins the one that has most in common with those `named`.
+    fn nearest(&self, named: &[Label]) -> Vec<Label> {
+        let off = |set: &Vec<Label>| without(set, named).len() + without(named, set).len();
+        let sets = std::iter::once(self.labels()).chain(self.twins.iter().cloned());
+        sets.min_by_key(off).unwrap_or_default()
     }
 
     fn labels(&self) -> Vec<Label> {
@@ -135,7 +146,7 @@ impl Truth {
 pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
     let labels = |named: &Named| named.label.clone();
     let named: Vec<Label> = answer.named.iter().map(labels).collect();
-    let there = truth.labels();
+    let there = truth.nearest(&named);
     let wrong = without(&named, &there);
     let missed = without(&there, &named);
     let exact = wrong.is_empty() && missed.is_empty();
@@ -289,6 +300,7 @@ mod tests {
                 .map(|(label, own)| ((*label).to_owned(), values(own)))
                 .collect(),
             declared: BTreeMap::new(),
+            twins: Vec::new(),
         }
     }
 
@@ -337,6 +349,27 @@ mod tests {
             &[&["coulomb_friction@1", "joint_spring@1"]],
         );
         assert!(!judge(Group::Single, &coulomb(), &added).within);
+    }
+
+    #[test]
+    fn a_set_that_the_logs_do_not_tell_from_the_true_one_is_right() {
+        let mut delayed = truth(&[("coulomb_friction@1", &[]), ("actuator_delay@1", &[])]);
+        let named = || {
+            vec![
+                named("actuator_lag@1", &[], 0.9),
+                named("coulomb_friction@1", &[], 0.9),
+            ]
+        };
+        let judged = |truth: &Truth| {
+            let answer = answer(Verdict::Explained, named(), &[]);
+            judge(Group::Several, truth, &answer)
+        };
+        assert_eq!(judged(&delayed).missed, ["actuator_delay@1"]);
+        let labels = ["coulomb_friction@1", "actuator_lag@1"].map(str::to_owned);
+        delayed.twins.push(labels.to_vec());
+        assert!(judged(&delayed).exact && judged(&delayed).passed);
+        delayed.twins[0].pop();
+        assert_eq!(judged(&delayed).wrong, ["actuator_lag@1"]);
     }
 
     #[test]

@@ -203,7 +203,7 @@ impl Machine {
                 if kept {
                     log.q[j].push(q);
                     log.qd[j].push(qd);
-                    log.tau[j].push(flaws.torque(command[j], rng));
+                    log.tau[j].push(flaws.torque(command[j], driving.limit[j], rng));
                 }
             }
             if kept {

@@ -16,7 +16,8 @@ pub struct Flaws {
     pub dropped: f64,
     /// Rows that are lost at once, at most.
     pub burst: usize,
-    /// Standard deviation of the logged torque \[N m\], and the step in which it is logged; zero for a fine one.
+    /// Standard deviation of the logged torque, and the step in which it is logged, zero for a fine one: in parts of the
+    /// largest torque of the joint.
     pub torque_noise: f64,
     pub torque_quantum: f64,
     /// Time constant of the filter behind the difference quotient of the positions \[s\].
@@ -43,11 +44,11 @@ impl Flaws {
         if sound { Ok(()) } else { Err(needs.to_owned()) }
     }
 
-    /// What is logged of a commanded torque \[N m\].
-    pub fn torque(&self, command: f64, rng: &mut impl Rng) -> f64 {
+    /// What is logged of a command to a joint whose largest torque is `limit` \[N m\].
+    pub fn torque(&self, command: f64, limit: f64, rng: &mut impl Rng) -> f64 {
         match (self.torque_noise, self.torque_quantum) {
             (0.0, 0.0) => command,
-            (noise, quantum) => sensed(command, noise, quantum, rng),
+            (noise, quantum) => sensed(command, limit * noise, limit * quantum, rng),
         }
     }
 }

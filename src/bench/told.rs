@@ -3,12 +3,19 @@
 use std::collections::BTreeMap;
 
 use super::answer::{estimates, label_of};
-use super::hidden::Hidden;
+use super::hidden::{Hidden, Label};
 use super::judge::{Coverage, Estimate, Truth, coverage};
 use crate::closeloop::{Fitted, Settings, Split, Study, StudyError, with_intervals};
 use crate::data::Log;
+use crate::data::statistics::{mean, standard_error};
+use crate::identify::{Fit, blocks};
 use crate::model::{FittedEffect, Library, Model};
 use crate::sim::metric::assess;
+
+/// Standard normal quantile of 95 %.
+const ONE_SIDED: f64 = 1.645;
+/// Errors within this factor of the true structure's are as small.
+const AS_GOOD: f64 = 1.05;
 
 /// A model with the true effects, fitted from their true values to the logs that a search has.
 pub struct Told<'a> {
@@ -83,18 +90,61 @@ impl<'a> Told<'a> {
             let simpler = typical(&self.study, self.library, name, &gone);
             effects.extend(simpler.filter(|new| !effects.iter().any(|old| old.excludes(new))));
         }
-        self.rises_with(effects)
-    }
-
-    /// By how much the error rises with other effects, fitted from their values, as a factor.
-    pub fn rises_with(&self, effects: Vec<FittedEffect>) -> f64 {
         let locals = self.fitted.fit.locals.clone();
         let other = self.fitted.model.with_effects(effects);
-        let Ok(other) = self.study.refit(&other, locals, None) else {
-            return f64::INFINITY;
-        };
+        let other = self.study.refit(&other, locals, None);
+        other.map_or(f64::INFINITY, |other| self.rise(&other))
+    }
+
+    /// The error of another fit over that of the true structure.
+    fn rise(&self, other: &Fitted) -> f64 {
         let logs = self.judged_on();
-        self.error_on(logs, &other) / self.error_on(logs, &self.fitted)
+        self.error_on(logs, other) / self.error_on(logs, &self.fitted)
+    }
+
+    /// Sets of effects that these logs do not tell from the true one: one effect exchanged for another of no more numbers
+    /// that it is confused with, where the true set does not have a smaller loss by more than chance (Vuong 1989), nor a
+    /// smaller error.
+    pub fn twins(&self) -> Vec<Vec<Label>> {
+        let places = 0..self.fitted.model.effects.len();
+        places.flat_map(|place| self.twins_at(place)).collect()
+    }
+
+    fn twins_at(&self, place: usize) -> Vec<Vec<Label>> {
+        let effects = &self.fitted.model.effects;
+        let (of, mut others) = (&effects[place], effects.clone());
+        others.remove(place);
+        let names = of.effect.confused_with.iter();
+        let rivals = names.filter_map(|name| typical(&self.study, self.library, name, of));
+        let simple = rivals.filter(|rival| rival.values.len() <= of.values.len());
+        simple
+            .filter(|rival| !others.iter().any(|other| other.excludes(rival)))
+            .map(|rival| [others.as_slice(), &[rival]].concat())
+            .filter(|set| self.is_as_good(set))
+            .map(|set| set.iter().map(label_of).collect())
+            .collect()
+    }
+
+    /// Whether the logs do not tell the true set of effects from another.
+    fn is_as_good(&self, effects: &[FittedEffect]) -> bool {
+        let Fitted { model, fit } = &self.fitted;
+        let other = model.with_effects(effects.to_vec());
+        let (locals, scale) = (fit.locals.clone(), Some(fit.scale));
+        let Ok(other) = self.study.refit(&other, locals, scale) else {
+            return false;
+        };
+        let blocks = blocks(&self.study.shooting);
+        let losses = |fit: &Fit| {
+            fit.equations_by(&blocks)
+                .into_iter()
+                .map(|block| block.cost)
+        };
+        let more: Vec<f64> = losses(&other.fit)
+            .zip(losses(fit))
+            .map(|(a, b)| a - b)
+            .collect();
+        let by_chance = mean(&more) <= ONE_SIDED * standard_error(&more);
+        by_chance && self.rise(&other) <= AS_GOOD
     }
 
     /// The test logs or, where values of a log's own are unknown there, the training logs.

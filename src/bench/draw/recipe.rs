@@ -212,7 +212,6 @@ impl Recipe {
             loops.remove(rng.random_range(0..loops.len()));
         }
         let quantum = TAU / 2.0_f64.powf(rules.bits.plain(rng)?);
-        let limit = self.driving.limit.iter().copied().fold(0.0, f64::max);
         Ok(Condition {
             drive: loops,
             rate_hz: rules.rate_hz.plain(rng)?,
@@ -224,8 +223,8 @@ impl Recipe {
                 jitter: rules.jitter.plain(rng)?,
                 dropped: rules.dropped.plain(rng)?,
                 burst: rules.burst.count(rng)?,
-                torque_noise: limit * rules.torque_noise.plain(rng)?,
-                torque_quantum: limit * rules.torque_quantum.plain(rng)?,
+                torque_noise: rules.torque_noise.plain(rng)?,
+                torque_quantum: rules.torque_quantum.plain(rng)?,
                 filter_s: rules.filter_s[rng.random_range(0..rules.filter_s.len())],
             },
         })

@@ -41,7 +41,7 @@ pub struct ConditionRules {
     pub jitter: Size,
     pub dropped: Size,
     pub burst: Size,
-    /// Standard deviation of the logged torque, and its step, in parts of the largest torque.
+    /// Standard deviation of the logged torque, and its step, in parts of the largest torque of the joint.
     pub torque_noise: Size,
     pub torque_quantum: Size,
     /// One of these \[s\]; zero for velocities that are differences.
