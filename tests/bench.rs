@@ -143,17 +143,19 @@ fn rigs_are_drawn_by_their_rules_and_the_same_each_time() {
 fn a_drawn_rig_starts_off_and_is_the_same_each_time() {
     let library = Library::built_in();
     let cells = read(&path("real.toml")).unwrap();
-    let cell = cells.iter().find(|cell| cell.id == "real/none/1").unwrap();
-    let settled = cell.settled(&library).unwrap();
-    assert_eq!(settled, cell.settled(&library).unwrap());
-    assert_eq!(settled.id, cell.id);
-    let model = settled.declared(&library).unwrap();
-    let (logs, truth) = settled.record(&model).unwrap();
-    assert_eq!(logs, settled.record(&model).unwrap().0);
-    for parameter in &model.parameters {
-        let off = parameter.value / truth.declared[&parameter.name];
-        assert!((0.2..=5.0).contains(&off), "{}: {off}", parameter.name);
-        assert!(off != 1.0);
+    for (id, effects) in [("real/none/1", 0), ("real/one/1", 2)] {
+        let cell = cells.iter().find(|cell| cell.id == id).unwrap();
+        let settled = cell.settled(&library).unwrap();
+        assert_eq!(settled, cell.settled(&library).unwrap());
+        assert_eq!((settled.id.as_str(), settled.effects.len()), (id, effects));
+        let model = settled.declared(&library).unwrap();
+        let (logs, truth) = settled.record(&model).unwrap();
+        assert_eq!(logs, settled.record(&model).unwrap().0);
+        for parameter in &model.parameters {
+            let off = parameter.value / truth.declared[&parameter.name];
+            assert!((0.2..=5.0).contains(&off), "{}: {off}", parameter.name);
+            assert_ne!(off, 1.0);
+        }
     }
 }
 

@@ -6,10 +6,11 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
+use super::coverage::Coverage;
 use super::draw::Drawn;
 use super::grid::{Cell, Group, Simulation, Source};
 use super::hidden::Hidden;
-use super::judge::{Answer, Coverage, Judgement, Truth, judge};
+use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
 use super::told::Told;

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::condition::{Condition, Driving};
 use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
-use super::recording::{Condition, Driving};
 use crate::files::beside_or_named;
 
 /// Why a grid cannot be run.

@@ -3,101 +3,15 @@
 use std::path::PathBuf;
 
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Deserializer, Serialize};
 
+use super::condition::{Condition, Driving, Loop};
 use super::excitation::{Chirp, Controller, Multisine, Steps};
 use super::machine::{Machine, State};
 use super::mechanics::Pair;
 use super::motion::STEP_S;
-use super::sensors::{Clock, Flaws, Losses, Speed, sensed};
+use super::sensors::{Clock, Losses, Speed, sensed};
 use super::wires::Wires;
 use crate::data::Log;
-
-/// How a rig is driven; one number a joint in every list.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Driving {
-    /// Open loop: root mean square of the torque \[N m\], and its band \[Hz\].
-    pub torque: Vec<f64>,
-    pub torque_hz: [f64; 2],
-    /// Closed loop: root mean square of the reference \[rad\], and its band \[Hz\].
-    pub reference: Vec<f64>,
-    pub reference_hz: [f64; 2],
-    /// Gains of the controller \[N m/rad\], \[N m s/rad\].
-    pub stiffness: Vec<f64>,
-    pub damping: Vec<f64>,
-    /// Largest torque that it commands \[N m\].
-    pub limit: Vec<f64>,
-}
-
-/// What drives a rig while a log is taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Loop {
-    /// A torque of many frequencies.
-    Open,
-    /// A controller that follows a reference of many frequencies.
-    Closed,
-    /// A torque whose frequency rises.
-    Chirp,
-    /// A torque that jumps and stays.
-    Steps,
-    /// Let go from up to twice the reference's size, under half of the torque of the open loop.
-    Release,
-}
-
-/// How logs are taken.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Condition {
-    /// Of the logs in turn.
-    #[serde(rename = "loop", deserialize_with = "one_or_more")]
-    pub drive: Vec<Loop>,
-    pub rate_hz: f64,
-    /// Standard deviation of white noise on positions \[rad\].
-    pub noise: f64,
-    /// Step of the encoder \[rad\]; zero for a fine one.
-    #[serde(default)]
-    pub quantum: f64,
-    pub logs: usize,
-    pub seconds: f64,
-    #[serde(default)]
-    pub flaws: Flaws,
-}
-
-impl Condition {
-    /// Whether logs can be taken so.
-    ///
-    /// # Errors
-    /// Why not.
-    pub fn check(&self) -> Result<(), String> {
-        let sound = self.rate_hz > 0.0
-            && self.noise >= 0.0
-            && self.quantum >= 0.0
-            && !self.drive.is_empty()
-            && self.logs >= 2
-            && self.seconds * self.rate_hz >= 10.0;
-        let needs = "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, two logs, ten rows";
-        if sound {
-            self.flaws.check()
-        } else {
-            Err(needs.to_owned())
-        }
-    }
-}
-
-fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Loop>, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum OneOrMore {
-        One(Loop),
-        More(Vec<Loop>),
-    }
-    Ok(match OneOrMore::deserialize(from)? {
-        OneOrMore::One(one) => vec![one],
-        OneOrMore::More(more) => more,
-    })
-}
 
 /// Logs differ in how hard the rig is driven; the last of them lies within the range of the others where there
 /// are more than two.
@@ -112,15 +26,15 @@ enum Source {
 }
 
 impl Source {
-    fn draw(driving: &Driving, how: Loop, lasts: &Lasting, j: usize, rng: &mut impl Rng) -> Self {
-        let (size, band) = (lasts.strength * driving.torque[j], driving.torque_hz);
+    fn draw(driving: &Driving, how: Loop, effort: &Effort, j: usize, rng: &mut impl Rng) -> Self {
+        let (size, band) = (effort.strength * driving.torque[j], driving.torque_hz);
         match how {
             Loop::Open => Self::Multisine(Multisine::draw(size, band, rng)),
             Loop::Release => Self::Multisine(Multisine::draw(0.5 * size, band, rng)),
-            Loop::Chirp => Self::Chirp(Chirp::draw(size, band, lasts.seconds, rng)),
-            Loop::Steps => Self::Steps(Steps::draw(size, band, lasts.seconds, rng)),
+            Loop::Chirp => Self::Chirp(Chirp::draw(size, band, effort.seconds, rng)),
+            Loop::Steps => Self::Steps(Steps::draw(size, band, effort.seconds, rng)),
             Loop::Closed => {
-                let size = lasts.strength * driving.reference[j];
+                let size = effort.strength * driving.reference[j];
                 let reference = Multisine::draw(size, driving.reference_hz, rng);
                 let controller =
                     Controller::new(driving.stiffness[j], driving.damping[j], driving.limit[j]);
@@ -143,7 +57,7 @@ impl Source {
 }
 
 /// How hard and how long \[s\] a rig is driven.
-struct Lasting {
+struct Effort {
     strength: f64,
     seconds: f64,
 }
@@ -174,12 +88,12 @@ impl Machine {
     ) -> Log {
         let (joints, flaws) = (self.joints(), &condition.flaws);
         let how = condition.drive[index % condition.drive.len()];
-        let lasting = Lasting {
+        let effort = Effort {
             strength: STRENGTHS[index % STRENGTHS.len()],
             seconds: condition.seconds,
         };
         let mut sources: Vec<Source> = (0..joints)
-            .map(|j| Source::draw(driving, how, &lasting, j, rng))
+            .map(|j| Source::draw(driving, how, &effort, j, rng))
             .collect();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
         let rows = (condition.seconds * condition.rate_hz).round() as usize + 1;
@@ -187,7 +101,7 @@ impl Machine {
         let mut losses = Losses::new(flaws);
         let mut speeds = vec![Speed::default(); joints];
         let mut wires = Wires::default();
-        let mut state = start(driving, how, lasting.strength, rng);
+        let mut state = start(driving, how, effort.strength, rng);
         let mut log = empty(index, joints);
         let (mut time, mut dt) = (0.0, 1.0 / condition.rate_hz);
         for row in 0..rows {
@@ -243,11 +157,12 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{Condition, Driving, Flaws, Loop};
+    use crate::bench::condition::{Condition, Driving, Loop};
     use crate::bench::force::Force;
     use crate::bench::friction::DryFriction;
     use crate::bench::machine::Machine;
     use crate::bench::mechanics::tests::pendulum;
+    use crate::bench::sensors::Flaws;
     use crate::data::Log;
 
     fn driving() -> Driving {

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::answer::{estimates, label_of};
+use super::coverage::{Coverage, coverage};
 use super::hidden::{Hidden, Label};
-use super::judge::{Coverage, Estimate, Truth, coverage};
+use super::judge::{Estimate, Truth};
 use crate::closeloop::{Fitted, Settings, Split, Study, StudyError, with_intervals};
 use crate::data::Log;
 use crate::data::statistics::{mean, standard_error};
@@ -199,7 +200,7 @@ fn typical(
 }
 
 /// The effect with its true values; `None` where the library has no such effect.
-pub fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
+fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     if hidden.name == "parameter_shift" {
         return shift(study.declared, hidden);
     }

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use super::rules::{Kind, Rules, StandIn};
 use super::size::Size;
+use crate::bench::condition::{Condition, Driving};
 use crate::bench::grid::Simulation;
 use crate::bench::hidden::Hidden;
 use crate::bench::machine::Machine;
 use crate::bench::mechanics::Mechanics;
-use crate::bench::recording::{Condition, Driving};
 use crate::bench::sensors::Flaws;
 use crate::data::Joint;
 use crate::model::Model;

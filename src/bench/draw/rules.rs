@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::size::Size;
-use crate::bench::recording::Loop;
+use crate::bench::condition::Loop;
 use crate::data::Joint;
 
 /// By which rigs are drawn.
