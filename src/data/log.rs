@@ -131,13 +131,13 @@ impl Log {
 
     fn check_finite(&self, path: &Path) -> Result<(), LogError> {
         let names = Columns::standard(self.joints());
-        for (name, values) in names.in_file_order().zip(self.columns()) {
+        for (column, values) in names.in_file_order().zip(self.columns()) {
             if let Some(row) = values.iter().position(|value| !value.is_finite()) {
                 return Err(LogError::Cell {
                     path: path.to_owned(),
                     // The header is line 1.
                     line: row + 2,
-                    column: name.clone(),
+                    column: column.name.clone(),
                     fault: CellFault::NotFinite(values[row].to_string()),
                 });
             }
@@ -147,7 +147,7 @@ impl Log {
 
     fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {
         let names = Columns::standard(self.joints());
-        let header: Vec<&str> = names.in_file_order().map(String::as_str).collect();
+        let header: Vec<&str> = names.in_file_order().map(|column| &*column.name).collect();
         writeln!(out, "{}", header.join(","))?;
         for row in 0..self.rows() {
             // `{:?}` of a float is its shortest text that reads back the same, with an exponent

@@ -9,6 +9,7 @@
 //! The torque of row `i` acts from `time[i]` to `time[i + 1]` (zero-order hold).
 
 mod audit;
+mod column;
 mod columns;
 mod error;
 mod joint;
@@ -26,6 +27,7 @@ pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueDemand, TorqueLag,
     VelocityCheck, audit,
 };
+pub use column::{Column, Quantity};
 pub use columns::Columns;
 pub use error::{CellFault, LogError};
 pub use joint::Joint;

@@ -2,6 +2,7 @@
 
 mod assemble;
 pub mod chain;
+mod columns_in_file;
 mod dynamics;
 mod effect;
 mod effect_file;
