@@ -192,12 +192,7 @@ pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
 pub fn empty_log(name: &str, joints: usize) -> Log {
     Log {
         path: name.into(),
-        time: Vec::new(),
-        q: vec![Vec::new(); joints],
-        qd: vec![Vec::new(); joints],
-        tau: vec![Vec::new(); joints],
-        leave_out: Vec::new(),
-        notes: Vec::new(),
+        ..Log::empty(joints)
     }
 }
 

@@ -13,6 +13,7 @@ mod fit;
 mod fitted;
 mod learn;
 mod outcome;
+mod pushes;
 mod refine;
 mod remainder;
 mod request;

@@ -35,6 +35,8 @@ pub struct Outcome {
 #[non_exhaustive]
 pub struct Given {
     pub train: Vec<Log>,
+    /// The training logs as they were fitted: with readings that jump masked and dropped rows put in or left out.
+    pub studied: Vec<Log>,
     pub test: Vec<Log>,
     pub split: SplitMethod,
     /// Of the training logs, then of the test logs.
@@ -86,15 +88,15 @@ impl Outcome {
     /// The training logs as they were studied; `declared` is the model they were studied for.
     pub fn study<'a>(&'a self, declared: &'a Model) -> Study<'a> {
         let Given {
-            train,
+            studied,
             audits,
             settings,
             ..
         } = &self.given;
-        let audits = audits[..train.len()].to_vec();
+        let audits = audits[..studied.len()].to_vec();
         Study {
             identifiability: self.models.identifiability.clone(),
-            ..Study::audited(declared, train, audits, settings)
+            ..Study::audited(declared, studied, audits, settings)
         }
     }
 }

@@ -5,6 +5,7 @@ use super::error::StudyError;
 use super::find::{Found, find};
 use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
+use super::pushes::tell_pushes;
 use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal};
 use super::request::Request;
@@ -12,7 +13,8 @@ use super::score::{Scorer, contradicted, findings};
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
-use crate::data::audit;
+use crate::data::{Audit, Log, audit};
+use crate::model::Library;
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
 /// network on the remainder, and score the models before and after on the test logs.
@@ -34,14 +36,28 @@ pub fn close_loop(
         learner,
     } = request;
     progress(Stage::Audit.into());
-    let mut study = Study::new(model, &split.train, &settings);
-    let test_audits = split.test.iter().map(audit);
-    let audits = study.audits().iter().cloned().chain(test_audits).collect();
+    let audits = |logs: &[Log]| -> Vec<Audit> {
+        logs.iter().map(|log| audit(log, &model.columns)).collect()
+    };
+    let for_fits = |logs: &[Log]| -> Vec<Log> {
+        logs.iter()
+            .map(|log| log.for_fits(settings.fit.window_s))
+            .collect()
+    };
+    let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
+    let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
+    let mut study = Study::audited(model, &studied, of_train.clone(), &settings);
+    // Where nothing moves, anything could be found.
+    let nothing = Library::empty();
+    let library = if study.moves() { library } else { &nothing };
     let found = find(&mut study, library, rng, progress)?;
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
     let refined = refine(&study, &found.before, &found.chosen.after);
     let remainder = remainder(&study, &found, &refined);
+    let mut of_train = of_train;
+    tell_pushes(&study, &found.chosen.after, &mut of_train);
+    tell_pushes(&study.on(&tested), &found.chosen.after, &mut of_test);
     let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
     let scorer = Scorer {
@@ -75,12 +91,13 @@ pub fn close_loop(
         learned,
         calibration: None,
         given: Given {
-            train: split.train.clone(),
+            train: split.train,
             test: split.test,
             split: split.method,
-            audits,
+            audits: [of_train, of_test].concat(),
             settings: settings.clone(),
             prismatic: model.prismatic.clone(),
+            studied,
         },
     })
 }

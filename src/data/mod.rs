@@ -11,8 +11,10 @@
 mod audit;
 mod column;
 mod columns;
+mod dropped;
 mod error;
 mod joint;
+mod jumps;
 mod lag;
 pub mod leave_out;
 mod local_cubic;
@@ -24,8 +26,8 @@ pub(crate) mod statistics;
 mod trajectory;
 
 pub use audit::{
-    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueDemand, TorqueLag,
-    VelocityCheck, audit,
+    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Response, Severity, TorqueDemand,
+    TorqueLag, VelocityCheck, audit,
 };
 pub use column::{Column, Quantity};
 pub use columns::Columns;

@@ -89,6 +89,7 @@ impl Table<'_> {
                 Some(tau) => channel(tau)?,
                 None => vec![vec![0.0; time.len()]; joints],
             },
+            masked: vec![vec![]; joints],
             q,
             time,
             leave_out: vec![],

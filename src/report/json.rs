@@ -7,6 +7,7 @@ use super::schema::{
     ModelError, NormEntry, ParameterEntry, Report, TriedEntry, UnexplainedEntry, WithdrawnEntry,
 };
 use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, Withdrawn};
+use crate::data::{Audit, Log};
 use crate::identify::{Fit, FitError};
 use crate::model::{FittedEffect, Origin, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
@@ -223,7 +224,7 @@ fn model_error(summary: Summary) -> ModelError {
 }
 
 fn logs(outcome: &Outcome) -> LogsEntry {
-    let entry = |log: &crate::data::Log| LogEntry {
+    let entry = |(log, audit): (&Log, &Audit)| LogEntry {
         name: log.name(),
         rows: log.rows(),
         start_s: log.time.first().copied().unwrap_or(0.0),
@@ -233,10 +234,19 @@ fn logs(outcome: &Outcome) -> LogsEntry {
             .iter()
             .map(|span| [span.start_s, span.end_s])
             .collect(),
+        jumps: audit.joints.iter().map(|joint| joint.q.spikes).collect(),
+        dropped_rows: audit.dropped_rows,
     };
+    let (of_train, of_test) = outcome.given.audits.split_at(outcome.given.train.len());
     LogsEntry {
-        train: outcome.given.train.iter().map(entry).collect(),
-        test: outcome.given.test.iter().map(entry).collect(),
+        train: outcome
+            .given
+            .train
+            .iter()
+            .zip(of_train)
+            .map(entry)
+            .collect(),
+        test: outcome.given.test.iter().zip(of_test).map(entry).collect(),
         split: outcome.given.split.clone(),
     }
 }

@@ -258,6 +258,10 @@ pub(super) struct LogEntry {
     pub end_s: f64,
     /// intervals left out, start and end in s
     pub leave_out: Vec<[f64; 2]>,
+    /// angles that jump for a single row, one number a joint: masked in fits, scored in test logs
+    pub jumps: Vec<usize>,
+    /// rows that the logger dropped: put in or left out in fits; in test logs the torque is held over them
+    pub dropped_rows: usize,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]

@@ -5,7 +5,7 @@ use super::calibration::section;
 use super::remainder::remainder;
 use super::wording::{capitalised, listed, probability, reduction, values};
 use crate::closeloop::{Finding, Outcome, SplitMethod, Verdict};
-use crate::data::Severity;
+use crate::data::{Audit, Severity};
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
@@ -31,10 +31,27 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 
 fn answer(outcome: &Outcome) -> String {
     format!(
-        "# {}: {}\n\n{}.\n\n",
+        "# {}: {}\n\n{}{}.\n\n",
         outcome.models.after.model.name,
         headline(outcome),
+        serious(outcome),
         capitalised(&outcome.reason)
+    )
+}
+
+/// What makes results wrong unless something is done about it, as a list to stand above them.
+pub(super) fn serious(outcome: &Outcome) -> String {
+    let of_log = |audit: &Audit| -> Vec<String> {
+        let line = |finding| format!("- **{}**: {finding}\n", audit.log);
+        audit.serious().map(line).collect()
+    };
+    let lines: Vec<String> = outcome.given.audits.iter().flat_map(of_log).collect();
+    if lines.is_empty() {
+        return String::new();
+    }
+    format!(
+        "Serious findings about the logs, to be mended first:\n\n{}\n",
+        lines.concat()
     )
 }
 
@@ -200,7 +217,7 @@ fn logs(outcome: &Outcome) -> String {
             .iter()
             .filter(|f| f.severity != Severity::Info)
         {
-            let _ = writeln!(out, "  - {}", finding.text);
+            let _ = writeln!(out, "  - {finding}");
         }
     }
     out + "\n"
