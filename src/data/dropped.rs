@@ -2,7 +2,6 @@
 
 use super::jumps::interpolated;
 use super::log::{Interval, Log};
-use super::signal::resolution;
 
 /// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
 /// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
@@ -80,8 +79,7 @@ impl Log {
             let largest = close_by.fold(0.0, f64::max);
             let range = tau.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b))
                 - tau.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-            let small = resolution(tau).max(SMALL_CHANGE * range);
-            change(row) <= small.max(count * SMOOTH * largest)
+            change(row) <= (SMALL_CHANGE * range).max(count * SMOOTH * largest)
         })
     }
 

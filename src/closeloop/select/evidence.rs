@@ -109,6 +109,10 @@ fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
         return 1.0;
     }
     let f = statistic * freedom / (q * (blocks as f64 - 1.0));
+    // Values without a spread, as on a joint at rest, say nothing.
+    if !f.is_finite() {
+        return 1.0;
+    }
     FisherSnedecor::new(q, freedom).map_or(1.0, |law| law.sf(f))
 }
 

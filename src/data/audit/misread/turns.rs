@@ -9,7 +9,7 @@ use crate::data::signal::differences;
 use crate::data::{Joint, Log};
 
 /// A joint turns by less than this share of a turn from one row to the next, or by at most twice as much as it does from
-/// the row before or to the row after.
+/// the row before or to the row after, within the turn.
 const CONTINUES: f64 = 0.1;
 
 /// Rounding of the ends of a turn, as a share of it.
@@ -55,15 +55,13 @@ fn passings(angles: &[f64], turn: f64) -> Option<Vec<usize>> {
     }
     let steps = differences(angles);
     let short_way = |row: usize| steps[row] - turn * (steps[row] / turn).round();
+    let is_long = |row: &usize| steps[*row].abs() > 0.5 * turn;
     let continues = |row: &usize| {
         let close_by = [row.saturating_sub(1), (row + 1).min(steps.len() - 1)];
-        let usual = close_by
-            .map(|near| short_way(near).abs())
-            .into_iter()
-            .fold(0.0, f64::max);
+        let usual = close_by.into_iter().filter(|near| !is_long(near));
+        let usual = usual.map(|near| steps[near].abs()).fold(0.0, f64::max);
         short_way(*row).abs() <= (CONTINUES * turn).max(2.0 * usual)
     };
-    let is_long = |row: &usize| steps[*row].abs() > 0.5 * turn;
     let rows: Vec<usize> = (0..steps.len()).filter(is_long).collect();
     (!rows.is_empty() && rows.iter().all(continues)).then_some(rows)
 }
