@@ -27,17 +27,35 @@ impl Log {
     /// table of finite numbers with strictly increasing time and the asked number of joints.
     pub fn read(path: impl AsRef<Path>, joints: usize, columns: &Columns) -> Result<Log, LogError> {
         let path = path.as_ref();
-        let bytes = fs::read(path).map_err(|why| LogError::Open {
-            path: path.to_owned(),
-            why,
-        })?;
-        let text = std::str::from_utf8(&bytes).map_err(|error| LogError::NotUtf8 {
-            path: path.to_owned(),
-            line: line_at(&bytes, error.valid_up_to()),
-        })?;
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let text = &text_of(path)?;
         Table { path, text }.log(joints, columns)
     }
+
+    /// Reads a CSV file with the standard columns, of as many joints as its header has.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn read_standard(path: impl AsRef<Path>) -> Result<Log, LogError> {
+        let path = path.as_ref();
+        let text = &text_of(path)?;
+        let table = Table { path, text };
+        let joints = table.rows()?.first().map_or(0, Row::joints);
+        // A header of no joint lacks the first.
+        table.log(joints.max(1), &Columns::default())
+    }
+}
+
+/// The text of a file, without a byte order mark.
+fn text_of(path: &Path) -> Result<String, LogError> {
+    let bytes = fs::read(path).map_err(|why| LogError::Open {
+        path: path.to_owned(),
+        why,
+    })?;
+    let text = std::str::from_utf8(&bytes).map_err(|error| LogError::NotUtf8 {
+        path: path.to_owned(),
+        line: line_at(&bytes, error.valid_up_to()),
+    })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned())
 }
 
 /// The text of a log and its path.
@@ -146,6 +164,13 @@ impl Row<'_> {
     fn names(&self) -> Vec<String> {
         let cells = self.record.iter();
         cells.map(|cell| bare(cell).to_owned()).collect()
+    }
+
+    /// How many joints have an angle, as a header: `q1`, `q2` and so on.
+    fn joints(&self) -> usize {
+        let names = self.names();
+        let has = |joint: &usize| names.contains(&format!("q{joint}"));
+        (1..).take_while(has).count()
     }
 
     fn check_width(&self, header: &Header) -> Result<(), LogError> {

@@ -2,7 +2,7 @@
 
 use super::super::table::short;
 use super::super::{Audit, JointAudit, MAX_LAG_S, VelocityCheck};
-use super::Severity::{Info, Serious, Warning};
+use super::Severity::{Info, Warning};
 use super::{Found, milliseconds, percent, spike_severity};
 use crate::data::Joint;
 
@@ -28,20 +28,13 @@ impl Found {
 
     fn about_velocity_spikes(&mut self, joint: &JointAudit, check: VelocityCheck, rows: usize) {
         let (name, number) = (&joint.qd.name, joint.joint);
-        let severity = spike_severity(joint.qd.spikes, rows);
-        let remedy = match severity {
-            Serious => {
-                format!(
-                    "do not fit {name}; take velocities from q{number} (`qd = []` under [columns])"
-                )
-            }
-            _ => format!("mask them, or take velocities from q{number}"),
-        };
-        self.add(
-            severity,
+        self.add_of(
+            joint,
+            // Never serious: fits read no velocities.
+            spike_severity(joint.qd.spikes, rows).max(Warning),
             format!(
-                "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: \
-                     {remedy}",
+                "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in errors of \
+                 velocities; `qd = []` under [columns] takes velocities from q{number}",
                 joint.qd.spikes,
                 percent(joint.qd.spikes as f64 / rows as f64),
                 short(check.worst_rad_s)
