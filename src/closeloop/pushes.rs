@@ -1,19 +1,25 @@
 //! Forces that no column holds: a person pushes, a cable pulls, a limb touches. The fitted model follows the log there
 //! only with a further torque that is far beyond what it needs elsewhere.
 
-use super::fitted::Fitted;
-use super::remainder::{ForceSample, ResidualForce};
+use super::remainder::ForceSample;
 use super::study::Study;
 use crate::data::statistics::{SIGMA_PER_MAD, median};
 use crate::data::{Audit, Finding, Interval, Joint, Severity};
 
-/// A residual force counts as a push beyond this many standard deviations of the others.
+/// A residual force counts as a push beyond this many standard deviations of the others,
 const PUSH: f64 = 8.0;
 
-/// A push goes on next to its strongest stretches as long as the force stays beyond this many standard deviations.
+/// and from this share of the joint's largest torque on: less is what the smoothing of friction leaves of a clean log.
+const PUSH_SHARE: f64 = 0.1;
+
+/// A push goes on next to its strongest stretch as long as the force stays beyond this many standard deviations,
 const ITS_EDGE: f64 = 4.0;
 
+/// for this many stretches at least: an end stop or a joint that sticks is over in one.
+const ITS_STRETCHES: usize = 2;
+
 /// One push on one joint.
+#[derive(Debug)]
 struct Push {
     log: usize,
     joint: Joint,
@@ -24,62 +30,45 @@ struct Push {
     times: f64,
 }
 
-/// Add to the audits of the study's logs where something pushed, as far as the model tells.
-pub(super) fn tell_pushes(study: &Study<'_>, fitted: &Fitted, audits: &mut [Audit]) {
-    // Logs over which the model diverges tell of no push.
-    let Ok(residual) = ResidualForce::of(study, fitted) else {
-        return;
-    };
-    let half_s = 0.5 * study.settings.remainder.stretch_s;
+/// Add to the audits of the study's logs where something pushed, as far as the residual forces of a fitted model tell.
+pub(super) fn tell_pushes(study: &Study<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
+    let stretch_s = study.settings.remainder.stretch_s;
     for joint in Joint::all(study.declared.joints) {
-        for push in pushes(&residual.samples, joint, half_s) {
+        let least = PUSH_SHARE * study.top_torque[joint];
+        for push in pushes(forces, joint, stretch_s, least) {
             audits[push.log].add(push.finding(&study.logs[push.log].name()));
         }
     }
 }
 
-fn pushes(samples: &[ForceSample], joint: Joint, half_s: f64) -> Vec<Push> {
-    let sizes: Vec<f64> = samples
-        .iter()
-        .map(|sample| sample.force[joint].abs())
-        .collect();
+/// The pushes on a joint of at least so much force, in stretches of `stretch_s`.
+fn pushes(samples: &[ForceSample], joint: Joint, stretch_s: f64, least: f64) -> Vec<Push> {
+    let force = |sample: &ForceSample| sample.force[joint];
+    let sizes: Vec<f64> = samples.iter().map(|sample| force(sample).abs()).collect();
     let deviation = SIGMA_PER_MAD * median(&sizes);
-    if deviation == 0.0 {
-        return Vec::new();
-    }
-    let beyond = |k: &usize, times: f64| sizes[*k] > times * deviation;
-    let mut found = Vec::new();
-    let mut k = 0;
-    while k < samples.len() {
-        if !beyond(&k, ITS_EDGE) {
-            k += 1;
-            continue;
-        }
-        // Neighbours in the list are neighbours in time within a log, but for gaps.
-        let adjacent = |a: usize, b: usize| {
-            samples[a].log == samples[b].log && samples[b].time_s - samples[a].time_s < 3.0 * half_s
-        };
-        let mut last = k;
-        while last + 1 < samples.len() && adjacent(last, last + 1) && beyond(&(last + 1), ITS_EDGE)
-        {
-            last += 1;
-        }
-        let force = sizes[k..=last].iter().copied().fold(0.0, f64::max);
-        if force > PUSH * deviation {
-            found.push(Push {
-                log: samples[k].log,
-                joint,
-                span: Interval {
-                    start_s: samples[k].time_s - half_s,
-                    end_s: samples[last].time_s + half_s,
-                },
-                force,
-                times: force / deviation,
-            });
-        }
-        k = last + 1;
-    }
-    found
+    let is_far = |sample: &ForceSample| force(sample).abs() > ITS_EDGE * deviation;
+    let goes_on = |a: &ForceSample, b: &ForceSample| {
+        let adjacent = a.log == b.log && b.time_s - a.time_s < 1.5 * stretch_s;
+        adjacent && is_far(a) && is_far(b)
+    };
+    let push = |run: &[ForceSample]| {
+        let largest = run
+            .iter()
+            .map(|sample| force(sample).abs())
+            .fold(0.0, f64::max);
+        let is_push = run.len() >= ITS_STRETCHES && largest > least.max(PUSH * deviation);
+        is_push.then(|| Push {
+            log: run[0].log,
+            joint,
+            span: Interval {
+                start_s: run[0].time_s - 0.5 * stretch_s,
+                end_s: run[run.len() - 1].time_s + 0.5 * stretch_s,
+            },
+            force: largest,
+            times: largest / deviation,
+        })
+    };
+    samples.chunk_by(goes_on).filter_map(push).collect()
 }
 
 impl Push {
@@ -98,5 +87,40 @@ impl Push {
             joint: Some(self.joint),
             ..Finding::new(Severity::Warning, text).within(log, &[span])
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forces of one joint in stretches of 0.15 s.
+    fn samples(force: impl Fn(usize) -> f64) -> Vec<ForceSample> {
+        let sample = |k: usize| ForceSample {
+            log: 0,
+            time_s: 0.15 * k as f64,
+            q: vec![0.0],
+            qd: vec![0.0],
+            tau: vec![0.0],
+            force: vec![force(k)],
+        };
+        (0..100).map(sample).collect()
+    }
+
+    #[test]
+    fn a_force_that_lasts_is_a_push_and_a_single_knock_is_none() {
+        let usual = |k: usize| 0.01 * (k as f64).sin();
+        let found = |force: &dyn Fn(usize) -> f64, least: f64| {
+            pushes(&samples(force), Joint::at(0), 0.15, least)
+        };
+        assert!(found(&usual, 0.0).is_empty());
+        let pushed = |k: usize| usual(k) + if (40..44).contains(&k) { 2.0 } else { 0.0 };
+        let one = found(&pushed, 0.1);
+        assert_eq!(one.len(), 1, "{one:?}");
+        assert!(
+            (one[0].span.start_s - 5.925).abs() < 1e-9 && (one[0].span.end_s - 6.525).abs() < 1e-9
+        );
+        assert!(found(&pushed, 3.0).is_empty());
+        assert!(found(&|k| usual(k) + if k == 40 { 2.0 } else { 0.0 }, 0.1).is_empty());
     }
 }

@@ -7,7 +7,7 @@ use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
 use super::pushes::tell_pushes;
 use super::refine::{Refined, refine};
-use super::remainder::{ResidualForce, proposal};
+use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
 use super::stage::{Progress, Stage};
@@ -26,7 +26,6 @@ pub fn close_loop(
     rng: &mut impl Rng,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Outcome, StudyError> {
-    request.check()?;
     let Request {
         model,
         library,
@@ -34,7 +33,7 @@ pub fn close_loop(
         against,
         settings,
         learner,
-    } = request;
+    } = request.scorable()?;
     progress(Stage::Audit.into());
     let audits = |logs: &[Log]| -> Vec<Audit> {
         logs.iter().map(|log| audit(log, &model.columns)).collect()
@@ -56,8 +55,14 @@ pub fn close_loop(
     let refined = refine(&study, &found.before, &found.chosen.after);
     let remainder = remainder(&study, &found, &refined);
     let mut of_train = of_train;
-    tell_pushes(&study, &found.chosen.after, &mut of_train);
-    tell_pushes(&study.on(&tested), &found.chosen.after, &mut of_test);
+    // Logs over which the model diverges tell of no push.
+    if let Ok(residual) = &remainder.after {
+        tell_pushes(&study, &residual.samples, &mut of_train);
+    }
+    let test_study = study.on(&tested);
+    if let Ok(forces) = residual_force(&test_study, &found.chosen.after) {
+        tell_pushes(&test_study, &forces, &mut of_test);
+    }
     let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
     let scorer = Scorer {

@@ -60,6 +60,10 @@ settings! {
         /// Time in s between what is learned from and what it is judged on, where both come from one log: longer than
         /// the memory of a drive.
         gap_s: f64 = 0.5,
+        /// Time in s that is judged on at least: two windows of 0.5 s.
+        shortest_s: f64 = 1.0,
+        /// No more than this share of a log goes into the gap and the test.
+        most: f64 = 0.5,
     }
 }
 
@@ -261,8 +265,9 @@ settings! {
 settings! {
     /// Stage 9: how models are scored.
     ScoreSettings {
-        /// Horizons of the reported errors in s; models are compared in one number at the middle one.
-        horizons_s: [f64; 3] = [0.1, 0.5, 1.0],
+        /// Horizons of the reported errors in s; models are compared in one number at the middle one. Those that are
+        /// longer than any test log are left out.
+        horizons_s: Vec<f64> = vec![0.1, 0.5, 1.0],
         /// With this many test logs whole ones are resampled; with fewer, stretches of two seconds.
         whole_logs: usize = 5,
         /// Fewer logs or stretches than this give no interval.

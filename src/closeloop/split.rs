@@ -22,7 +22,7 @@ pub enum SplitMethod {
     Given,
     /// The last logs of those given.
     LastLogs { count: usize },
-    /// The end of every log, after a gap.
+    /// The end of every log, after a gap: the largest share of one, with the gap.
     EndOfEachLog { share: f64, gap_s: f64 },
 }
 
@@ -53,8 +53,11 @@ impl Split {
     /// Set the end of each log apart.
     fn ends_of(logs: Vec<Log>, settings: &SplitSettings) -> Self {
         let (mut train, mut test) = (Vec::new(), Vec::new());
+        let mut share = settings.test_share;
         for log in logs {
-            let middle = log.time[0] + (1.0 - settings.test_share) * log.duration();
+            let rest_s = settings.rest_s(log.duration());
+            share = share.max(rest_s / log.duration());
+            let middle = log.time[log.rows() - 1] - rest_s;
             train.push(between(&log, f64::NEG_INFINITY, middle));
             test.push(between(&log, middle + settings.gap_s, f64::INFINITY));
         }
@@ -64,7 +67,7 @@ impl Split {
             train,
             test,
             method: SplitMethod::EndOfEachLog {
-                share: settings.test_share,
+                share,
                 gap_s: settings.gap_s,
             },
         }
@@ -104,6 +107,12 @@ fn speed(log: &Log) -> f64 {
 }
 
 impl SplitSettings {
+    /// How much of the end of a log goes into the gap and the test, in s: more of a short log, so that it can be judged.
+    fn rest_s(&self, duration_s: f64) -> f64 {
+        let enough = (self.test_share * duration_s).max(self.gap_s + self.shortest_s);
+        enough.min(self.most * duration_s)
+    }
+
     /// How many of so many logs are set apart.
     #[allow(
         clippy::cast_precision_loss,
