@@ -19,6 +19,7 @@ mod front_door;
 mod functions;
 mod gradients;
 mod identify;
+mod logs;
 mod measured;
 mod mechanism;
 mod memory;
