@@ -6,6 +6,7 @@ use super::super::table::short;
 use super::Severity::Warning;
 use super::{Found, percent, spike_severity};
 use crate::data::jumps::{bridge, rows_that_jump};
+use crate::data::local_cubic::half_width_s;
 use crate::data::log::{Interval, Log};
 
 /// More stretches than this are no list to paste.
@@ -43,14 +44,14 @@ impl Found {
     }
 }
 
-/// From halfway to the row before to halfway to the row after, in digits that a log has.
+/// From halfway to the row before, in digits that a log has, until no start state of a window is estimated from the row.
 fn around(log: &Log, row: usize) -> Interval {
-    let halfway = |other: usize| 0.5 * (log.time[row] + log.time[other]);
-    let digits = (1e3 / log.median_step()).log10().ceil().clamp(0.0, 9.0);
+    let step_s = log.median_step();
+    let digits = (1e3 / step_s).log10().ceil().clamp(0.0, 9.0);
     let rounded = |t: f64| (t * 10.0_f64.powf(digits)).round() / 10.0_f64.powf(digits);
     Interval {
-        start_s: rounded(halfway(row - 1)),
-        end_s: rounded(halfway(row + 1)),
+        start_s: rounded(0.5 * (log.time[row - 1] + log.time[row])),
+        end_s: rounded(log.time[row] + half_width_s(step_s) + 0.5 * step_s),
     }
 }
 
@@ -67,7 +68,7 @@ mod tests {
         let words = [
             "q1 jumps for 1 single row(s)",
             "up to 50 rad",
-            "rig.csv@2.999-3.001",
+            "rig.csv@2.999-3.017",
         ];
         assert!(says(&log, Warning, &words));
         assert!(!says(&log, super::super::Severity::Serious, &[]));
