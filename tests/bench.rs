@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
 use residyn::model::{FittedEffect, Library};
 use residyn::sim::metric::assess;
@@ -100,6 +102,61 @@ fn bench_rigs_and_effect_files_agree_on_every_effect() {
         compared += 1;
     }
     assert!(compared > 50, "{compared}");
+}
+
+#[test]
+fn rigs_are_drawn_by_their_rules_and_the_same_each_time() {
+    let cells = read(&path("real.toml")).unwrap();
+    let named = |part: &str| cells.iter().filter(|c| c.id.starts_with(part)).count();
+    assert_eq!([named("real/one/"), named("real/two/")], [40, 40]);
+    for (number, cell) in cells.iter().enumerate() {
+        let Source::Drawn(recipe) = &cell.source else {
+            panic!("{}: not drawn", cell.id)
+        };
+        let draw = || {
+            let rng = &mut ChaCha8Rng::seed_from_u64(number as u64);
+            recipe.draw(rng).unwrap()
+        };
+        let drawn = draw();
+        assert_eq!(drawn, draw());
+        assert_eq!(drawn.effects.len(), recipe.effects + recipe.outside);
+        for (k, effect) in drawn.effects.iter().enumerate() {
+            let mut others = drawn.effects[..k].iter();
+            let allowed = |other: &Hidden| {
+                other.joint != effect.joint || recipe.rules.allow(&effect.name, &other.name)
+            };
+            assert!(others.all(allowed), "{}: {:?}", cell.id, drawn.effects);
+        }
+        let condition = &drawn.simulation.condition;
+        let turn = std::f64::consts::TAU / condition.quantum;
+        assert!((4095.0..16385.0).contains(&turn), "{turn}");
+        assert!((3..=6).contains(&condition.logs));
+        assert!((4.0..=10.0).contains(&condition.seconds));
+        assert!((100.0..=500.0).contains(&condition.rate_hz));
+        assert!((0.05..=0.2).contains(&condition.flaws.jitter));
+        assert!((0.0..=0.03).contains(&condition.flaws.dropped));
+        assert_eq!(condition.drive.len(), 2);
+    }
+}
+
+#[test]
+fn a_drawn_rig_starts_off_and_is_the_same_each_time() {
+    let library = Library::built_in();
+    let cells = read(&path("real.toml")).unwrap();
+    for (id, effects) in [("real/none/1", 0), ("real/one/1", 2)] {
+        let cell = cells.iter().find(|cell| cell.id == id).unwrap();
+        let settled = cell.settled(&library).unwrap();
+        assert_eq!(settled, cell.settled(&library).unwrap());
+        assert_eq!((settled.id.as_str(), settled.effects.len()), (id, effects));
+        let model = settled.declared(&library).unwrap();
+        let (logs, truth) = settled.record(&model).unwrap();
+        assert_eq!(logs, settled.record(&model).unwrap().0);
+        for parameter in &model.parameters {
+            let off = parameter.value / truth.declared[&parameter.name];
+            assert!((0.2..=5.0).contains(&off), "{}: {off}", parameter.name);
+            assert_ne!(off, 1.0);
+        }
+    }
 }
 
 #[test]

@@ -34,6 +34,7 @@ pub fn fitted(effect: &Effect, joint: usize, values: &[f64]) -> FittedEffect {
         values: values.iter().map(|value| (*value, None)).collect(),
         own: Vec::new(),
         fixed: false,
+        status: None,
     }
 }
 
@@ -192,12 +193,7 @@ pub fn assert_near(found: f64, wanted: f64, share: f64, what: &str) {
 pub fn empty_log(name: &str, joints: usize) -> Log {
     Log {
         path: name.into(),
-        time: Vec::new(),
-        q: vec![Vec::new(); joints],
-        qd: vec![Vec::new(); joints],
-        tau: vec![Vec::new(); joints],
-        leave_out: Vec::new(),
-        notes: Vec::new(),
+        ..Log::empty(joints)
     }
 }
 

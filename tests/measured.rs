@@ -126,7 +126,7 @@ fn a_log_that_misled_an_identification_is_told_from_a_good_one() {
     };
     let findings = |log: &str| {
         let log = data.join(log);
-        let json = succeeds(&["audit", "--json", "--model", "pendulum", text(&log)]);
+        let json = answers(&["audit", "--json", "--model", "pendulum", text(&log)]);
         let audits: Value = serde_json::from_str(&json).unwrap();
         audits[0]["findings"].as_array().unwrap().clone()
     };
@@ -139,7 +139,7 @@ fn a_log_that_misled_an_identification_is_told_from_a_good_one() {
     let poor = findings("pd_system_identification.csv");
     for (severity, words) in [
         ("serious", "tau1 chatters: 2.2"),
-        ("serious", "disagree with dq1/dt"),
+        ("warning", "disagree with dq1/dt"),
         ("warning", "s of motion, 6 stretches"),
         ("warning", "the motion explains 14."),
         ("warning", "trails tau1 by 15."),

@@ -6,6 +6,7 @@
 mod against;
 mod bad_input;
 mod bench;
+mod bench_rigs;
 mod clients;
 mod common;
 mod control;
@@ -19,6 +20,7 @@ mod front_door;
 mod functions;
 mod gradients;
 mod identify;
+mod logs;
 mod measured;
 mod mechanism;
 mod memory;

@@ -67,9 +67,11 @@ fn declared(effects: &[&str]) -> Model {
 fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
     let (bare, system) = (declared(&[]), declared(effects));
     let settings = Settings::default();
-    let before = Study::new(&bare, logs, &settings).fit_declared().unwrap();
+    let before = Study::new(&bare, logs, &settings)
+        .fit_declared(&[])
+        .unwrap();
     let mut study = Study::new(&system, logs, &settings);
-    let after = study.fit_declared().unwrap();
+    let after = study.fit_declared(&[]).unwrap();
     let probes = Library::built_in();
     unexplained(&study, probes.probes(), &before, &after, &mut rng(seed))
 }
@@ -79,7 +81,7 @@ fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
     let system = declared(&[]);
     let settings = Settings::default();
     let mut study = Study::new(&system, logs, &settings);
-    let fitted = study.fit_declared().unwrap();
+    let fitted = study.fit_declared(&[]).unwrap();
     let library = Library::built_in();
     let left = unexplained(&study, library.probes(), &fitted, &fitted, &mut rng(seed));
     proposal(&study, &fitted, &left)

@@ -34,7 +34,7 @@ pub fn answer(outcome: &Outcome) -> Answer {
             .all_parameters()
             .iter())
         .filter(is_declared)
-        .map(|parameter| estimate(&parameter.name, parameter))
+        .map(|parameter| Estimate::of(&parameter.name, parameter))
         .collect(),
         left: outcome.remainder.unexplained.fraction,
         left_p_value: outcome.remainder.unexplained.p_value,
@@ -43,34 +43,41 @@ pub fn answer(outcome: &Outcome) -> Answer {
 }
 
 fn named(finding: &Finding) -> Named {
-    let own = &finding.effect.effect.parameters;
-    let common = own.iter().zip(&finding.parameters);
-    let common = common.filter(|(_, found)| !found.per_log);
-    let single = finding.effect.own.iter().map(|in_log| Estimate {
-        name: of_log(&own[in_log.parameter].name, &in_log.log_name()),
-        value: in_log.value,
-        ci95: in_log.ci95,
-    });
     Named {
         label: label_of(&finding.effect),
-        parameters: common
-            .map(|(own, found)| estimate(&own.name, found))
-            .chain(single)
-            .collect(),
+        parameters: estimates(&finding.effect, &finding.parameters),
         p_value: finding.p_value,
         error_reduction: finding.error_reduction.as_ref().ok().copied(),
     }
 }
 
-fn label_of(effect: &FittedEffect) -> Label {
+/// The numbers of an effect, called as in its file; `found` are its parameters as the model has them.
+pub fn estimates(effect: &FittedEffect, found: &[Parameter]) -> Vec<Estimate> {
+    let own = &effect.effect.parameters;
+    let common = own.iter().zip(found);
+    let common = common.filter(|(_, found)| !found.per_log);
+    let single = effect.own.iter().map(|in_log| Estimate {
+        name: of_log(&own[in_log.parameter].name, &in_log.log_name()),
+        value: in_log.value,
+        ci95: in_log.ci95,
+    });
+    common
+        .map(|(own, found)| Estimate::of(&own.name, found))
+        .chain(single)
+        .collect()
+}
+
+pub fn label_of(effect: &FittedEffect) -> Label {
     let (name, parameters) = (&effect.effect.name, &effect.effect.parameters);
     label(name, effect.joint, &parameters[0].name)
 }
 
-fn estimate(name: &str, parameter: &Parameter) -> Estimate {
-    Estimate {
-        name: name.to_owned(),
-        value: parameter.value,
-        ci95: parameter.ci95,
+impl Estimate {
+    pub fn of(name: &str, parameter: &Parameter) -> Self {
+        Self {
+            name: name.to_owned(),
+            value: parameter.value,
+            ci95: parameter.ci95,
+        }
     }
 }

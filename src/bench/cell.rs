@@ -1,27 +1,50 @@
 //! One cell: record its logs, close the loop, fit the true structure for comparison, judge.
 
+use anyhow::{Context, anyhow};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 use super::answer::answer;
-use super::grid::{Cell, Simulation, Source};
+use super::coverage::Coverage;
+use super::draw::Drawn;
+use super::grid::{Cell, Group, Simulation, Source};
+use super::hidden::Hidden;
 use super::judge::{Answer, Judgement, Truth, judge};
 use super::machine::Machine;
 use super::mechanics::Pair;
-use super::told::told;
-use crate::closeloop::{Outcome, Request, Split, StudyError, close_loop};
+use super::told::Told;
+use crate::closeloop::{Outcome, Request, Settings, Split, StudyError, close_loop};
 use crate::data::{Log, LogError};
 use crate::files::content_hash;
 use crate::model::{Library, Model};
 
 /// The result of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Findings {
+#[serde(untagged)]
+pub enum Findings {
+    /// Of closing the loop.
+    Searched(Box<Searched>),
+    /// Of the fit that is told the true structure.
+    Told(KnownStructure),
+}
+
+/// What closing the loop found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Searched {
     pub truth: Truth,
     pub answer: Answer,
     pub judgement: Judgement,
     pub errors: Errors,
+}
+
+/// What the fit of the true structure found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KnownStructure {
+    pub truth: Truth,
+    /// Open-loop position error on the test log, 0.5 s ahead, all joints together \[rad\].
+    pub error: f64,
+    pub coverage: Vec<Coverage>,
 }
 
 /// Open-loop position error on the test log, 0.5 s ahead, all joints together \[rad\].
@@ -40,22 +63,82 @@ impl Errors {
     }
 }
 
+/// All logs but the last to learn from, the last to be judged on.
+pub fn last_is_test(logs: Vec<Log>) -> Split {
+    let mut split = Split::given(logs, Vec::new());
+    split.test.extend(split.train.pop());
+    split
+}
+
 impl Cell {
+    /// The cell with its rig drawn, where it is to be drawn.
+    ///
+    /// # Errors
+    /// A model file that cannot be read, or rules by which no rig can be drawn.
+    pub fn settled(&self, library: &Library) -> anyhow::Result<Self> {
+        let Source::Drawn(recipe) = &self.source else {
+            return Ok(self.clone());
+        };
+        let model = library.model(&self.model)?;
+        let mut rng =
+            ChaCha8Rng::seed_from_u64(content_hash(format!("{}: rig", self.id).as_bytes()));
+        let drawn = recipe.settle(self, &model, library, &mut rng)?;
+        let mut settled = self.drawn(&drawn, &drawn.effects);
+        let (_, truth) = settled.record(&model)?;
+        let start = recipe.start(&model, &truth.declared, &mut rng);
+        settled.start = start.map_err(|message| anyhow!(message))?;
+        Ok(settled)
+    }
+
+    /// Number of joints, where the rig is simulated.
+    pub fn joints(&self) -> Option<usize> {
+        match &self.source {
+            Source::Simulated(simulation) => Some(simulation.mechanics.joints()),
+            Source::Drawn(recipe) => Some(recipe.mechanics.joints()),
+            Source::Files { .. } => None,
+        }
+    }
+
+    /// The cell with a drawn rig that has these effects.
+    pub(super) fn drawn(&self, drawn: &Drawn, effects: &[Hidden]) -> Self {
+        Self {
+            effects: effects.to_vec(),
+            source: Source::Simulated(Box::new(drawn.simulation.clone())),
+            ..self.clone()
+        }
+    }
+
+    /// The declared model.
+    ///
+    /// # Errors
+    /// A model file that cannot be read.
+    pub fn declared(&self, library: &Library) -> anyhow::Result<Model> {
+        let mut model = library.model(&self.model)?;
+        for (name, value) in &self.start {
+            let mut parameters = model.parameters.iter_mut();
+            let parameter = parameters.find(|parameter| parameter.name == *name);
+            let unknown = || format!("{}: no parameter `{name}`", self.model.display());
+            parameter.with_context(unknown)?.value = *value;
+        }
+        Ok(model)
+    }
+
     /// The logs of the cell and the truth behind them.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// A file that cannot be read, or a rig that has not been drawn.
     ///
     /// # Panics
     /// Never: the effects were checked when the grid was read.
-    pub fn record(&self, model: &Model) -> Result<(Vec<Log>, Truth), LogError> {
+    pub fn record(&self, model: &Model) -> anyhow::Result<(Vec<Log>, Truth)> {
         match &self.source {
             Source::Files { logs, declared } => {
                 let read = |path| model.read_log(path);
-                let logs = logs.iter().map(read).collect::<Result<_, _>>()?;
+                let logs = logs.iter().map(read).collect::<Result<_, LogError>>()?;
                 Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
             }
             Source::Simulated(simulation) => Ok(self.simulate(simulation)),
+            Source::Drawn(_) => Err(anyhow!("{}: its rig has not been drawn", self.id)),
         }
     }
 
@@ -85,27 +168,40 @@ impl Cell {
         offset
     }
 
-    /// Record the logs, close the loop, judge.
+    /// Record the logs, close the loop or fit the structure that is told, judge.
     ///
     /// # Errors
     /// A model file or log that cannot be read, or logs on which closing the loop fails.
     pub fn run(&self, library: &Library) -> anyhow::Result<Findings> {
-        let model = library.model(&self.model)?;
-        let (logs, truth) = self.record(&model)?;
-        let mut split = Split::given(logs, Vec::new());
-        split.test.extend(split.train.pop());
+        let model = self.declared(library)?;
+        let (logs, mut truth) = self.record(&model)?;
+        let split = last_is_test(logs);
+        let settings = Settings::default();
+        let (effects, known) = (&self.effects, &truth.declared);
+        let told = Told::fit(&model, library, &split, &settings, effects, known);
+        if self.group == Group::Told {
+            let told = told.context("the true structure cannot be fitted")?;
+            return Ok(Findings::Told(KnownStructure {
+                error: told.error(),
+                coverage: told.coverage(&truth)?,
+                truth,
+            }));
+        }
+        if self.group == Group::Several {
+            truth.twins = told.as_ref().map(Told::twins).unwrap_or_default();
+        }
         let outcome = close(&model, library, split.clone(), self.seed)?;
         let answer = answer(&outcome);
-        Ok(Findings {
+        Ok(Findings::Searched(Box::new(Searched {
             judgement: judge(self.group, &truth, &answer),
             errors: Errors {
                 before: outcome.errors.before.position_rms(),
                 after: outcome.errors.after.position_rms(),
-                told: told(&model, library, &split, &self.effects),
+                told: told.map(|told| told.error()),
             },
             truth,
             answer,
-        })
+        })))
     }
 }
 

@@ -62,16 +62,9 @@ impl Approach {
     }
 }
 
-/// How many whole steps of `dt` s a delay is, and the rest \[s\].
-pub fn whole_steps(delay: f64, dt: f64) -> (usize, f64) {
-    let steps = (delay / dt).floor();
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // delays are not negative
-    (steps as usize, (delay - steps * dt).clamp(0.0, dt))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Approach, Shape, whole_steps};
+    use super::{Approach, Shape};
 
     fn shape(change: impl Fn(&mut Shape)) -> Shape {
         let mut shape = Shape::default();
@@ -117,15 +110,5 @@ mod tests {
         };
         assert!((step.at(1.01, 0.01) - 2.0 * (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
         assert_eq!(step.at(1.01, 0.0), 2.0);
-    }
-
-    #[test]
-    fn a_delay_splits_into_whole_steps_and_a_remainder() {
-        assert_eq!(whole_steps(0.02, 0.01), (2, 0.0));
-        let (steps, rest) = whole_steps(0.0137, 0.01);
-        assert!(steps == 1 && (rest - 0.0037).abs() < 1e-15);
-        // Rounding may move one step between the two parts, but not change their sum.
-        let (steps, rest) = whole_steps(0.03, 0.01);
-        assert!((steps as f64 * 0.01 + rest - 0.03).abs() < 1e-15);
     }
 }

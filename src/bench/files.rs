@@ -69,6 +69,7 @@ fn cell(folder: &Path, number: u64, grid: &Path) -> Result<Cell, GridError> {
         effects: described.effects,
         seed: number,
         model: beside_or_named(grid, &described.model),
+        start: BTreeMap::new(),
         source: Source::Files {
             logs: described.logs.iter().map(|log| folder.join(log)).collect(),
             declared: described.declared,

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::condition::{Condition, Driving};
+use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
-use super::recording::{Condition, Driving};
 use crate::files::beside_or_named;
 
 /// Why a grid cannot be run.
@@ -32,6 +33,10 @@ pub enum Group {
     Single,
     /// Two are missing and both have to be named.
     Pair,
+    /// Two to five are missing in a rig drawn by chance and all have to be named.
+    Several,
+    /// As many; the program is told which, and its intervals have to hold the truth.
+    Told,
     /// Nothing is missing and nothing may be named.
     None,
     /// Something is missing that the library does not know; it has to be flagged.
@@ -46,6 +51,26 @@ struct Plant {
     model: PathBuf,
     mechanics: Mechanics,
     driving: Driving,
+    /// Typical top speed of each joint \[rad/s\], by which effects are drawn.
+    #[serde(default)]
+    speed: Vec<f64>,
+}
+
+/// Rigs drawn by chance: each of these numbers of effects on each of the plants in turn.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Draws {
+    /// The part of a cell's name before its number.
+    name: String,
+    group: Group,
+    plants: Vec<String>,
+    /// First and last number of its cells.
+    numbers: [u64; 2],
+    /// How many effects of the library a rig hides.
+    effects: Vec<usize>,
+    /// How many others.
+    #[serde(default)]
+    outside: usize,
 }
 
 /// Every set of effects under every condition with every seed.
@@ -63,8 +88,14 @@ struct Series {
 #[serde(deny_unknown_fields)]
 struct File {
     plants: BTreeMap<String, Plant>,
+    #[serde(default)]
     conditions: BTreeMap<String, Condition>,
+    #[serde(default)]
     series: Vec<Series>,
+    /// By which rigs are drawn.
+    rules: Option<Rules>,
+    #[serde(default)]
+    draws: Vec<Draws>,
 }
 
 /// One test: a rig with its effects, how its logs are taken, and a seed.
@@ -80,6 +111,9 @@ pub struct Cell {
     pub seed: u64,
     /// A model file, or the name of a built-in system.
     pub model: PathBuf,
+    /// Values of declared parameters in place of those of the model file.
+    #[serde(default)]
+    pub start: BTreeMap<String, f64>,
     pub source: Source,
 }
 
@@ -97,6 +131,8 @@ pub struct Simulation {
 pub enum Source {
     /// Recorded when they are asked for.
     Simulated(Box<Simulation>),
+    /// A rig that is drawn when it is asked for.
+    Drawn(Box<Recipe>),
     /// Recorded by another program.
     Files {
         logs: Vec<PathBuf>,
@@ -133,6 +169,10 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
         let added = file.expand(series, path);
         all.extend(added.map_err(|message| wrong(format!("series {}: {message}", number + 1)))?);
     }
+    for draws in &file.draws {
+        let drawn = file.drawn(draws, path);
+        all.extend(drawn.map_err(|message| wrong(format!("draws {}: {message}", draws.name)))?);
+    }
     let mut ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|two| two[0] == two[1]) {
@@ -166,17 +206,8 @@ impl File {
             }
         }
         for (name, condition) in &self.conditions {
-            let sound = condition.rate_hz > 0.0
-                && condition.noise >= 0.0
-                && condition.quantum >= 0.0
-                && condition.logs >= 2
-                && condition.seconds * condition.rate_hz >= 10.0;
-            if !sound {
-                return Err(format!(
-                    "conditions.{name}: needs `rate_hz` above zero, `noise` and `quantum` not below, two logs, \
-                     ten rows"
-                ));
-            }
+            let checked = condition.check();
+            checked.map_err(|message| format!("conditions.{name}: {message}"))?;
         }
         Ok(())
     }
@@ -198,6 +229,7 @@ impl File {
                     effects: effects.clone(),
                     seed,
                     model: beside_or_named(path, &plant.model),
+                    start: BTreeMap::new(),
                     source: Source::Simulated(Box::new(Simulation {
                         mechanics: plant.mechanics.clone(),
                         driving: plant.driving.clone(),
@@ -207,6 +239,42 @@ impl File {
             }
         }
         Ok(all)
+    }
+
+    fn drawn(&self, draws: &Draws, path: &Path) -> Result<Vec<Cell>, String> {
+        let rules = self.rules.as_ref().ok_or("needs `rules` to draw by")?;
+        if draws.plants.is_empty() || draws.effects.is_empty() {
+            return Err("needs a plant and a number of effects".to_owned());
+        }
+        let [first, last] = draws.numbers;
+        (first..=last)
+            .zip(0..)
+            .map(|(number, place)| {
+                let [effects, plants] = [draws.effects.len(), draws.plants.len()];
+                let name = &draws.plants[place / effects % plants];
+                let plant = self.plants.get(name).ok_or(format!("no plant `{name}`"))?;
+                let recipe = Recipe {
+                    mechanics: plant.mechanics.clone(),
+                    driving: plant.driving.clone(),
+                    speed: plant.speed.clone(),
+                    rules: rules.clone(),
+                    effects: draws.effects[place % effects],
+                    outside: draws.outside,
+                };
+                recipe.check()?;
+                Ok(Cell {
+                    id: format!("{}/{number}", draws.name),
+                    group: draws.group,
+                    plant: name.clone(),
+                    condition: draws.name.clone(),
+                    effects: Vec::new(),
+                    seed: number,
+                    model: beside_or_named(path, &plant.model),
+                    start: BTreeMap::new(),
+                    source: Source::Drawn(Box::new(recipe)),
+                })
+            })
+            .collect()
     }
 }
 

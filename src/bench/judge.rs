@@ -1,10 +1,10 @@
 //! Named effects against the true ones.
 
 use std::collections::BTreeMap;
-use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
+use super::coverage::{Coverage, coverage};
 use super::grid::Group;
 use super::hidden::{Hidden, Label};
 use super::mechanics::Pair;
@@ -18,6 +18,9 @@ pub struct Truth {
     pub effects: Vec<(Label, BTreeMap<String, f64>)>,
     /// True values of declared parameters, where the rig fixes them.
     pub declared: BTreeMap<String, f64>,
+    /// Other sets of effects that the logs do not tell from these: as right.
+    #[serde(default)]
+    pub twins: Vec<Vec<Label>>,
 }
 
 /// A value with its 95 % interval.
@@ -54,19 +57,17 @@ pub struct Answer {
     pub left_where: String,
 }
 
-/// Whether a 95 % interval holds the truth.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Coverage {
-    pub name: String,
-    pub truth: f64,
-    pub value: f64,
-    pub covered: bool,
+impl Answer {
+    fn estimates(&self) -> Vec<(Label, Vec<Estimate>)> {
+        let of = |named: &Named| (named.label.clone(), named.parameters.clone());
+        self.named.iter().map(of).collect()
+    }
 }
 
 /// The answer compared with the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judgement {
-    /// The true effects were named, each on its joint, and nothing else.
+    /// The true effects, or a set that the logs do not tell from them, were named, each on its joint, and nothing else.
     pub exact: bool,
     /// The same after swapping named effects for alternatives that were listed with them.
     pub within: bool,
@@ -76,7 +77,7 @@ pub struct Judgement {
     pub missed: Vec<Label>,
     /// A significant remainder is reported.
     pub flagged: bool,
-    /// Named effects that cut less than half of the error.
+    /// Effects that were named, are absent, and cut less than half of the error.
     pub weak: Vec<Label>,
     /// Of the parameters of true effects that were named; of effects by `name`, of declared parameters as
     /// they are called.
@@ -113,7 +114,15 @@ impl Truth {
                 .map(|effect| (effect.label(), values(effect, offsets)))
                 .collect(),
             declared,
+            twins: Vec::new(),
         }
+    }
+
+    /// Of the true set of effects and its twins the one that has most in common with those `named`.
+    fn nearest(&self, named: &[Label]) -> Vec<Label> {
+        let off = |set: &Vec<Label>| without(set, named).len() + without(named, set).len();
+        let sets = std::iter::once(self.labels()).chain(self.twins.iter().cloned());
+        sets.min_by_key(off).unwrap_or_default()
     }
 
     fn labels(&self) -> Vec<Label> {
@@ -128,7 +137,7 @@ impl Truth {
 pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
     let labels = |named: &Named| named.label.clone();
     let named: Vec<Label> = answer.named.iter().map(labels).collect();
-    let there = truth.labels();
+    let there = truth.nearest(&named);
     let wrong = without(&named, &there);
     let missed = without(&there, &named);
     let exact = wrong.is_empty() && missed.is_empty();
@@ -146,10 +155,11 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
         .iter()
         .filter(|effect| effect.error_reduction.is_none_or(|share| share < HALF))
         .map(labels)
+        .filter(|label| wrong.contains(label))
         .collect();
     let passed = match group {
-        Group::Single | Group::Pair => exact,
-        Group::None => named.is_empty(),
+        Group::Single | Group::Pair | Group::Several | Group::Told => exact,
+        Group::None => named.is_empty() && !flagged,
         Group::Outside => flagged && weak.is_empty(),
     };
     Judgement {
@@ -159,7 +169,10 @@ pub fn judge(group: Group, truth: &Truth, answer: &Answer) -> Judgement {
         missed,
         flagged,
         weak,
-        coverage: coverage(truth, answer, exact),
+        coverage: match exact {
+            true => coverage(truth, &answer.estimates(), &answer.declared),
+            false => Vec::new(),
+        },
         passed,
     }
 }
@@ -172,68 +185,10 @@ fn without(a: &[Label], b: &[Label]) -> Vec<Label> {
         .collect()
 }
 
-/// Intervals are only meaningful for the true structure; others are not evaluated.
-fn coverage(truth: &Truth, answer: &Answer, exact: bool) -> Vec<Coverage> {
-    if !exact {
-        return Vec::new();
-    }
-    let mut all = Vec::new();
-    for (label, values) in &truth.effects {
-        let named = answer.named.iter().filter(|named| named.label == *label);
-        for named in named {
-            let mut estimates = named.parameters.clone();
-            if label.starts_with("cogging_torque") {
-                turn_ripple(&mut estimates, values);
-            }
-            all.extend(estimates.iter().filter_map(|estimate| {
-                let truth = *values.get(&estimate.name)?;
-                Coverage::of(&format!("{label}.{}", estimate.name), truth, estimate)
-            }));
-        }
-    }
-    let declared = answer.declared.iter();
-    all.extend(declared.filter_map(|estimate| {
-        let truth = *truth.declared.get(&estimate.name)?;
-        Coverage::of(&estimate.name, truth, estimate)
-    }));
-    all
-}
-
-/// A ripple is the same with the other sign of its amplitude and half a turn more of phase, and with any whole number
-/// of turns: this picks the form of the truth.
-fn turn_ripple(estimates: &mut [Estimate], truth: &BTreeMap<String, f64>) {
-    let amplitude = estimates.iter().find(|e| e.name == "A");
-    let flipped = amplitude.is_some_and(|e| e.value * truth["A"] < 0.0);
-    for estimate in estimates {
-        if flipped && estimate.name == "A" {
-            estimate.value = -estimate.value;
-            estimate.ci95 = estimate.ci95.map(|[low, high]| [-high, -low]);
-        }
-        if estimate.name == "phase" {
-            let half_turn = if flipped { PI } else { 0.0 };
-            let off = estimate.value + half_turn - truth["phase"];
-            let turn = half_turn - TAU * (off / TAU).round();
-            estimate.value += turn;
-            estimate.ci95 = estimate.ci95.map(|[low, high]| [low + turn, high + turn]);
-        }
-    }
-}
-
-impl Coverage {
-    /// `None` without an interval.
-    fn of(name: &str, truth: f64, estimate: &Estimate) -> Option<Self> {
-        let [low, high] = estimate.ci95?;
-        Some(Self {
-            name: name.to_owned(),
-            truth,
-            value: estimate.value,
-            covered: (low..=high).contains(&truth),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
     use crate::data::Joint;
 
@@ -278,6 +233,7 @@ mod tests {
                 .map(|(label, own)| ((*label).to_owned(), values(own)))
                 .collect(),
             declared: BTreeMap::new(),
+            twins: Vec::new(),
         }
     }
 
@@ -326,6 +282,27 @@ mod tests {
             &[&["coulomb_friction@1", "joint_spring@1"]],
         );
         assert!(!judge(Group::Single, &coulomb(), &added).within);
+    }
+
+    #[test]
+    fn a_set_that_the_logs_do_not_tell_from_the_true_one_is_right() {
+        let mut delayed = truth(&[("coulomb_friction@1", &[]), ("actuator_delay@1", &[])]);
+        let named = || {
+            vec![
+                named("actuator_lag@1", &[], 0.9),
+                named("coulomb_friction@1", &[], 0.9),
+            ]
+        };
+        let judged = |truth: &Truth| {
+            let answer = answer(Verdict::Explained, named(), &[]);
+            judge(Group::Several, truth, &answer)
+        };
+        assert_eq!(judged(&delayed).missed, ["actuator_delay@1"]);
+        let labels = ["coulomb_friction@1", "actuator_lag@1"].map(str::to_owned);
+        delayed.twins.push(labels.to_vec());
+        assert!(judged(&delayed).exact && judged(&delayed).passed);
+        delayed.twins[0].pop();
+        assert_eq!(judged(&delayed).wrong, ["actuator_lag@1"]);
     }
 
     #[test]

@@ -118,9 +118,17 @@ impl Mechanics {
             Self::Pendulum { inertia, moment, g } => [
                 ("C_g".to_owned(), -moment * g / (inertia + rotor)),
                 ("C_i".to_owned(), 1.0 / (inertia + rotor)),
+                ("inertia".to_owned(), inertia + rotor),
+                ("moment".to_owned(), moment),
             ]
             .into(),
-            Self::DoublePendulum { .. } => BTreeMap::new(),
+            Self::DoublePendulum { m1, m2, i1, i2, .. } => [
+                ("mass_1".to_owned(), m1),
+                ("mass_2".to_owned(), m2),
+                ("inertia_1".to_owned(), i1 + rotor),
+                ("inertia_2".to_owned(), i2),
+            ]
+            .into(),
         }
     }
 }

@@ -6,6 +6,9 @@
 
 mod answer;
 mod cell;
+mod condition;
+mod coverage;
+mod draw;
 mod drive;
 mod excitation;
 mod files;
@@ -18,16 +21,24 @@ mod machine;
 mod mechanics;
 mod motion;
 mod recording;
+pub mod rigs;
+mod rows;
+mod sensors;
 mod table;
 mod told;
 mod transmission;
+mod wires;
 
-pub use cell::{Errors, Findings};
+pub use cell::{Errors, Findings, KnownStructure, Searched};
+pub use condition::{Condition, Driving, Loop};
+pub use coverage::Coverage;
+pub use draw::{Drawn, Recipe, Rules};
 pub use files::recorded;
 pub use grid::{Cell, GridError, Group, Simulation, Source, cells, read};
 pub use hidden::{Hidden, Label};
-pub use judge::{Answer, Coverage, Estimate, Judgement, Named, Truth, judge};
+pub use judge::{Answer, Estimate, Judgement, Named, Truth, judge};
 pub use machine::{Machine, State};
 pub use mechanics::{Mechanics, Pair};
-pub use recording::{Condition, Driving, Loop};
-pub use table::{Line, Rate, Row, Summary, markdown, summarise};
+pub use rows::{Rate, Row};
+pub use sensors::Flaws;
+pub use table::{Line, Summary, markdown, summarise};

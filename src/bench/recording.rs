@@ -1,58 +1,17 @@
-//! Recording a log: drive the rig, read its encoders.
+//! Recording a log: drive the rig, read its sensors.
 
 use std::path::PathBuf;
 
-use rand::Rng;
-use rand_distr::{Distribution, Normal};
-use serde::{Deserialize, Serialize};
+use rand::{Rng, RngExt};
 
-use super::drive::{Approach, whole_steps};
-use super::excitation::{Controller, Multisine};
+use super::condition::{Condition, Driving, Loop};
+use super::excitation::{Chirp, Controller, Multisine, Steps};
 use super::machine::{Machine, State};
 use super::mechanics::Pair;
 use super::motion::STEP_S;
+use super::sensors::{Clock, Losses, Speed, sensed};
+use super::wires::Wires;
 use crate::data::Log;
-
-/// How a rig is driven; one number a joint in every list.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Driving {
-    /// Open loop: root mean square of the torque \[N m\], and its band \[Hz\].
-    pub torque: Vec<f64>,
-    pub torque_hz: [f64; 2],
-    /// Closed loop: root mean square of the reference \[rad\], and its band \[Hz\].
-    pub reference: Vec<f64>,
-    pub reference_hz: [f64; 2],
-    /// Gains of the controller \[N m/rad\], \[N m s/rad\].
-    pub stiffness: Vec<f64>,
-    pub damping: Vec<f64>,
-    /// Largest torque that it commands \[N m\].
-    pub limit: Vec<f64>,
-}
-
-/// Open or closed loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Loop {
-    Open,
-    Closed,
-}
-
-/// How logs are taken.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Condition {
-    #[serde(rename = "loop")]
-    pub drive: Loop,
-    pub rate_hz: f64,
-    /// Standard deviation of white noise on positions \[rad\].
-    pub noise: f64,
-    /// Step of the encoder \[rad\]; zero for a fine one.
-    #[serde(default)]
-    pub quantum: f64,
-    pub logs: usize,
-    pub seconds: f64,
-}
 
 /// Logs differ in how hard the rig is driven; the last of them lies within the range of the others where there
 /// are more than two.
@@ -60,19 +19,22 @@ const STRENGTHS: [f64; 6] = [1.2, 0.5, 0.8, 1.0, 0.7, 0.9];
 
 /// Where the torque comes from.
 enum Source {
-    Open(Multisine),
+    Multisine(Multisine),
+    Chirp(Chirp),
+    Steps(Steps),
     Closed(Multisine, Controller),
 }
 
 impl Source {
-    fn draw(driving: &Driving, how: Loop, strength: f64, j: usize, rng: &mut impl Rng) -> Self {
+    fn draw(driving: &Driving, how: Loop, effort: &Effort, j: usize, rng: &mut impl Rng) -> Self {
+        let (size, band) = (effort.strength * driving.torque[j], driving.torque_hz);
         match how {
-            Loop::Open => {
-                let size = strength * driving.torque[j];
-                Self::Open(Multisine::draw(size, driving.torque_hz, rng))
-            }
+            Loop::Open => Self::Multisine(Multisine::draw(size, band, rng)),
+            Loop::Release => Self::Multisine(Multisine::draw(0.5 * size, band, rng)),
+            Loop::Chirp => Self::Chirp(Chirp::draw(size, band, effort.seconds, rng)),
+            Loop::Steps => Self::Steps(Steps::draw(size, band, effort.seconds, rng)),
             Loop::Closed => {
-                let size = strength * driving.reference[j];
+                let size = effort.strength * driving.reference[j];
                 let reference = Multisine::draw(size, driving.reference_hz, rng);
                 let controller =
                     Controller::new(driving.stiffness[j], driving.damping[j], driving.limit[j]);
@@ -83,7 +45,9 @@ impl Source {
 
     fn command(&mut self, measured: f64, time: f64, dt: f64) -> f64 {
         match self {
-            Self::Open(torque) => torque.at(time),
+            Self::Multisine(torque) => torque.at(time),
+            Self::Chirp(torque) => torque.at(time),
+            Self::Steps(torque) => torque.at(time),
             Self::Closed(reference, controller) => {
                 let wanted = [reference.at(time), reference.rate(time)];
                 controller.command(measured, wanted, dt)
@@ -92,49 +56,28 @@ impl Source {
     }
 }
 
-/// One encoder: offset, white noise, quantisation.
-fn read(angle: f64, condition: &Condition, rng: &mut impl Rng) -> f64 {
-    let noise = Normal::new(0.0, condition.noise).expect("the grid was checked");
-    let angle = angle + noise.sample(rng);
-    match condition.quantum {
-        quantum if quantum > 0.0 => (angle / quantum).round() * quantum,
-        _ => angle,
-    }
+/// How hard and how long \[s\] a rig is driven.
+struct Effort {
+    strength: f64,
+    seconds: f64,
 }
 
-/// Commands of a rig and the part of them that has reached its drives.
-struct Wires {
-    /// One a step, from the start.
-    commands: Vec<Pair>,
-    given: [Approach; 2],
-}
-
-impl Wires {
-    /// The command of joint `j` that is `steps` old in step `row`; zero before the start.
-    fn command(&self, row: usize, steps: usize, j: usize) -> f64 {
-        row.checked_sub(steps).map_or(0.0, |k| self.commands[k][j])
-    }
-
-    /// Each joint's drive gets the target that its delay brings from `at` s after the start of step `row` on.
-    fn set(&mut self, machine: &Machine, row: usize, dt: f64, at: f64) {
-        for j in 0..machine.joints() {
-            let drive = &machine.drives[j];
-            let (steps, rest) = whole_steps(drive.delay, dt);
-            let target = self.command(row, steps + usize::from(at < rest), j);
-            #[allow(clippy::cast_precision_loss)] // rows are few
-            let now = row as f64 * dt + at;
-            self.given[j] = Approach {
-                since: now,
-                from: self.given[j].at(now, drive.lag),
-                target,
-            };
+/// The state from which a log begins: at rest, hanging down, or where the rig is let go.
+fn start(driving: &Driving, how: Loop, strength: f64, rng: &mut impl Rng) -> State {
+    let mut q = [0.0; 2];
+    if how == Loop::Release {
+        for (angle, reference) in q.iter_mut().zip(&driving.reference) {
+            let side = if rng.random() { 1.0 } else { -1.0 };
+            *angle = side * strength * rng.random_range(1.0..=2.0) * reference;
         }
     }
+    State::at_rest(q)
 }
 
 impl Machine {
-    /// Record the `index`-th log of a rig that starts at rest, hanging down; encoders read too much by `offset`
-    /// rad. Velocities are backward differences of what the encoders read.
+    /// Record the `index`-th log of a rig that starts at rest; encoders read too much by `offset` rad. Velocities
+    /// are filtered backward differences of what the encoders read. Rows that are lost are not in the log, while the
+    /// rig and its controller go on.
     pub fn record(
         &self,
         driving: &Driving,
@@ -143,50 +86,56 @@ impl Machine {
         offset: Pair,
         rng: &mut impl Rng,
     ) -> Log {
-        let joints = self.joints();
-        let strength = STRENGTHS[index % STRENGTHS.len()];
+        let (joints, flaws) = (self.joints(), &condition.flaws);
+        let how = condition.drive[index % condition.drive.len()];
+        let effort = Effort {
+            strength: STRENGTHS[index % STRENGTHS.len()],
+            seconds: condition.seconds,
+        };
         let mut sources: Vec<Source> = (0..joints)
-            .map(|j| Source::draw(driving, condition.drive, strength, j, rng))
+            .map(|j| Source::draw(driving, how, &effort, j, rng))
             .collect();
-        let dt = 1.0 / condition.rate_hz;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some thousands
         let rows = (condition.seconds * condition.rate_hz).round() as usize + 1;
-        let mut wires = Wires {
-            commands: Vec::with_capacity(rows),
-            given: [Approach::default(); 2],
-        };
-        let mut state = State::at_rest([0.0; 2]);
+        let mut clock = Clock::new(condition.rate_hz, flaws);
+        let mut losses = Losses::new(flaws);
+        let mut speeds = vec![Speed::default(); joints];
+        let mut wires = Wires::default();
+        let mut state = start(driving, how, effort.strength, rng);
         let mut log = empty(index, joints);
+        let (mut time, mut dt) = (0.0, 1.0 / condition.rate_hz);
         for row in 0..rows {
-            #[allow(clippy::cast_precision_loss)] // rows are few
-            let time = row as f64 * dt;
+            // The first and the last row are there, so that the log is as long as it was meant to be.
+            let kept = !losses.next(rng) || row == 0 || row == rows - 1;
             let encoders = self.encoders(&state);
             let mut command = [0.0; 2];
             for j in 0..joints {
-                let q = read(encoders[j] + offset[j], condition, rng);
+                let angle = encoders[j] + offset[j];
+                let q = sensed(angle, condition.noise, condition.quantum, rng);
+                let qd = speeds[j].at(q, dt, flaws.filter_s);
                 command[j] = sources[j].command(q, time, dt);
-                let qd = log.q[j].last().map_or(0.0, |last| (q - last) / dt);
-                log.q[j].push(q);
-                log.qd[j].push(qd);
-                log.tau[j].push(command[j]);
+                if kept {
+                    log.q[j].push(q);
+                    log.qd[j].push(qd);
+                    log.tau[j].push(flaws.torque(command[j], driving.limit[j], rng));
+                }
             }
-            log.time.push(time);
-            wires.commands.push(command);
-            self.hold(&mut state, &mut wires, row, dt);
+            if kept {
+                log.time.push(time);
+            }
+            wires.issue(time, command);
+            let next = clock.next(rng);
+            self.hold(&mut state, &mut wires, time, next);
+            (dt, time) = (next - time, next);
         }
         log
     }
 
-    /// Integrates over one step of the log, split where a delayed command changes.
-    fn hold(&self, state: &mut State, wires: &mut Wires, row: usize, dt: f64) {
-        let changes = [0, 1].map(|j| whole_steps(self.drives[j].delay, dt).1);
-        let mut cuts = [0.0, changes[0], changes[1], dt];
-        cuts.sort_by(f64::total_cmp);
-        for span in cuts.windows(2).filter(|span| span[1] > span[0]) {
-            wires.set(self, row, dt, span[0]);
-            #[allow(clippy::cast_precision_loss)] // rows are few
-            let from = row as f64 * dt + span[0];
-            self.advance(state, from, span[1] - span[0], &wires.given, STEP_S);
+    /// Integrates from one reading to the next \[s\], split where a command arrives at a drive.
+    fn hold(&self, state: &mut State, wires: &mut Wires, from: f64, to: f64) {
+        for span in wires.cuts(self, from, to).windows(2) {
+            let given = wires.given(self, span[0]);
+            self.advance(state, span[0], span[1] - span[0], &given, STEP_S);
         }
     }
 }
@@ -208,11 +157,12 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{Condition, Driving, Loop};
+    use crate::bench::condition::{Condition, Driving, Loop};
     use crate::bench::force::Force;
     use crate::bench::friction::DryFriction;
     use crate::bench::machine::Machine;
     use crate::bench::mechanics::tests::pendulum;
+    use crate::bench::sensors::Flaws;
     use crate::data::Log;
 
     fn driving() -> Driving {
@@ -227,14 +177,15 @@ mod tests {
         }
     }
 
-    fn condition(drive: Loop) -> Condition {
+    fn condition(how: Loop) -> Condition {
         Condition {
-            drive,
+            drive: vec![how],
             rate_hz: 100.0,
             noise: 0.0,
             quantum: 0.0,
             logs: 3,
             seconds: 4.0,
+            flaws: Flaws::default(),
         }
     }
 
@@ -346,6 +297,24 @@ mod tests {
         for row in 1..noisy.rows() {
             let difference = (noisy.q[0][row] - noisy.q[0][row - 1]) / 0.01;
             assert!((noisy.qd[0][row] - difference).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn lost_rows_are_missing_while_the_rig_goes_on() {
+        let machine = Machine::bare(pendulum());
+        let mut closed = condition(Loop::Closed);
+        let whole = record(&machine, &closed, 0.0);
+        (closed.flaws.dropped, closed.flaws.burst) = (0.1, 4);
+        let lossy = record(&machine, &closed, 0.0);
+        let lost = whole.rows() - lossy.rows();
+        assert!((20..70).contains(&lost), "{lost}");
+        assert_eq!(lossy.duration(), whole.duration());
+        // What is left is what was there: the controller has seen the lost rows, and the rig has moved under it.
+        for (row, time) in lossy.time.iter().enumerate() {
+            let there = whole.time.iter().position(|t| t == time).unwrap();
+            let of = |log: &Log, row: usize| [log.q[0][row], log.qd[0][row], log.tau[0][row]];
+            assert_eq!(of(&lossy, row), of(&whole, there));
         }
     }
 }

@@ -5,11 +5,11 @@ use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
 
-use super::cell::Findings;
+use super::cell::{Findings, Searched};
 use super::grid::{Cell, Group};
-use super::judge::{Coverage, Judgement};
+use super::rows::{Done, Rate, Row, rows};
 use crate::closeloop::Verdict;
-use crate::data::statistics::{rank_quantile, wilson};
+use crate::data::statistics::rank_quantile;
 
 /// One cell and its result; one line of `cells.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,51 +22,6 @@ pub struct Line {
     pub cell: Cell,
     /// The findings, or why closing the loop failed.
     pub findings: Result<Findings, String>,
-}
-
-/// A relative frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Rate {
-    pub hits: usize,
-    pub of: usize,
-}
-
-impl Rate {
-    fn count(all: impl Iterator<Item = bool>) -> Self {
-        all.fold(Self { hits: 0, of: 0 }, |rate, hit| Self {
-            hits: rate.hits + usize::from(hit),
-            of: rate.of + 1,
-        })
-    }
-
-    /// The share; NaN without a trial.
-    #[allow(clippy::cast_precision_loss)] // counts are small
-    pub fn share(self) -> f64 {
-        self.hits as f64 / self.of as f64
-    }
-
-    /// 95 % interval of the share (Wilson 1927).
-    pub fn wilson(self) -> [f64; 2] {
-        wilson(self.hits, self.of)
-    }
-}
-
-/// One row of the table.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
-    pub what: String,
-    pub rate: Rate,
-    pub wilson: [f64; 2],
-}
-
-impl Row {
-    fn new(what: impl Into<String>, rate: Rate) -> Self {
-        Self {
-            what: what.into(),
-            rate,
-            wilson: rate.wilson(),
-        }
-    }
 }
 
 /// The results of a grid.
@@ -110,45 +65,16 @@ pub struct Seconds {
     pub total: f64,
 }
 
-/// The error after is as small as that of the true structure when it exceeds it by no more than this.
-const AS_GOOD: f64 = 1.1;
-
-/// A cell on which closing the loop failed counts as not passed wherever it counts.
-struct Done<'l> {
-    cell: &'l Cell,
-    findings: Option<&'l Findings>,
-}
-
-impl Done<'_> {
-    fn shows(&self, what: impl Fn(&Judgement) -> bool) -> bool {
-        self.findings.is_some_and(|f| what(&f.judgement))
-    }
-
-    fn ratio(&self) -> Option<f64> {
-        self.findings?.errors.ratio()
-    }
-
-    fn coverage(&self) -> &[Coverage] {
-        self.findings.map_or(&[], |f| &f.judgement.coverage)
-    }
-}
-
 /// Count.
 pub fn summarise(lines: &[Line]) -> Summary {
-    let done: Vec<Done<'_>> = lines
-        .iter()
-        .map(|line| Done {
-            cell: &line.cell,
-            findings: line.findings.as_ref().ok(),
-        })
-        .collect();
+    let done: Vec<Done<'_>> = lines.iter().map(Done::of).collect();
     let failed = lines.iter().filter_map(|line| {
         let error = line.findings.as_ref().err()?;
         Some((line.cell.id.clone(), error.clone()))
     });
     let known: Vec<&Done<'_>> = done
         .iter()
-        .filter(|d| matches!(d.cell.group, Group::Single | Group::Pair))
+        .filter(|d| matches!(d.cell.group, Group::Single | Group::Pair | Group::Several))
         .collect();
     let ratios: Vec<f64> = known.iter().filter_map(|d| d.ratio()).collect();
     Summary {
@@ -170,60 +96,9 @@ pub fn summarise(lines: &[Line]) -> Summary {
     }
 }
 
-fn rows(done: &[Done<'_>], ratios: &[f64]) -> Vec<Row> {
-    let of = |group: Group, hit: &dyn Fn(&Done<'_>) -> bool| {
-        Rate::count(done.iter().filter(|d| d.cell.group == group).map(hit))
-    };
-    let exact = |d: &Done<'_>| d.shows(|j| j.exact);
-    let within = |d: &Done<'_>| d.shows(|j| j.within);
-    let named = |d: &Done<'_>| !d.findings.is_some_and(|f| f.answer.named.is_empty());
-    let flagged_in_vain = |d: &Done<'_>| !d.shows(|j| !j.flagged);
-    let flagged = |d: &Done<'_>| d.shows(|j| j.flagged);
-    let passed = |d: &Done<'_>| d.shows(|j| j.passed);
-    let covered = |of_effects: bool| {
-        let all = done.iter().flat_map(Done::coverage);
-        let wanted = all.filter(|c| c.name.contains('.') == of_effects);
-        Rate::count(wanted.map(|c| c.covered))
-    };
-    vec![
-        Row::new("one effect: exact", of(Group::Single, &exact)),
-        Row::new(
-            "one effect: exact or a listed alternative",
-            of(Group::Single, &within),
-        ),
-        Row::new("two effects: exact", of(Group::Pair, &exact)),
-        Row::new(
-            "two effects: exact or listed alternatives",
-            of(Group::Pair, &within),
-        ),
-        Row::new("no effect: something is named", of(Group::None, &named)),
-        Row::new(
-            "no effect: something is flagged",
-            of(Group::None, &flagged_in_vain),
-        ),
-        Row::new("outside the library: flagged", of(Group::Outside, &flagged)),
-        Row::new(
-            "outside the library: flagged, and no name that cuts less than half of the error",
-            of(Group::Outside, &passed),
-        ),
-        Row::new(
-            "95 % intervals of effects that hold the truth",
-            covered(true),
-        ),
-        Row::new(
-            "95 % intervals of declared parameters that hold the truth",
-            covered(false),
-        ),
-        Row::new(
-            "error after within a tenth of that of the true structure",
-            Rate::count(ratios.iter().map(|ratio| *ratio <= AS_GOOD)),
-        ),
-    ]
-}
-
 fn by(done: &[Done<'_>], keys: impl Fn(&Done<'_>) -> Vec<String>) -> Vec<Row> {
     let mut groups: BTreeMap<String, Vec<bool>> = BTreeMap::new();
-    for d in done {
+    for d in done.iter().filter(|d| !d.is_told()) {
         for key in keys(d) {
             groups.entry(key).or_default().push(d.shows(|j| j.passed));
         }
@@ -254,7 +129,7 @@ fn counted(groups: BTreeMap<String, Vec<bool>>) -> Vec<Row> {
 
 /// `None` for a passed cell, and for one that could not be run, which is listed by its error.
 fn failure(d: &Done<'_>) -> Option<Failure> {
-    let Findings {
+    let Searched {
         answer,
         judgement,
         errors,

@@ -1,30 +1,202 @@
 //! The fit of the true structure: the best that any search could reach.
 
-use super::hidden::Hidden;
-use crate::closeloop::{Settings, Split, Study};
-use crate::model::{FittedEffect, Library, Model};
-use crate::sim::metric::{Assessment, assess};
+use std::collections::BTreeMap;
 
-/// Error of the model with the true effects, fitted from their true values to the logs that the search had:
-/// position, all joints together, at the middle horizon \[rad\]. `None` where the library lacks one of them.
-pub fn told(declared: &Model, library: &Library, split: &Split, effects: &[Hidden]) -> Option<f64> {
-    let settings = Settings::default();
-    let mut study = Study::new(declared, &split.train, &settings);
-    let before = study.fit_declared().ok()?;
-    let truth: Vec<FittedEffect> = effects
-        .iter()
-        .map(|hidden| fitted(&study, library, hidden))
-        .collect::<Option<_>>()?;
-    let locals = before.fit.locals.clone();
-    let found = study
-        .refit(&before.model.with_effects(truth), locals, None)
-        .ok()?;
-    let errors: Assessment = assess(
-        &found.model.dynamics(),
-        &split.test,
-        &settings.score.horizons_s,
-    );
-    Some(errors.position_rms())
+use super::answer::{estimates, label_of};
+use super::coverage::{Coverage, coverage};
+use super::hidden::{Hidden, Label};
+use super::judge::{Estimate, Truth};
+use crate::closeloop::{Fitted, Settings, Split, Study, StudyError, with_intervals};
+use crate::data::Log;
+use crate::data::statistics::{mean, standard_error};
+use crate::identify::{Fit, blocks};
+use crate::model::{FittedEffect, Library, Model};
+use crate::sim::metric::assess;
+
+/// Standard normal quantile of 95 %.
+const ONE_SIDED: f64 = 1.645;
+/// Errors within this factor of the true structure's are as small.
+const AS_GOOD: f64 = 1.05;
+
+/// A model with the true effects, fitted from their true values to the logs that a search has.
+pub struct Told<'a> {
+    study: Study<'a>,
+    library: &'a Library,
+    split: &'a Split,
+    settings: &'a Settings,
+    fitted: Fitted,
+}
+
+/// A model whose declared parameters have the true values, where these are known.
+pub fn at_truth(model: &Model, declared: &BTreeMap<String, f64>) -> Model {
+    let mut model = model.clone();
+    for parameter in &mut model.parameters {
+        if let Some(value) = declared.get(&parameter.name).filter(|_| !parameter.fixed) {
+            parameter.value = *value;
+        }
+    }
+    model
+}
+
+impl<'a> Told<'a> {
+    /// Fit the true structure; `None` where the library lacks one of the effects or the fit fails. Declared parameters
+    /// start from the true values where all are known, else from the fit of the declared model.
+    pub fn fit(
+        declared: &'a Model,
+        library: &'a Library,
+        split: &'a Split,
+        settings: &'a Settings,
+        effects: &[Hidden],
+        known: &BTreeMap<String, f64>,
+    ) -> Option<Self> {
+        let mut study = Study::new(declared, &split.train, settings);
+        let truth: Vec<FittedEffect> = effects
+            .iter()
+            .map(|hidden| fitted(&study, library, hidden))
+            .collect::<Option<_>>()?;
+        let mut free = declared.parameters.iter().filter(|p| !p.fixed);
+        let (model, locals) = if free.all(|p| known.contains_key(&p.name)) {
+            let locals = study.shooting.initial_locals(0);
+            (at_truth(declared, known), locals)
+        } else {
+            let before = study.fit_declared(library.effects()).ok()?;
+            (before.model, before.fit.locals)
+        };
+        let found = study.refit(&model.with_effects(truth), locals, None).ok()?;
+        Some(Self {
+            study,
+            library,
+            split,
+            settings,
+            fitted: found,
+        })
+    }
+
+    /// Open-loop position error, all joints together, at the middle horizon \[rad\].
+    pub fn error(&self) -> f64 {
+        self.error_on(&self.split.test, &self.fitted)
+    }
+
+    fn error_on(&self, logs: &[Log], fitted: &Fitted) -> f64 {
+        let horizons = &self.settings.score.horizons_s;
+        assess(&fitted.model.dynamics(), logs, horizons).position_rms()
+    }
+
+    /// By how much the error rises without the effect at a place, what is left being fitted again, as a factor; simpler
+    /// effects that it contains stay. Infinite where that fit fails.
+    pub fn rises_without(&self, place: usize) -> f64 {
+        let mut effects = self.fitted.model.effects.clone();
+        let gone = effects.remove(place);
+        for name in &gone.effect.contains {
+            let simpler = typical(&self.study, self.library, name, &gone);
+            effects.extend(simpler.filter(|new| !effects.iter().any(|old| old.excludes(new))));
+        }
+        let locals = self.fitted.fit.locals.clone();
+        let other = self.fitted.model.with_effects(effects);
+        let other = self.study.refit(&other, locals, None);
+        other.map_or(f64::INFINITY, |other| self.rise(&other))
+    }
+
+    /// The error of another fit over that of the true structure.
+    fn rise(&self, other: &Fitted) -> f64 {
+        let logs = self.judged_on();
+        self.error_on(logs, other) / self.error_on(logs, &self.fitted)
+    }
+
+    /// Sets of effects that these logs do not tell from the true one: one effect exchanged for another of no more numbers
+    /// that it is confused with, where the true set does not have a smaller loss by more than chance (Vuong 1989), nor a
+    /// smaller error.
+    pub fn twins(&self) -> Vec<Vec<Label>> {
+        let places = 0..self.fitted.model.effects.len();
+        places.flat_map(|place| self.twins_at(place)).collect()
+    }
+
+    fn twins_at(&self, place: usize) -> Vec<Vec<Label>> {
+        let effects = &self.fitted.model.effects;
+        let (of, mut others) = (&effects[place], effects.clone());
+        others.remove(place);
+        let names = of.effect.confused_with.iter();
+        let rivals = names.filter_map(|name| typical(&self.study, self.library, name, of));
+        let simple = rivals.filter(|rival| rival.values.len() <= of.values.len());
+        simple
+            .filter(|rival| !others.iter().any(|other| other.excludes(rival)))
+            .map(|rival| [others.as_slice(), &[rival]].concat())
+            .filter(|set| self.is_as_good(set))
+            .map(|set| set.iter().map(label_of).collect())
+            .collect()
+    }
+
+    /// Whether the logs do not tell the true set of effects from another.
+    fn is_as_good(&self, effects: &[FittedEffect]) -> bool {
+        let Fitted { model, fit } = &self.fitted;
+        let other = model.with_effects(effects.to_vec());
+        let (locals, scale) = (fit.locals.clone(), Some(fit.scale));
+        let Ok(other) = self.study.refit(&other, locals, scale) else {
+            return false;
+        };
+        let blocks = blocks(&self.study.shooting);
+        let losses = |fit: &Fit| {
+            fit.equations_by(&blocks)
+                .into_iter()
+                .map(|block| block.cost)
+        };
+        let more: Vec<f64> = losses(&other.fit)
+            .zip(losses(fit))
+            .map(|(a, b)| a - b)
+            .collect();
+        let by_chance = mean(&more) <= ONE_SIDED * standard_error(&more);
+        by_chance && self.rise(&other) <= AS_GOOD
+    }
+
+    /// The test logs or, where values of a log's own are unknown there, the training logs.
+    fn judged_on(&self) -> &[Log] {
+        let effects = &self.fitted.model.effects;
+        let mut parameters = effects.iter().flat_map(|effect| &effect.effect.parameters);
+        if parameters.any(|parameter| parameter.per_log) {
+            &self.split.train
+        } else {
+            &self.split.test
+        }
+    }
+
+    /// Which 95 % intervals of the true structure hold the truth, after the last refinement.
+    ///
+    /// # Errors
+    /// The fit in fine steps fails.
+    pub fn coverage(&self, truth: &Truth) -> Result<Vec<Coverage>, StudyError> {
+        let fine = self.study.refined();
+        let refined = fine.estimate(&self.fitted)?;
+        let model = with_intervals(&fine, &refined, &self.fitted.model);
+        let all = model.all_parameters();
+        let declared: Vec<Estimate> = all[..model.parameters.len()]
+            .iter()
+            .map(|parameter| Estimate::of(&parameter.name, parameter))
+            .collect();
+        let of_effect = |(k, effect): (usize, &FittedEffect)| {
+            let found = estimates(effect, &all[model.place_of(k)]);
+            (label_of(effect), found)
+        };
+        let effects: Vec<_> = model.effects.iter().enumerate().map(of_effect).collect();
+        Ok(coverage(truth, &effects, &declared))
+    }
+}
+
+/// An effect of the library on the joint of another, at the values that are typical of it.
+fn typical(
+    study: &Study<'_>,
+    library: &Library,
+    name: &str,
+    like: &FittedEffect,
+) -> Option<FittedEffect> {
+    let effect = library.effect(name).ok()?;
+    study.declared.can_carry(effect, like.joint).ok()?;
+    let joint = like.joint;
+    let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
+    let mut fitted = FittedEffect::absent(&effect, joint);
+    for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
+        slot.0 = parameter.typical;
+    }
+    Some(fitted)
 }
 
 /// The effect with its true values; `None` where the library has no such effect.

@@ -4,16 +4,18 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{Answer, Common, inputs};
-use crate::data::{Audit, audit};
+use crate::data::{Audit, Columns, Log, audit};
 use crate::model::Library;
 
-/// Audit logs: sampling, noise, spikes, lags, excitation, and what they cannot show
+/// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and what mends them
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  residyn audit --model pendulum run1.csv run2.csv")]
+#[command(
+    after_help = "Exit status 1 where a finding is serious.\n\nExample:\n  residyn audit run1.csv run2.csv"
+)]
 pub(super) struct Arguments {
-    /// Model file, or the name of a built-in system: number of joints and names of columns
+    /// Model file, or the name of a built-in system, for names and units of columns; without it, logs have the standard ones
     #[arg(long)]
-    model: PathBuf,
+    model: Option<PathBuf>,
     /// Logs to audit
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
@@ -22,10 +24,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let model = Library::built_in().model(&arguments.model)?;
-    let logs = inputs::logs(&arguments.logs, &model)?;
+    let (logs, columns) = read(arguments)?;
     inputs::print_notes(&logs);
-    let audits: Vec<Audit> = logs.iter().map(audit).collect();
+    let audits: Vec<Audit> = logs.iter().map(|log| audit(log, &columns)).collect();
     if arguments.common.json {
         inputs::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
     } else {
@@ -33,5 +34,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             inputs::print(&format!("{audit}\n"))?;
         }
     }
-    Ok(Answer::Yes)
+    let serious = audits.iter().any(|audit| audit.serious().next().is_some());
+    Ok(if serious { Answer::No } else { Answer::Yes })
+}
+
+/// The logs and what their columns are.
+fn read(arguments: &Arguments) -> Result<(Vec<Log>, Columns)> {
+    let Some(model) = &arguments.model else {
+        let logs = arguments.logs.iter().map(Log::read_standard);
+        return Ok((logs.collect::<Result<_, _>>()?, Columns::default()));
+    };
+    let model = Library::built_in().model(model)?;
+    Ok((inputs::logs(&arguments.logs, &model)?, model.columns))
 }

@@ -1,3 +1,5 @@
+mod rigs;
+
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -12,7 +14,7 @@ use crate::files::content_id;
 use crate::model::Library;
 use crate::runs::RunFolder;
 
-/// Measure the program on simulated rigs
+/// Measure the program on simulated and on measured rigs
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]
@@ -22,6 +24,7 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     Effects(Effects),
+    Rigs(rigs::Rigs),
 }
 
 /// Measure how often closing the loop names hidden effects, on a grid of rigs coded independently of the models
@@ -54,8 +57,10 @@ struct Effects {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let What::Effects(arguments) = &arguments.what;
-    effects(arguments)
+    match &arguments.what {
+        What::Effects(arguments) => effects(arguments),
+        What::Rigs(arguments) => rigs::run(arguments),
+    }
 }
 
 fn effects(arguments: &Effects) -> Result<Answer> {
@@ -102,8 +107,6 @@ struct Store {
 impl Store {
     fn open(folder: &Path) -> Result<Self> {
         let path = folder.join("cells.jsonl");
-        let program =
-            fs::read(std::env::current_exe()?).context("the program cannot read itself")?;
         let mut known = Vec::new();
         if path.is_file() {
             let lines = BufReader::new(File::open(&path)?).lines();
@@ -112,7 +115,7 @@ impl Store {
         }
         Ok(Self {
             path,
-            program: content_id(&program),
+            program: program_id()?,
             known,
         })
     }
@@ -143,17 +146,17 @@ impl Store {
 
     fn add(&self, cell: &Cell, library: &Library) -> Result<Line> {
         let begun = Instant::now();
-        // A panic is a result of the bench: it is recorded, and the run continues.
-        let run = std::panic::AssertUnwindSafe(|| cell.run(library));
-        let findings = match std::panic::catch_unwind(run) {
-            Ok(findings) => findings.map_err(|error| told(&error)),
-            Err(_) => Err("the program panicked".to_owned()),
-        };
+        let mut settled = cell.clone();
+        let findings = unless_panic(|| {
+            settled = cell.settled(library)?;
+            settled.run(library)
+        });
+        let findings = findings.and_then(|findings| findings.map_err(|error| told(&error)));
         let line = Line {
             configuration: configuration(cell)?,
             program: self.program.clone(),
             seconds: begun.elapsed().as_secs_f64(),
-            cell: cell.clone(),
+            cell: settled,
             findings,
         };
         let mut file = OpenOptions::new()
@@ -165,6 +168,18 @@ impl Store {
         file.write_all(format!("\n{}\n", serde_json::to_string(&line)?).as_bytes())?;
         Ok(line)
     }
+}
+
+/// Hash of this build of the program.
+fn program_id() -> Result<String> {
+    let program = fs::read(std::env::current_exe()?).context("the program cannot read itself")?;
+    Ok(content_id(&program))
+}
+
+/// The result of some work, or that it panicked: a panic is a result of the bench, and the run continues.
+fn unless_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+    done.map_err(|_| "the program panicked".to_owned())
 }
 
 /// Hash of the cell and of the files it uses, which may change while the grid does not.

@@ -115,7 +115,7 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
     let mut train = inputs::logs(&arguments.train, &declared)?;
     let mut test = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
-    inputs::print_notes(train.iter().chain(&test));
+    inputs::print_notes_and_faults(train.iter().chain(&test), &declared.columns);
     let split = if test.is_empty() {
         Split::of(train, &Settings::default().split)
     } else {

@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (declared, dynamics) = model(arguments)?;
     let mut logs = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
-    inputs::print_notes(&logs);
+    inputs::print_notes_and_faults(&logs, &declared.columns);
     let offsets = arguments
         .calibrate
         .map(|share| calibrate(&dynamics, &mut logs, share))

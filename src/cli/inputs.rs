@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::data::{LeaveOut, Log, leave_out};
+use crate::data::{Columns, LeaveOut, Log, audit, leave_out};
 use crate::model::{Library, Model};
 use crate::train::{Backend, Checkpoint, HybridModel};
 
@@ -94,6 +94,19 @@ pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     for log in logs {
         for note in &log.notes {
             eprintln!("note: {}: {note}", log.name());
+        }
+    }
+}
+
+/// Print the notes of logs and what is serious about them on standard error, before anything is computed from them.
+pub(super) fn print_notes_and_faults<'l>(
+    logs: impl IntoIterator<Item = &'l Log>,
+    columns: &Columns,
+) {
+    for log in logs {
+        print_notes([log]);
+        for finding in audit(log, columns).serious() {
+            eprintln!("serious: {}: {finding}", log.name());
         }
     }
 }

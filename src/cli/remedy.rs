@@ -2,6 +2,7 @@ use std::error::Error;
 use std::io::ErrorKind;
 
 use crate::bench::GridError;
+use crate::bench::rigs::RigsError;
 use crate::experiment::ExperimentError;
 use crate::files::OutputError;
 use crate::runs::RunFolderError;
@@ -14,6 +15,7 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().and_then(of_recipe))
         .or_else(|| error.downcast_ref().and_then(of_experiment))
         .or_else(|| error.downcast_ref().and_then(of_grid))
+        .or_else(|| error.downcast_ref().and_then(of_rigs))
 }
 
 fn of_output(error: &OutputError) -> Option<&'static str> {
@@ -55,4 +57,14 @@ fn of_experiment(error: &ExperimentError) -> Option<&'static str> {
 
 fn of_grid(error: &GridError) -> Option<&'static str> {
     matches!(error, GridError::Open { .. }).then_some("give a grid with --grid")
+}
+
+fn of_rigs(error: &RigsError) -> Option<&'static str> {
+    match error {
+        RigsError::Open { .. } => Some("give a file of rigs with --rigs"),
+        RigsError::NoLogs { .. } => {
+            Some("give the folder of measured logs with --data, or other rigs with --only")
+        }
+        _ => None,
+    }
 }

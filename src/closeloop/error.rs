@@ -8,9 +8,10 @@ use crate::identify::FitError;
 #[non_exhaustive]
 pub enum StudyError {
     #[error(
-        "the test logs hold no window of {horizon_s} s to score a model on; use longer test logs or leave out less of them"
+        "the test logs hold no window of {shortest_s} s to score a model on; give longer test logs with --test, or leave out \
+         less of them{found}"
     )]
-    NoTest { horizon_s: f64 },
+    NoTest { shortest_s: f64, found: String },
     #[error(transparent)]
     Fit(#[from] FitError),
     #[error(transparent)]

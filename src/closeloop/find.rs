@@ -1,15 +1,14 @@
 use rand::Rng;
 
-use super::confirm::{Withdrawn, confirm};
 use super::error::StudyError;
+use super::establish::{Standing, establish, without_each};
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
-use super::select::{Rival, Round, Search, left_out_losses};
-use super::split::set_aside;
+use super::select::{Rival, Round, Search, candidates, left_out_losses, starts};
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::identify::FitError;
-use crate::model::{FittedEffect, Library};
+use crate::model::{Library, Status};
 
 /// The result of searching the logs for what the declared model lacks.
 pub struct Found {
@@ -19,22 +18,31 @@ pub struct Found {
     pub unexplained: Unexplained,
 }
 
-/// What was selected on a part of the logs and confirmed on the rest.
+/// The set of effects that was chosen.
 pub struct Chosen {
-    /// The model with the confirmed effects, fitted to all logs.
+    /// The model with them, fitted.
     pub after: Fitted,
+    /// One for each added effect, in the order of the model.
+    pub standings: Vec<Standing>,
     pub rounds: Vec<Round>,
-    /// Effects that explain the logs as well as one that was selected.
+    /// Effects that explain the logs as well as one that was chosen.
     pub rivals: Vec<Rival>,
-    pub withdrawn: Vec<Withdrawn>,
-    /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
-    pub confirmed_on: usize,
-    /// Why the selected effects were withdrawn, if the model with them could not be fitted.
+    /// Why there are no effects, if the chosen model could not be fitted.
     pub failure: Option<FitError>,
 }
 
-/// Stages 3 to 5: fit the declared model, select effects on a part of the logs, confirm them on the rest, fit the model
-/// with the confirmed ones to all logs and test its residuals.
+impl Chosen {
+    /// Number of established effects.
+    pub fn established(&self) -> usize {
+        let standings = self.standings.iter();
+        standings
+            .filter(|s| s.status == Status::Established)
+            .count()
+    }
+}
+
+/// Stages 3 to 5: fit the declared model, choose the set of effects that explains the logs best, judge each of them and
+/// test the residuals.
 ///
 /// # Errors
 /// As [`Study::fit_declared`].
@@ -45,19 +53,29 @@ pub fn find(
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Found, StudyError> {
     progress(Stage::Fit.into());
-    let before = study.fit_declared()?;
-    let mut chosen = choose(study, library, &before, progress)?;
+    let before = study.fit_declared(library.effects())?;
+    let mut chosen = choose(study, library, &before, progress);
     progress(Stage::Remainder.into());
-    let test =
-        |after: &Fitted, rng: &mut _| unexplained(study, library.probes(), &before, after, rng);
-    let mut left = test(&chosen.after, rng);
-    let share = share_left(study, &before, &chosen.after);
-    if left.is_significant() && share > study.settings.confirm.masking {
-        chosen
-            .withdrawn
-            .extend(all_withdrawn(study, &chosen.after, MASKING));
-        chosen.after = before.clone();
-        left = test(&chosen.after, rng);
+    let mut test = |after: &Fitted| unexplained(study, library.probes(), &before, after, rng);
+    let mut left = test(&chosen.after);
+    if left.is_significant()
+        && share_left(study, &before, &chosen.after) > study.settings.establish.masking
+    {
+        for standing in &mut chosen.standings {
+            standing.status = Status::Supported;
+            standing.reason = Some(MASKING.into());
+        }
+    }
+    let added = study.added(&chosen.after.model);
+    for (effect, standing) in chosen.after.model.effects[added]
+        .iter_mut()
+        .zip(&chosen.standings)
+    {
+        effect.status = Some(standing.status);
+    }
+    if chosen.established() == 0 && !chosen.standings.is_empty() {
+        // What is not established explains nothing.
+        left = test(&before);
     }
     Ok(Found {
         before,
@@ -66,7 +84,7 @@ pub fn find(
     })
 }
 
-/// Why effects are withdrawn that leave most of the loss and an unexplained remainder.
+/// Why effects are not established that leave most of the loss and an unexplained remainder.
 const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
 
@@ -75,55 +93,35 @@ fn choose(
     library: &Library,
     before: &Fitted,
     progress: &mut dyn FnMut(Progress<'_>),
-) -> Result<Chosen, StudyError> {
-    let (kept, aside) = set_aside(study.logs, study.settings);
-    let (mut kept, aside) = (study.on(&kept), study.on(&aside));
-    let declared = kept.fit_declared()?;
-    let mut search = Search::new(&kept, library.effects(), progress);
-    let selected = search.select(declared)?;
-    search.tell(Stage::Confirm.into());
-    let confirmed = confirm(&kept, &aside, selected.clone())
-        .and_then(|confirmed| Ok((on_all(study, before, &confirmed.fitted)?, confirmed)));
-    Ok(match confirmed {
-        Ok((after, confirmed)) => Chosen {
-            after,
-            rivals: search.rivals(&confirmed.fitted),
-            rounds: search.rounds,
-            withdrawn: confirmed.withdrawn,
-            confirmed_on: confirmed.stretches,
-            failure: None,
-        },
-        Err(error) => Chosen {
-            after: before.clone(),
-            rivals: Vec::new(),
-            rounds: search.rounds,
-            withdrawn: all_withdrawn(
-                study,
-                &selected,
-                &format!("the model with it cannot be fitted to all training logs: {error}"),
-            ),
-            confirmed_on: 0,
-            failure: Some(error),
-        },
-    })
-}
-
-/// The chosen effects fitted to all logs.
-fn on_all(study: &Study<'_>, before: &Fitted, chosen: &Fitted) -> Result<Fitted, FitError> {
-    if study.added(&chosen.model).is_empty() {
-        return Ok(before.clone());
-    }
-    study.refit(&chosen.model, before.fit.locals.clone(), None)
-}
-
-/// All added effects of a model, withdrawn for one reason.
-fn all_withdrawn(study: &Study<'_>, fitted: &Fitted, reason: &str) -> Vec<Withdrawn> {
-    let added = &fitted.model.effects[study.added(&fitted.model)];
-    let withdrawn = |effect: &FittedEffect| Withdrawn {
-        effect: effect.clone(),
-        reason: reason.to_owned(),
+) -> Chosen {
+    let mut search = Search::new(study, library.effects(), progress);
+    let chosen = match search.select(before.clone()) {
+        Ok(chosen) => chosen,
+        Err(failure) => {
+            return Chosen {
+                after: before.clone(),
+                standings: Vec::new(),
+                rounds: search.rounds,
+                rivals: Vec::new(),
+                failure: Some(failure),
+            };
+        }
     };
-    added.iter().map(withdrawn).collect()
+    search.tell(Stage::Establish.into());
+    let without = without_each(study, &chosen);
+    let all = candidates(study, library.effects(), &study.declared.effects);
+    let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
+    let standings = establish(study, &chosen, &without, trials);
+    let established: Vec<bool> = (standings.iter())
+        .map(|standing| standing.status == Status::Established)
+        .collect();
+    Chosen {
+        rivals: search.rivals(&chosen, &without, &established),
+        standings,
+        rounds: search.rounds,
+        after: chosen.fitted,
+        failure: None,
+    }
 }
 
 /// Loss that the effects leave, as a share of the declared model's, on stretches left out of the fits.

@@ -6,15 +6,19 @@ use std::fmt::Debug;
 use std::path::Path;
 
 use rand::Rng;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::fitted::Fitted;
 use super::refine::Refined;
 use super::settings::LearnSettings;
+use super::split::between;
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{Dynamics, Origin};
 use crate::sim::as_modelled;
+use crate::sim::metric::assess;
 
 /// What a residual network is trained on.
 #[derive(Debug)]
@@ -69,26 +73,96 @@ impl LearnError {
     }
 }
 
-/// Train the residual network on what the refined model leaves. `None` where no network is asked for or the logs are
-/// too few to train it.
+/// The residual network, and whether it helps on motion that it was not trained on.
+pub struct Learned {
+    pub network: Box<dyn LearnedResidual>,
+    pub check: NetworkCheck,
+}
+
+/// Open-loop position errors at the middle horizon on parts of the training logs, by networks that were trained on the
+/// other parts.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct NetworkCheck {
+    /// of the model without a network in each part, rad (or m)
+    pub without: Vec<f64>,
+    /// of the model with the network that was trained on the other parts
+    pub with: Vec<f64>,
+    /// whether the network is used: where it is not, it adds nothing
+    pub used: bool,
+}
+
+impl NetworkCheck {
+    fn of(errors: Vec<[f64; 2]>, settings: &LearnSettings) -> Self {
+        let ratio = |[without, with]: &[f64; 2]| with / without;
+        let total = |k: usize| errors.iter().map(|e| e[k].powi(2)).sum::<f64>().sqrt();
+        let harms = errors.iter().any(|e| ratio(e) > settings.harmful);
+        Self {
+            without: errors.iter().map(|e| e[0]).collect(),
+            with: errors.iter().map(|e| e[1]).collect(),
+            // Not a number where a prediction is none: then it is not used.
+            used: !harms && total(1) <= settings.helpful * total(0),
+        }
+    }
+}
+
+/// Train the residual network on what the refined model leaves, and keep it if it helps on parts of the logs that it was
+/// not trained on. `None` where no network is asked for or the logs are too few to train one.
 pub(super) fn learn(
     refined: &Refined<'_>,
     learner: Option<&dyn ResidualLearner>,
     rng: &mut impl Rng,
     progress: &mut dyn FnMut(Progress<'_>),
-) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> {
+) -> Result<Option<Learned>, LearnError> {
     let Some(learner) = learner else {
         return Ok(None);
     };
-    let task = task(&refined.study, &refined.after);
-    learner.learn(&task, rng, &mut |text| {
+    let (study, fitted) = (&refined.study, &refined.after);
+    let mut tell = |text: &str| {
         let text = format!("{}, {text}", Stage::Learn.text());
         progress(Progress::within(Stage::Learn, &text));
-    })
+    };
+    let settings = &study.settings.learn;
+    let parts = parts(study.logs, settings.parts);
+    let horizon_s = [study.settings.score.middle_s()];
+    let error = |model: &Dynamics, logs: &[Log]| assess(model, logs, &horizon_s).position_rms();
+    let mut errors = Vec::new();
+    for (k, left_out) in parts.iter().enumerate() {
+        let others = (0..parts.len()).filter(|other| *other != k);
+        let others: Vec<Log> = others.flat_map(|other| parts[other].clone()).collect();
+        let task = task(study, fitted, &others, settings.clone());
+        let Some(network) = learner.learn(&task, rng, &mut tell)? else {
+            return Ok(None);
+        };
+        let without = error(&fitted.model.absorbed().dynamics(), left_out);
+        errors.push([without, error(network.hybrid(), left_out)]);
+    }
+    let check = NetworkCheck::of(errors, settings);
+    let mut settings = settings.clone();
+    if !check.used {
+        // A network that is not trained adds nothing.
+        settings.epochs = 0;
+    }
+    let task = task(study, fitted, study.logs, settings);
+    let network = learner.learn(&task, rng, &mut tell)?;
+    Ok(network.map(|network| Learned { network, check }))
 }
 
-fn task(study: &Study<'_>, fitted: &Fitted) -> ResidualTask {
-    let settings = study.settings.learn.clone();
+/// The logs in so many parts: whole logs in turn or, where there are fewer, pieces of each.
+fn parts(logs: &[Log], count: usize) -> Vec<Vec<Log>> {
+    if logs.len() >= count {
+        let of = |part: usize| logs.iter().skip(part).step_by(count).cloned().collect();
+        return (0..count).map(of).collect();
+    }
+    #[allow(clippy::cast_precision_loss)] // few parts
+    let piece = |log: &Log, part: usize| {
+        let at = |k: usize| log.time[0] + log.duration() * k as f64 / count as f64;
+        between(log, at(part), at(part + 1))
+    };
+    let of = |part: usize| logs.iter().map(|log| piece(log, part)).collect();
+    (0..count).map(of).collect()
+}
+
+fn task(study: &Study<'_>, fitted: &Fitted, logs: &[Log], settings: LearnSettings) -> ResidualTask {
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
     let equations = fitted.model.absorbed().dynamics();
     let thinning = Thinning {
@@ -97,7 +171,7 @@ fn task(study: &Study<'_>, fitted: &Fitted) -> ResidualTask {
     };
     let dynamics = fitted.model.dynamics();
     let of_log = |log: &Log| trajectories(&as_modelled(&*dynamics.in_log(log), log), thinning);
-    let stretches = study.logs.iter().flat_map(of_log);
+    let stretches = logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
     for (k, stretch) in stretches.enumerate() {
         match (k + 1).is_multiple_of(settings.every) {

@@ -1,18 +1,19 @@
 //! Closing the loop: from logs and a declared model to the effects that the model lacks.
 //!
 //! Stages in the order of `docs/method.md`, one file or folder each: [`split`](Split) and audit, fit, select and
-//! confirm, test what remains, tell alternatives apart, refine, learn, score, calibrate. [`close_loop`] goes
+//! establish, test what remains, tell alternatives apart, refine, learn, score, calibrate. [`close_loop`] goes
 //! through all of them.
 
 mod calibrate;
-mod confirm;
 mod discriminate;
 mod error;
+mod establish;
 mod find;
 mod fit;
 mod fitted;
 mod learn;
 mod outcome;
+mod pushes;
 mod refine;
 mod remainder;
 mod request;
@@ -28,13 +29,16 @@ mod tests;
 mod verdict;
 
 pub use calibrate::{Calibration, DetectionLimit, Repetition, Smallest, calibrate};
-pub use confirm::Withdrawn;
 pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;
+pub use establish::Standing;
 pub use find::{Chosen, Found, find};
 pub use fitted::Fitted;
-pub use learn::{LearnError, LearnedResidual, ResidualLearner, ResidualTask};
+pub use learn::{
+    LearnError, Learned, LearnedResidual, NetworkCheck, ResidualLearner, ResidualTask,
+};
 pub use outcome::{Effects, Given, Models, Outcome, Remainder};
+pub use refine::with_intervals;
 pub use remainder::{
     Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, proposal,
     unexplained,
@@ -42,12 +46,13 @@ pub use remainder::{
 pub use request::{Reference, Request};
 pub use run::close_loop;
 pub use score::{Contradicted, Errors, Finding};
-pub use select::{Evidence, Rival, Round};
+pub use select::{Rival, Round, Tried};
 pub use settings::{
-    CalibrateSettings, ConfirmSettings, CurveSettings, DiscriminateSettings, FitSettings,
+    CalibrateSettings, CurveSettings, DiscriminateSettings, EstablishSettings, FitSettings,
     LearnSettings, ProposalSettings, RefineSettings, RemainderSettings, ScoreSettings,
     SelectSettings, Settings, SplitSettings, VerdictSettings,
 };
+pub(crate) use split::between;
 pub use split::{Split, SplitMethod};
 pub use stage::{Progress, Stage};
 pub use study::Study;

@@ -1,8 +1,7 @@
 use super::calibrate::Calibration;
-use super::confirm::Withdrawn;
 use super::discriminate::Alternative;
 use super::fitted::Fitted;
-use super::learn::LearnedResidual;
+use super::learn::Learned;
 use super::remainder::{Proposal, ResidualForce, Unexplained};
 use super::score::{Contradicted, Errors, Finding};
 use super::select::Round;
@@ -26,7 +25,7 @@ pub struct Outcome {
     pub remainder: Remainder,
     pub errors: Errors,
     /// The residual network, where the logs suffice to train it.
-    pub learned: Option<Box<dyn LearnedResidual>>,
+    pub learned: Option<Learned>,
     /// What the training logs could show, where that was asked for: see [`calibrate`](super::calibrate()).
     pub calibration: Option<Calibration>,
 }
@@ -35,6 +34,8 @@ pub struct Outcome {
 #[non_exhaustive]
 pub struct Given {
     pub train: Vec<Log>,
+    /// The training logs as they were fitted: with readings that jump masked and dropped rows put in or left out.
+    pub studied: Vec<Log>,
     pub test: Vec<Log>,
     pub split: SplitMethod,
     /// Of the training logs, then of the test logs.
@@ -60,12 +61,13 @@ pub struct Models {
 /// The effects that were found, and what else was considered.
 #[non_exhaustive]
 pub struct Effects {
+    /// Those that are established.
     pub findings: Vec<Finding>,
+    /// Those that are not, and yet lower the loss on stretches left out of the fit: the model has them, but their names
+    /// are not to be relied on.
+    pub supported: Vec<Finding>,
     /// What the logs do not tell from the findings.
     pub alternatives: Vec<Alternative>,
-    pub withdrawn: Vec<Withdrawn>,
-    /// Stretches of data set aside that the effects were confirmed on; 0 where the logs leave none.
-    pub confirmed_on: usize,
     /// What was tried.
     pub rounds: Vec<Round>,
 }
@@ -86,15 +88,15 @@ impl Outcome {
     /// The training logs as they were studied; `declared` is the model they were studied for.
     pub fn study<'a>(&'a self, declared: &'a Model) -> Study<'a> {
         let Given {
-            train,
+            studied,
             audits,
             settings,
             ..
         } = &self.given;
-        let audits = audits[..train.len()].to_vec();
+        let audits = audits[..studied.len()].to_vec();
         Study {
             identifiability: self.models.identifiability.clone(),
-            ..Study::audited(declared, train, audits, settings)
+            ..Study::audited(declared, studied, audits, settings)
         }
     }
 }

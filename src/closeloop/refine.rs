@@ -58,7 +58,7 @@ impl Study<'_> {
 /// A fitted model with its 95 % intervals; parameters that were not free have none. An interval reaches as much further
 /// as the value was off in `coarse` numbers: smoothing and steps err to first order, so that what halving them changes is
 /// what is left of their error (Richardson 1911).
-pub(super) fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &Model) -> Model {
+pub fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &Model) -> Model {
     let uncertainty = uncertainty(&study.shooting, &fitted.fit);
     let (values, coarse) = (fitted.model.values(), coarse.values());
     let mut model = fitted.model.clone();

@@ -2,7 +2,7 @@ use super::error::StudyError;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::split::Split;
-use crate::data::Log;
+use crate::data::{Finding, Log, audit};
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
@@ -50,13 +50,34 @@ impl<'a> Request<'a> {
         Self::new(model, library, split)
     }
 
+    /// The same with those of the horizons of which the test logs hold a window.
+    ///
     /// # Errors
-    /// Test logs without a window of one of the horizons.
-    pub(super) fn check(&self) -> Result<(), StudyError> {
-        let has_no_window = |horizon_s: &&f64| window_count(&self.split.test, **horizon_s) == 0;
-        match self.settings.score.horizons_s.iter().find(has_no_window) {
-            Some(&horizon_s) => Err(StudyError::NoTest { horizon_s }),
-            None => Ok(()),
+    /// Test logs without a window of any of them.
+    pub(super) fn scorable(mut self) -> Result<Self, StudyError> {
+        let horizons_s = &mut self.settings.score.horizons_s;
+        let shortest_s = horizons_s.iter().copied().fold(f64::INFINITY, f64::min);
+        horizons_s.retain(|horizon_s| window_count(&self.split.test, *horizon_s) > 0);
+        if horizons_s.is_empty() {
+            return Err(StudyError::NoTest {
+                shortest_s,
+                found: self.serious_in_test(),
+            });
         }
+        Ok(self)
+    }
+
+    /// The first serious finding about a test log, as the end of a sentence; empty without one.
+    fn serious_in_test(&self) -> String {
+        let audits = self
+            .split
+            .test
+            .iter()
+            .map(|log| audit(log, &self.model.columns));
+        let mut found = audits.flat_map(|audit| {
+            let told = |finding: &Finding| format!("; {}: {finding}", audit.log);
+            audit.serious().map(told).next()
+        });
+        found.next().unwrap_or_default()
     }
 }

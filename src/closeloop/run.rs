@@ -5,14 +5,16 @@ use super::error::StudyError;
 use super::find::{Found, find};
 use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
+use super::pushes::tell_pushes;
 use super::refine::{Refined, refine};
-use super::remainder::{ResidualForce, proposal};
+use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
 use super::stage::{Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
-use crate::data::audit;
+use crate::data::{Audit, Log, audit};
+use crate::model::{Library, Status};
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
 /// network on the remainder, and score the models before and after on the test logs.
@@ -24,7 +26,6 @@ pub fn close_loop(
     rng: &mut impl Rng,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Result<Outcome, StudyError> {
-    request.check()?;
     let Request {
         model,
         library,
@@ -32,32 +33,48 @@ pub fn close_loop(
         against,
         settings,
         learner,
-    } = request;
+    } = request.scorable()?;
     progress(Stage::Audit.into());
-    let mut study = Study::new(model, &split.train, &settings);
-    let test_audits = split.test.iter().map(audit);
-    let audits = study.audits().iter().cloned().chain(test_audits).collect();
+    let audits = |logs: &[Log]| -> Vec<Audit> {
+        logs.iter().map(|log| audit(log, &model.columns)).collect()
+    };
+    let for_fits = |logs: &[Log]| -> Vec<Log> {
+        logs.iter()
+            .map(|log| log.for_fits(settings.fit.window_s))
+            .collect()
+    };
+    let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
+    let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
+    let mut study = Study::audited(model, &studied, of_train.clone(), &settings);
+    // Where nothing moves, anything could be found.
+    let nothing = Library::empty();
+    let library = if study.moves() { library } else { &nothing };
     let found = find(&mut study, library, rng, progress)?;
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
     let refined = refine(&study, &found.before, &found.chosen.after);
     let remainder = remainder(&study, &found, &refined);
+    let mut of_train = of_train;
+    // Logs over which the model diverges tell of no push.
+    if let Ok(residual) = &remainder.after {
+        tell_pushes(&study, &residual.samples, &mut of_train);
+    }
+    let test_study = study.on(&tested);
+    if let Ok(forces) = residual_force(&test_study, &found.chosen.after) {
+        tell_pushes(&test_study, &forces, &mut of_test);
+    }
     let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let hybrid = learned.as_ref().map(|learned| learned.hybrid());
+    let hybrid = learned.as_ref().map(|learned| learned.network.hybrid());
     let models = [&refined.before, &refined.after];
     let errors = scorer.errors(model, models, hybrid, &against, rng);
-    let findings = findings(
-        &study,
-        &found.chosen.after,
-        &refined,
-        &scorer,
-        &errors.after,
-    );
+    let findings = findings(&study, &found.chosen, &refined, &scorer);
+    let (findings, supported) =
+        (findings.into_iter()).partition(|finding| finding.status == Status::Established);
     let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     Ok(Outcome {
         verdict,
@@ -65,9 +82,8 @@ pub fn close_loop(
         models: models_of(&study, refined),
         effects: Effects {
             findings,
+            supported,
             alternatives,
-            withdrawn: found.chosen.withdrawn,
-            confirmed_on: found.chosen.confirmed_on,
             rounds: found.chosen.rounds,
         },
         remainder,
@@ -75,12 +91,13 @@ pub fn close_loop(
         learned,
         calibration: None,
         given: Given {
-            train: split.train.clone(),
+            train: split.train,
             test: split.test,
             split: split.method,
-            audits,
+            audits: [of_train, of_test].concat(),
             settings: settings.clone(),
             prismatic: model.prismatic.clone(),
+            studied,
         },
     })
 }

@@ -31,6 +31,13 @@ macro_rules! settings {
     };
 }
 
+impl ScoreSettings {
+    /// The horizon (s) at which models are compared in one number.
+    pub fn middle_s(&self) -> f64 {
+        self.horizons_s[self.horizons_s.len() / 2]
+    }
+}
+
 /// How the loop is closed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 #[non_exhaustive]
@@ -38,7 +45,7 @@ pub struct Settings {
     pub split: SplitSettings,
     pub fit: FitSettings,
     pub select: SelectSettings,
-    pub confirm: ConfirmSettings,
+    pub establish: EstablishSettings,
     pub remainder: RemainderSettings,
     pub curves: CurveSettings,
     pub proposal: ProposalSettings,
@@ -60,6 +67,10 @@ settings! {
         /// Time in s between what is learned from and what it is judged on, where both come from one log: longer than
         /// the memory of a drive.
         gap_s: f64 = 0.5,
+        /// Time in s that is judged on at least: two windows of 0.5 s.
+        shortest_s: f64 = 1.0,
+        /// No more than this share of a log goes into the gap and the test.
+        most: f64 = 0.5,
     }
 }
 
@@ -80,11 +91,49 @@ settings! {
 }
 
 settings! {
-    /// Stage 4: which effects are admitted.
+    /// Stage 4: which sets of effects are tried, and which one is chosen.
     SelectSettings {
-        /// Probability of a false alarm that one round admits, over all candidates and all their starting points.
+        /// Effects of one set at most.
+        most_effects: usize = 12,
+        /// Steps of the search over predicted losses, each of which adds or drops one effect.
+        depth: usize = 12,
+        /// Sets that lead from one of these steps to the next.
+        beam: usize = 4,
+        /// Sets that are fitted after all have been compared by predicted loss.
+        fitted: usize = 8,
+        /// Rounds of prediction and fits.
+        rounds: usize = 8,
+        /// A round must lower the loss on left-out stretches by this share for another one to follow.
+        step: f64 = 0.02,
+        /// A simpler set takes the place of a richer one where the loss on left-out stretches rises by less than this
+        /// share,
+        negligible: f64 = 0.01,
+        /// or by less than so many standard errors (the rule of one standard error: Breiman et al. 1984)
+        simplest: f64 = 1.0,
+        /// and this share: what acts in a few fast stretches only has a large standard error.
+        simpler: f64 = 0.05,
+        /// A whole log is left out at a time; fewer logs than this are left out in parts, at least so many altogether.
+        fewest_groups: usize = 8,
+        /// Predicted losses may be wrong by this factor: what they exclude by more is not fitted.
+        slack: f64 = 3.0,
+        /// Candidates that are fitted in place of each established effect.
+        rivals: usize = 3,
+        /// Those within this many standard errors of the chosen one explain the logs as well as it does,
+        as_good: f64 = 2.0,
+        /// if they also save this share of what it saves,
+        as_much: f64 = 0.8,
+        /// and leave at most this many times the loss that it leaves, a seventh more in error: few stretches may fail
+        /// to tell models apart of which one leaves plainly more.
+        as_little: f64 = 1.3,
+    }
+}
+
+settings! {
+    /// Stage 4, second half: which of the selected effects are established.
+    EstablishSettings {
+        /// Probability of a false alarm for one effect, over all candidates and all their starting points.
         false_alarm: f64 = 0.05,
-        /// Few stretches cannot give so small a probability. With them an effect that plainly helps is admitted at
+        /// Few stretches cannot give so small a probability. With them an effect that plainly helps is established at
         /// this level, without a correction for the number of candidates.
         significant_alone: f64 = 0.01,
         /// An effect must lower the loss on left-out stretches by this share, and thus the error by a twentieth: less
@@ -93,41 +142,11 @@ settings! {
         /// An effect plainly helps that takes away this share of the loss on stretches that it was not fitted to:
         /// chance does not do that.
         plain: f64 = 0.5,
-        /// Candidates within this many standard errors of the best explain the logs as well as it does,
-        as_good: f64 = 2.0,
-        /// if they also save this share of what it saves,
-        as_much: f64 = 0.8,
-        /// and leave at most this many times the loss that it leaves, a seventh more in error: few stretches may fail
-        /// to tell models apart of which one leaves plainly more.
-        as_little: f64 = 1.3,
-        /// A simpler set of effects takes the place of a richer one where the loss rises by less than this share: half
-        /// of what is worthwhile.
-        simpler: f64 = 0.05,
-        /// Candidates that are fitted after all have been screened.
-        fitted: usize = 8,
-        /// Effects that are added at most.
-        most_effects: usize = 6,
-        /// With this many logs a whole log is left out at a time; with fewer, stretches of two seconds.
-        whole_logs: usize = 8,
-    }
-}
-
-settings! {
-    /// Stage 4, second half: which selected effects are confirmed.
-    ConfirmSettings {
-        /// With this many training logs whole ones are set aside to confirm; with fewer, the end of each.
-        whole_logs: usize = 4,
-        /// Training logs of less than this (s) altogether are needed whole to select effects.
-        shortest_s: f64 = 10.0,
-        /// Fewer stretches than this prove nothing either way.
-        fewest_stretches: usize = 4,
-        /// An effect is confirmed that lowers the loss on data it was not selected on, with at most this probability of
-        /// doing so by chance: such effects are few, and each was significant over the whole library before.
-        significance: f64 = 0.1,
-        /// Where the loss changes by less than this share, the motion set aside does not show the effect.
-        not_shown: f64 = 0.01,
+        /// An effect is confirmed that lowers the loss on the half of the stretches that its size was not fitted to with
+        /// at most this probability of doing so by chance.
+        confirmed: f64 = 0.1,
         /// Where an unexplained remainder stays, effects that leave more than this share of the loss do not explain
-        /// it either: they would mask the real cause and are withdrawn.
+        /// it either: they would mask the real cause, and none is established.
         masking: f64 = 0.5,
     }
 }
@@ -247,6 +266,12 @@ settings! {
         segments: usize = 1200,
         /// Length in s of the stretches that are trained on or kept to choose the epoch.
         stretch_s: f64 = 2.0,
+        /// Parts of the logs that are left out in turn to see whether a network helps at all:
+        parts: usize = 3,
+        /// it is used if it lowers the error on all of them together to this share or less,
+        helpful: f64 = 0.95,
+        /// and raises it on none of them to more than this share.
+        harmful: f64 = 1.02,
         /// One stretch of this many is kept to choose the epoch.
         every: usize = 5,
         epochs: usize = 250,
@@ -261,8 +286,9 @@ settings! {
 settings! {
     /// Stage 9: how models are scored.
     ScoreSettings {
-        /// Horizons of the reported errors in s; models are compared in one number at the middle one.
-        horizons_s: [f64; 3] = [0.1, 0.5, 1.0],
+        /// Horizons of the reported errors in s; models are compared in one number at the middle one. Those that are
+        /// longer than any test log are left out.
+        horizons_s: Vec<f64> = vec![0.1, 0.5, 1.0],
         /// With this many test logs whole ones are resampled; with fewer, stretches of two seconds.
         whole_logs: usize = 5,
         /// Fewer logs or stretches than this give no interval.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::settings::{Settings, SplitSettings};
+use super::settings::SplitSettings;
 use crate::data::Log;
 
 /// Which logs a study learns from and which it is judged by.
@@ -22,7 +22,7 @@ pub enum SplitMethod {
     Given,
     /// The last logs of those given.
     LastLogs { count: usize },
-    /// The end of every log, after a gap.
+    /// The end of every log, after a gap: the largest share of one, with the gap.
     EndOfEachLog { share: f64, gap_s: f64 },
 }
 
@@ -53,8 +53,11 @@ impl Split {
     /// Set the end of each log apart.
     fn ends_of(logs: Vec<Log>, settings: &SplitSettings) -> Self {
         let (mut train, mut test) = (Vec::new(), Vec::new());
+        let mut share = settings.test_share;
         for log in logs {
-            let middle = log.time[0] + (1.0 - settings.test_share) * log.duration();
+            let rest_s = settings.rest_s(log.duration());
+            share = share.max(rest_s / log.duration());
+            let middle = log.time[log.rows() - 1] - rest_s;
             train.push(between(&log, f64::NEG_INFINITY, middle));
             test.push(between(&log, middle + settings.gap_s, f64::INFINITY));
         }
@@ -64,46 +67,20 @@ impl Split {
             train,
             test,
             method: SplitMethod::EndOfEachLog {
-                share: settings.test_share,
+                share,
                 gap_s: settings.gap_s,
             },
         }
     }
 }
 
-/// Logs to choose effects by, and others to confirm the choice: whole trajectories where there are four or
-/// more, else the end of each after a gap. The confirming ones are those of middling speed: a
-/// choice is to be confirmed within the range of motion that it was made for. Of a few seconds none are set aside.
-pub(super) fn set_aside(logs: &[Log], settings: &Settings) -> (Vec<Log>, Vec<Log>) {
-    if logs.iter().map(Log::duration).sum::<f64>() < settings.confirm.shortest_s {
-        return (logs.to_vec(), Vec::new());
-    }
-    if logs.len() < settings.confirm.whole_logs {
-        let halves = Split::ends_of(logs.to_vec(), &settings.split);
-        return (halves.train, halves.test);
-    }
-    let mut by_speed: Vec<usize> = (0..logs.len()).collect();
-    by_speed.sort_by(|&a, &b| speed(&logs[a]).total_cmp(&speed(&logs[b])));
-    let count = settings.split.count_of(logs.len());
-    let first = (logs.len() - count) / 2;
-    let confirming = &by_speed[first..first + count];
-    let (aside, kept): (Vec<usize>, Vec<usize>) =
-        (0..logs.len()).partition(|k| confirming.contains(k));
-    let of = |indices: Vec<usize>| indices.into_iter().map(|k| logs[k].clone()).collect();
-    (of(kept), of(aside))
-}
-
-/// Mean distance travelled in a second, over all joints.
-fn speed(log: &Log) -> f64 {
-    let travelled = |q: &Vec<f64>| {
-        q.windows(2)
-            .map(|pair| (pair[1] - pair[0]).abs())
-            .sum::<f64>()
-    };
-    log.q.iter().map(travelled).sum::<f64>() / log.duration().max(f64::MIN_POSITIVE)
-}
-
 impl SplitSettings {
+    /// How much of the end of a log goes into the gap and the test, in s: more of a short log, so that it can be judged.
+    fn rest_s(&self, duration_s: f64) -> f64 {
+        let enough = (self.test_share * duration_s).max(self.gap_s + self.shortest_s);
+        enough.min(self.most * duration_s)
+    }
+
     /// How many of so many logs are set apart.
     #[allow(
         clippy::cast_precision_loss,
@@ -116,16 +93,21 @@ impl SplitSettings {
 }
 
 /// The rows of a log from `start_s` to `end_s`.
-fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
+pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
     let rows =
         log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
     let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();
+    let masked = |of_joint: &Vec<usize>| {
+        let kept = of_joint.iter().filter(|row| rows.contains(row));
+        kept.map(|row| row - rows.start).collect()
+    };
     Log {
         path: log.path.clone(),
         time: log.time[rows.clone()].to_vec(),
         q: cut(&log.q),
         qd: cut(&log.qd),
         tau: cut(&log.tau),
+        masked: log.masked.iter().map(masked).collect(),
         leave_out: log.leave_out.clone(),
         notes: log.notes.clone(),
     }

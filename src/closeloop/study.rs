@@ -3,7 +3,7 @@ use std::sync::OnceLock;
 
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
-use crate::data::{Audit, Log, audit};
+use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
 use crate::model::{Dynamics, FittedEffect, Model};
 
@@ -53,7 +53,8 @@ impl<'a> Sample<'a> {
 
 impl<'a> Study<'a> {
     pub fn new(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
-        let audits = logs.iter().map(audit).collect();
+        let audits = logs.iter().map(|log| audit(log, &declared.columns));
+        let audits = audits.collect();
         Self::audited(declared, logs, audits, settings)
     }
 
@@ -143,8 +144,15 @@ impl<'a> Study<'a> {
 
     /// The audits of the logs, in their order.
     pub fn audits(&self) -> &[Audit] {
-        let of_logs = || self.logs.iter().map(audit).collect();
-        self.audits.get_or_init(of_logs)
+        let of_log = |log| audit(log, &self.declared.columns);
+        self.audits
+            .get_or_init(|| self.logs.iter().map(of_log).collect())
+    }
+
+    /// Whether any joint moves visibly in any of the logs.
+    pub(super) fn moves(&self) -> bool {
+        let moves = |audit: &Audit| audit.joints.iter().any(JointAudit::moves);
+        self.audits().iter().any(moves)
     }
 
     /// Fit a model, starting from its values, with the study's smoothing of friction.

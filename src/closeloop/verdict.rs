@@ -29,10 +29,22 @@ pub(super) fn verdict(
     errors: &Errors,
 ) -> (Verdict, String) {
     let added = study.added(&found.chosen.after.model).len();
-    match failure(found, refined).or_else(|| inconclusive(study, added, errors)) {
+    let established = found.chosen.established();
+    match at_rest(study)
+        .or_else(|| failure(found, refined))
+        .or_else(|| inconclusive(study, added, errors))
+    {
         Some(reason) => (Verdict::Inconclusive, reason),
-        None => conclusion(added, &found.unexplained),
+        None => conclusion(established, &found.unexplained),
     }
+}
+
+/// Whether there is nothing to conclude from.
+fn at_rest(study: &Study<'_>) -> Option<String> {
+    (!study.moves()).then(|| {
+        "no joint moves visibly in any training log: record motion before anything can be said"
+            .into()
+    })
 }
 
 /// Which fit failed or did not converge, if one did that the verdict rests on.

@@ -2,63 +2,80 @@
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
-
+use super::column::{Column, Quantity};
 use super::error::LogError;
 
-/// Names under which a log file holds time, angles, velocities and torques.
+/// Columns in which a log file holds time, angles, velocities and torques, and their units.
 ///
 /// This is the `[columns]` table of a model file. An empty list stands for the standard names
-/// (`q1..`, `qd1..`, `tau1..`), so that a model file has to name only what differs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+/// (`q1..`, `qd1..`, `tau1..`) in standard units, so that a model file has to name only what differs.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
-    /// Column of the time \[s\].
-    pub time: String,
-    /// Columns of the joint angles \[rad\], joint 1 first.
-    pub q: Vec<String>,
-    /// Columns of the joint velocities \[rad/s\], joint 1 first.
-    pub qd: Vec<String>,
-    /// Columns of the joint torques \[N m\], joint 1 first.
-    pub tau: Vec<String>,
+    pub time: Column,
+    /// Joint angles, joint 1 first.
+    pub q: Vec<Column>,
+    /// Joint velocities, joint 1 first; `None` where they are to come from the angles.
+    pub qd: Option<Vec<Column>>,
+    /// Joint torques, joint 1 first.
+    pub tau: Vec<Column>,
 }
 
 impl Default for Columns {
     /// `time`, and the standard names for however many joints the model has.
     fn default() -> Self {
         Self {
-            time: "time".to_owned(),
+            time: Column::named("time"),
             q: vec![],
-            qd: vec![],
+            qd: Some(vec![]),
             tau: vec![],
         }
     }
 }
 
 impl Columns {
-    /// The standard names `time`, `q1..`, `qd1..`, `tau1..` for a number of joints.
+    /// The standard columns `time`, `q1..`, `qd1..`, `tau1..` for a number of joints.
     pub fn standard(joints: usize) -> Self {
         Self {
             q: numbered("q", joints),
-            qd: numbered("qd", joints),
+            qd: Some(numbered("qd", joints)),
             tau: numbered("tau", joints),
             ..Self::default()
         }
     }
 
-    /// All names: time, angles, velocities, torques.
-    pub(super) fn in_file_order(&self) -> impl Iterator<Item = &String> {
+    /// All columns: time, angles, velocities, torques.
+    pub(super) fn in_file_order(&self) -> impl Iterator<Item = &Column> {
         std::iter::once(&self.time)
             .chain(&self.q)
-            .chain(&self.qd)
+            .chain(self.qd.iter().flatten())
             .chain(&self.tau)
     }
 
-    /// These names with every empty list filled with the standard names.
+    /// The line of a model file under `[columns]` for one of the quantities: `tau = [{ column = "tau1", factor = -1 }]`.
+    pub fn line(&self, quantity: Quantity) -> String {
+        let list = |columns: &[Column]| {
+            let columns: Vec<String> = columns.iter().map(Column::to_string).collect();
+            format!("[{}]", columns.join(", "))
+        };
+        let value = match quantity {
+            Quantity::Time => self.time.to_string(),
+            Quantity::Angle => list(&self.q),
+            Quantity::Velocity => list(self.qd.as_deref().unwrap_or_default()),
+            Quantity::Torque => list(&self.tau),
+        };
+        format!("{} = {value}", quantity.key())
+    }
+
+    /// These columns with every empty list filled with the standard names; `None` where a list has another length.
+    pub(super) fn whole(&self, joints: usize) -> Option<Columns> {
+        self.completed(joints, Path::new("")).ok()
+    }
+
+    /// These columns with every empty list filled with the standard names.
     fn completed(&self, joints: usize, path: &Path) -> Result<Columns, LogError> {
-        let list = |list: &'static str, names: &Vec<String>| match names.len() {
+        let list = |list: &'static str, columns: &Vec<Column>| match columns.len() {
             0 => Ok(numbered(list, joints)),
-            named if named == joints => Ok(names.clone()),
+            named if named == joints => Ok(columns.clone()),
             named => Err(LogError::Mapping {
                 path: path.to_owned(),
                 list,
@@ -69,17 +86,30 @@ impl Columns {
         Ok(Columns {
             time: self.time.clone(),
             q: list("q", &self.q)?,
-            qd: list("qd", &self.qd)?,
+            qd: self.qd.as_ref().map(|qd| list("qd", qd)).transpose()?,
             tau: list("tau", &self.tau)?,
         })
     }
 }
 
-fn numbered(prefix: &str, joints: usize) -> Vec<String> {
-    (1..=joints)
-        .map(|joint| format!("{prefix}{joint}"))
+fn numbered(prefix: &str, joints: usize) -> Vec<Column> {
+    let joints = 1..=joints;
+    joints
+        .map(|joint| Column::named(format!("{prefix}{joint}")))
         .collect()
 }
+
+/// Where one column of a channel stands in a row, and what its numbers become.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cell {
+    pub index: usize,
+    pub scale: f64,
+    pub wrapped: bool,
+}
+
+/// Words in the names of columns that hold torques, and of those that hold velocities.
+const LIKE_TORQUE: &[&str] = &["tau", "torque", "effort"];
+const LIKE_VELOCITY: &[&str] = &["qd", "dq", "vel", "speed", "omega", "rpm", "dot"];
 
 /// The header of a file, and its line.
 pub(super) struct Header<'a> {
@@ -88,14 +118,15 @@ pub(super) struct Header<'a> {
     pub names: Vec<String>,
 }
 
-/// Indices of the channels into a row's cells.
-#[derive(Debug, PartialEq, Eq)]
+/// Where the channels stand in a row.
+#[derive(Debug, PartialEq)]
 pub(super) struct Layout {
-    pub time: usize,
-    pub q: Vec<usize>,
-    pub qd: Vec<usize>,
+    pub time: Cell,
+    pub q: Vec<Cell>,
+    /// `None` where velocities come from the angles.
+    pub qd: Option<Vec<Cell>>,
     /// `None` for the log of a passive rig, which has no torque columns.
-    pub tau: Option<Vec<usize>>,
+    pub tau: Option<Vec<Cell>>,
     /// Names of the columns that nothing reads.
     pub ignored: Vec<String>,
 }
@@ -108,20 +139,20 @@ impl Header<'_> {
         if columns == Columns::standard(joints) {
             self.check_joint_count(joints)?;
         }
-        let all = |names: &[String], list| {
-            let find = |name: &String| self.find(name, list, &columns);
-            names.iter().map(find).collect::<Result<Vec<_>, _>>()
+        let all = |list: &[Column], quantity| {
+            let find = |column: &Column| self.find(column, quantity, &columns);
+            list.iter().map(find).collect::<Result<Vec<_>, _>>()
         };
-        let passive = columns.tau == numbered("tau", joints) && self.has_no_torque();
+        let standard = Columns::standard(joints);
+        let passive = columns.tau == standard.tau && !self.has_one_like(LIKE_TORQUE);
+        let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY);
+        let qd = columns.qd.as_deref().filter(|_| !still);
+        let tau = Some(&columns.tau).filter(|_| !passive);
         Ok(Layout {
-            time: self.find(&columns.time, "time", &columns)?,
-            q: all(&columns.q, "q")?,
-            qd: all(&columns.qd, "qd")?,
-            tau: if passive {
-                None
-            } else {
-                Some(all(&columns.tau, "tau")?)
-            },
+            time: self.find(&columns.time, Quantity::Time, &columns)?,
+            q: all(&columns.q, Quantity::Angle)?,
+            qd: qd.map(|qd| all(qd, Quantity::Velocity)).transpose()?,
+            tau: tau.map(|tau| all(tau, Quantity::Torque)).transpose()?,
             ignored: self.others(&columns),
         })
     }
@@ -162,36 +193,44 @@ impl Header<'_> {
         Ok(())
     }
 
-    /// Whether no column looks like a torque. A torque under an unexpected name must not turn a
-    /// driven rig into a passive one silently.
-    fn has_no_torque(&self) -> bool {
-        let like_torque = |name: &String| {
+    /// Whether the name of some column holds one of these words. A torque or a velocity under an unexpected name must
+    /// not be passed over silently.
+    fn has_one_like(&self, words: &[&str]) -> bool {
+        let is_like = |name: &String| {
             let name = name.to_lowercase();
-            ["tau", "torque", "effort"]
-                .iter()
-                .any(|word| name.contains(word))
+            words.iter().any(|word| name.contains(word))
         };
-        !self.names.iter().any(like_torque)
+        self.names.iter().any(is_like)
     }
 
-    fn find(&self, name: &String, list: &str, columns: &Columns) -> Result<usize, LogError> {
+    fn find(
+        &self,
+        wanted: &Column,
+        quantity: Quantity,
+        columns: &Columns,
+    ) -> Result<Cell, LogError> {
+        let name = &wanted.name;
         let mut places = (0..self.names.len()).filter(|&index| self.names[index] == *name);
         let (path, line, column) = (self.path.to_owned(), self.line, name.clone());
         match (places.next(), places.next()) {
-            (Some(index), None) => Ok(index),
+            (Some(index), None) => Ok(Cell {
+                index,
+                scale: wanted.scale(quantity),
+                wrapped: wanted.wrapped,
+            }),
             (Some(_), Some(_)) => Err(LogError::DuplicateColumn { path, line, column }),
             (None, _) => Err(LogError::MissingColumn {
                 path,
                 line,
                 column,
-                remedy: self.remedy(name, list, &self.others(columns)),
+                remedy: self.remedy(name, quantity, &self.others(columns)),
             }),
         }
     }
 
     /// Points to the nearest of the names that are `free` (no other channel's) where one is near, and
     /// to all names otherwise.
-    fn remedy(&self, wanted: &str, list: &str, free: &[String]) -> String {
+    fn remedy(&self, wanted: &str, quantity: Quantity, free: &[String]) -> String {
         let nearest = free
             .iter()
             .map(|name| (likeness(name, wanted), name))
@@ -199,9 +238,12 @@ impl Header<'_> {
             .filter(|(likeness, _)| *likeness >= 0.5)
             .map(|(_, name)| name);
         let example = nearest.map_or("NAME", String::as_str);
-        let entry = match list {
-            "time" => format!("time = {example:?}"),
-            list => format!("{list} = [{example:?}]"),
+        let entry = match quantity {
+            Quantity::Time => format!("time = {example:?}"),
+            Quantity::Velocity => {
+                format!("qd = [{example:?}], or qd = [] to take velocities from the angles")
+            }
+            list => format!("{} = [{example:?}]", list.key()),
         };
         let known = match nearest {
             Some(name) => format!("did you mean {name:?}?"),
@@ -211,7 +253,7 @@ impl Header<'_> {
     }
 
     fn others(&self, columns: &Columns) -> Vec<String> {
-        let used = |name: &&String| columns.in_file_order().any(|wanted| wanted == *name);
+        let used = |name: &&String| columns.in_file_order().any(|wanted| wanted.name == **name);
         let unused = self.names.iter().filter(|name| !used(name));
         unused.cloned().collect()
     }
@@ -236,6 +278,15 @@ mod tests {
         header.layout(joints, columns)
     }
 
+    fn cell(index: usize) -> Cell {
+        let (scale, wrapped) = (1.0, false);
+        Cell {
+            index,
+            scale,
+            wrapped,
+        }
+    }
+
     fn message(header: &str, joints: usize) -> String {
         layout(header, joints, &Columns::default())
             .unwrap_err()
@@ -246,10 +297,10 @@ mod tests {
     fn order_is_free_and_extra_columns_are_named() {
         let found = layout("tau1,note,qd1,q1,time", 1, &Columns::default()).unwrap();
         let expected = Layout {
-            time: 4,
-            q: vec![3],
-            qd: vec![2],
-            tau: Some(vec![0]),
+            time: cell(4),
+            q: vec![cell(3)],
+            qd: Some(vec![cell(2)]),
+            tau: Some(vec![cell(0)]),
             ignored: vec!["note".to_owned()],
         };
         assert_eq!(found, expected);
@@ -260,7 +311,7 @@ mod tests {
         assert_eq!(
             message("time,q1,dq1,tau1", 1),
             "rig.csv, line 1: there is no column \"qd1\"; did you mean \"dq1\"? Rename it, or name it \
-             under [columns] in the model file: qd = [\"dq1\"]"
+             under [columns] in the model file: qd = [\"dq1\"], or qd = [] to take velocities from the angles"
         );
         assert!(
             message("Time,q1,qd1,tau1", 1).ends_with("in the model file: time = \"Time\""),
@@ -290,14 +341,14 @@ mod tests {
     fn a_mapping_chooses_one_joint_of_many() {
         let columns = Columns {
             q: vec!["q2".into()],
-            qd: vec!["qd2".into()],
+            qd: Some(vec!["qd2".into()]),
             tau: vec!["tau2".into()],
             ..Columns::default()
         };
         let found = layout("time,q1,q2,qd1,qd2,tau1,tau2", 1, &columns).unwrap();
         assert_eq!(
             (found.q, found.qd, found.tau),
-            (vec![2], vec![4], Some(vec![6]))
+            (vec![cell(2)], Some(vec![cell(4)]), Some(vec![cell(6)]))
         );
     }
 
@@ -309,6 +360,19 @@ mod tests {
         );
         assert!(message("time,q1,qd1,torque_1", 1).contains("there is no column \"tau1\""));
         assert!(message("time,q1,q2,qd1,qd2,tau1", 2).contains("there is no column \"tau2\""));
+    }
+
+    #[test]
+    fn only_a_header_without_any_velocity_takes_them_from_the_angles() {
+        let none = layout("time,q1,tau1", 1, &Columns::default()).unwrap();
+        assert_eq!((none.qd, none.tau), (None, Some(vec![cell(2)])));
+        assert!(message("time,q1,velocity_1,tau1", 1).contains("there is no column \"qd1\""));
+        let from_angles = Columns {
+            qd: None,
+            ..Columns::default()
+        };
+        let found = layout("time,q1,qd1,tau1", 1, &from_angles).unwrap();
+        assert_eq!((found.qd, found.ignored), (None, vec!["qd1".to_owned()]));
     }
 
     #[test]

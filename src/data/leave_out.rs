@@ -164,6 +164,7 @@ mod tests {
             q: vec![],
             qd: vec![],
             tau: vec![],
+            masked: vec![],
             leave_out: vec![],
             notes: vec![],
         }

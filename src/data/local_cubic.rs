@@ -4,6 +4,9 @@
 //! fitted by least squares to the positions on either side has no lag, takes irregular sampling as it
 //! is, and follows accelerations that change over the window.
 
+use super::signal::differences;
+use super::statistics::median;
+
 /// Half width of the window that the fit reads \[s\]: 16 ms, or four median steps of slower logs.
 ///
 /// 16 ms is short against the swing of a desk-sized rig and long enough at 500 Hz to average an
@@ -73,6 +76,18 @@ pub fn local_cubic(
         slope: c1 / half_width_s,
         curvature: 2.0 * c2 / (half_width_s * half_width_s),
     })
+}
+
+/// The derivative of a channel at every row: the slope of the cubic fitted around it or, where there is none (ends, gaps),
+/// the difference of the rows on either side over the time between them. At least two rows.
+pub(super) fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
+    let half_width = half_width_s(median(&differences(time)));
+    let between = |a: usize, b: usize| (values[b] - values[a]) / (time[b] - time[a]);
+    let neighbours = |row: usize| between(row.saturating_sub(1), (row + 1).min(time.len() - 1));
+    let slope = |row| {
+        local_cubic(time, values, row, half_width).map_or_else(|| neighbours(row), |fit| fit.slope)
+    };
+    (0..time.len()).map(slope).collect()
 }
 
 /// Least-squares coefficients of 1, s, s^2, s^3; `None` if the points do not determine them.

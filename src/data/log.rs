@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::Columns;
 use super::error::{CellFault, LogError};
+use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
 use super::statistics::median;
 use crate::files::write_with;
@@ -52,6 +53,9 @@ pub struct Log {
     pub qd: Vec<Vec<f64>>,
     /// Joint torques \[N m\]; row i acts from `time[i]` to `time[i + 1]`.
     pub tau: Vec<Vec<f64>>,
+    /// Rows whose angles are not to be fitted, `[joint]`, in rising order: readings that jump, and rows put in where the
+    /// logger dropped some. Their angles are what the rows around them tell. May be empty: none in a log as it is read.
+    pub masked: Vec<Vec<usize>>,
     /// Intervals that are neither fitted nor scored, for instance because a person touched the rig.
     pub leave_out: Vec<Interval>,
     /// What a reader of the log should know about how it was read, one sentence each.
@@ -67,6 +71,7 @@ impl Log {
             q: vec![Vec::new(); joints],
             qd: vec![Vec::new(); joints],
             tau: vec![Vec::new(); joints],
+            masked: vec![Vec::new(); joints],
             leave_out: Vec::new(),
             notes: Vec::new(),
         }
@@ -106,6 +111,32 @@ impl Log {
         self.path.as_os_str() == name || self.name() == name
     }
 
+    /// Whether the angle of a joint, counted from 0, is not to be fitted at a row.
+    pub fn is_masked(&self, joint: usize, row: usize) -> bool {
+        let rows = self.masked.get(joint);
+        rows.is_some_and(|rows| rows.binary_search(&row).is_ok())
+    }
+
+    /// The log as fits read it: readings that jump are masked, and rows that the logger dropped are put in, or left out
+    /// with the windows of `window_s` around them.
+    #[must_use]
+    pub fn for_fits(&self, window_s: f64) -> Log {
+        self.without_jumps().completed(window_s)
+    }
+
+    /// The log with angles that jump for a single row masked.
+    pub(super) fn without_jumps(&self) -> Log {
+        let mut log = self.clone();
+        for (q, masked) in log.q.iter_mut().zip(&mut log.masked) {
+            let rows = rows_that_jump(q);
+            bridge(&self.time, q, &rows);
+            masked.extend(rows);
+            masked.sort_unstable();
+            masked.dedup();
+        }
+        log
+    }
+
     /// Writes the log as CSV with the standard header `time,q1..,qd1..,tau1..`.
     ///
     /// Every number is the shortest text that reads back as the same number. The text goes to a
@@ -131,13 +162,13 @@ impl Log {
 
     fn check_finite(&self, path: &Path) -> Result<(), LogError> {
         let names = Columns::standard(self.joints());
-        for (name, values) in names.in_file_order().zip(self.columns()) {
+        for (column, values) in names.in_file_order().zip(self.columns()) {
             if let Some(row) = values.iter().position(|value| !value.is_finite()) {
                 return Err(LogError::Cell {
                     path: path.to_owned(),
                     // The header is line 1.
                     line: row + 2,
-                    column: name.clone(),
+                    column: column.name.clone(),
                     fault: CellFault::NotFinite(values[row].to_string()),
                 });
             }
@@ -147,7 +178,7 @@ impl Log {
 
     fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {
         let names = Columns::standard(self.joints());
-        let header: Vec<&str> = names.in_file_order().map(String::as_str).collect();
+        let header: Vec<&str> = names.in_file_order().map(|column| &*column.name).collect();
         writeln!(out, "{}", header.join(","))?;
         for row in 0..self.rows() {
             // `{:?}` of a float is its shortest text that reads back the same, with an exponent
@@ -175,6 +206,7 @@ mod tests {
             q: vec![vec![1.0, -1e-300, 3.5], vec![0.1, 0.2, 1.0 / 3.0]],
             qd: vec![vec![0.0; 3], vec![1e22, 0.0, -7.25]],
             tau: vec![vec![0.0; 3], vec![0.5; 3]],
+            masked: vec![vec![]; 2],
             leave_out: vec![],
             notes: vec![],
         }

@@ -9,9 +9,12 @@
 //! The torque of row `i` acts from `time[i]` to `time[i + 1]` (zero-order hold).
 
 mod audit;
+mod column;
 mod columns;
+mod dropped;
 mod error;
 mod joint;
+mod jumps;
 mod lag;
 pub mod leave_out;
 mod local_cubic;
@@ -23,9 +26,10 @@ pub(crate) mod statistics;
 mod trajectory;
 
 pub use audit::{
-    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Severity, TorqueDemand, TorqueLag,
-    VelocityCheck, audit,
+    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Response, Severity, TorqueDemand,
+    TorqueLag, VelocityCheck, audit,
 };
+pub use column::{Column, Quantity};
 pub use columns::Columns;
 pub use error::{CellFault, LogError};
 pub use joint::Joint;

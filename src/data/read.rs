@@ -3,13 +3,16 @@
 //! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and
 //! blank lines. Everything else that is not a complete table of finite numbers is an error.
 
+use std::f64::consts::TAU;
 use std::fs;
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord};
 
-use super::columns::{Columns, Header, Layout};
+use super::column::unwrap;
+use super::columns::{Cell, Columns, Header, Layout};
 use super::error::{CellFault, LogError};
+use super::local_cubic::slopes;
 use super::log::Log;
 
 impl Log {
@@ -17,24 +20,42 @@ impl Log {
     ///
     /// Columns may stand in any order. Columns that nothing asks for are ignored, and a note names
     /// them. A file without any torque column is the log of a passive rig: its torques are zero, and
-    /// a note says so.
+    /// a note says so. Without any velocity column, velocities are the slopes of cubics fitted to the angles.
     ///
     /// # Errors
     /// A [`LogError`] that names file, line, column, fault and remedy, for anything that is not a
     /// table of finite numbers with strictly increasing time and the asked number of joints.
     pub fn read(path: impl AsRef<Path>, joints: usize, columns: &Columns) -> Result<Log, LogError> {
         let path = path.as_ref();
-        let bytes = fs::read(path).map_err(|why| LogError::Open {
-            path: path.to_owned(),
-            why,
-        })?;
-        let text = std::str::from_utf8(&bytes).map_err(|error| LogError::NotUtf8 {
-            path: path.to_owned(),
-            line: line_at(&bytes, error.valid_up_to()),
-        })?;
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let text = &text_of(path)?;
         Table { path, text }.log(joints, columns)
     }
+
+    /// Reads a CSV file with the standard columns, of as many joints as its header has.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn read_standard(path: impl AsRef<Path>) -> Result<Log, LogError> {
+        let path = path.as_ref();
+        let text = &text_of(path)?;
+        let table = Table { path, text };
+        let joints = table.rows()?.first().map_or(0, Row::joints);
+        // A header of no joint lacks the first.
+        table.log(joints.max(1), &Columns::default())
+    }
+}
+
+/// The text of a file, without a byte order mark.
+fn text_of(path: &Path) -> Result<String, LogError> {
+    let bytes = fs::read(path).map_err(|why| LogError::Open {
+        path: path.to_owned(),
+        why,
+    })?;
+    let text = std::str::from_utf8(&bytes).map_err(|error| LogError::NotUtf8 {
+        path: path.to_owned(),
+        line: line_at(&bytes, error.valid_up_to()),
+    })?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned())
 }
 
 /// The text of a log and its path.
@@ -62,23 +83,35 @@ impl Table<'_> {
             return Err(LogError::TooFewRows { path, rows });
         }
         rows.iter().try_for_each(|row| row.check_width(&header))?;
-        let column = |&index: &usize| -> Result<Vec<f64>, LogError> {
-            rows.iter().map(|row| row.number(&header, index)).collect()
+        let column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
+            let number = |row: &Row| Ok(cell.scale * row.number(&header, cell.index)?);
+            rows.iter().map(number).collect()
         };
-        let channel = |indices: &[usize]| indices.iter().map(column).collect::<Result<Vec<_>, _>>();
+        let channel = |cells: &[Cell]| cells.iter().map(column).collect::<Result<Vec<_>, _>>();
         let time = column(&layout.time)?;
-        check_time(&rows, &time, &header.names[layout.time])?;
+        check_time(&rows, &time, &header.names[layout.time.index])?;
+        let (mut q, mut notes) = (channel(&layout.q)?, notes(&layout));
+        for (angles, cell) in q.iter_mut().zip(&layout.q).filter(|(_, cell)| cell.wrapped) {
+            let (name, passed) = (&header.names[cell.index], unwrap(angles, TAU));
+            notes.push(format!(
+                "{name} passes the end of its turn {passed} times: full turns are counted"
+            ));
+        }
         Ok(Log {
             path,
-            q: channel(&layout.q)?,
-            qd: channel(&layout.qd)?,
+            qd: match &layout.qd {
+                Some(qd) => channel(qd)?,
+                None => q.iter().map(|q| slopes(&time, q)).collect(),
+            },
             tau: match &layout.tau {
                 Some(tau) => channel(tau)?,
                 None => vec![vec![0.0; time.len()]; joints],
             },
+            masked: vec![vec![]; joints],
+            q,
             time,
             leave_out: vec![],
-            notes: notes(&layout),
+            notes,
         })
     }
 
@@ -133,6 +166,13 @@ impl Row<'_> {
         cells.map(|cell| bare(cell).to_owned()).collect()
     }
 
+    /// How many joints have an angle, as a header: `q1`, `q2` and so on.
+    fn joints(&self) -> usize {
+        let names = self.names();
+        let has = |joint: &usize| names.contains(&format!("q{joint}"));
+        (1..).take_while(has).count()
+    }
+
     fn check_width(&self, header: &Header) -> Result<(), LogError> {
         if self.record.len() == header.names.len() {
             return Ok(());
@@ -183,6 +223,11 @@ fn notes(layout: &Layout) -> Vec<String> {
             .collect();
         notes.push(format!("columns ignored: {}", names.join(", ")));
     }
+    if layout.qd.is_none() {
+        notes.push(
+            "velocities come from the angles: slopes of cubics fitted around each row".to_owned(),
+        );
+    }
     if layout.tau.is_none() {
         notes.push("no torque columns: read as a passive rig, with zero torque".to_owned());
     }
@@ -219,6 +264,7 @@ fn line_at(bytes: &[u8], offset: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::column::Column;
     use super::*;
 
     fn read(text: &str, joints: usize) -> Result<Log, LogError> {
@@ -252,6 +298,47 @@ mod tests {
         let log = read("time,q1,qd1\n0,1,2\n1,1,2\n", 1).unwrap();
         assert_eq!(log.tau, [[0.0, 0.0]]);
         assert!(log.notes[0].contains("passive"));
+    }
+
+    #[test]
+    fn a_log_without_velocity_takes_it_from_the_angles_with_a_note() {
+        let rows: Vec<String> = (0..50)
+            .map(|i| f64::from(i) * 0.01)
+            .map(|t| format!("{t},{},0", 3.0 * t * t))
+            .collect();
+        let log = read(&format!("time,q1,tau1\n{}\n", rows.join("\n")), 1).unwrap();
+        let off = |row: usize| (log.qd[0][row] - 6.0 * log.time[row]).abs();
+        // At the ends a difference of neighbours is half a step late: 6 rad/s^2 * 5 ms.
+        assert!((4..46).all(|row| off(row) < 1e-9) && (0..50).all(|row| off(row) < 0.031));
+        assert!(log.notes[0].contains("velocities come from the angles"));
+    }
+
+    #[test]
+    fn units_factors_and_turns_are_read() {
+        let columns = Columns {
+            time: Column {
+                unit: Some("us"),
+                ..Column::named("time")
+            },
+            q: vec![Column {
+                unit: Some("deg"),
+                wrapped: true,
+                ..Column::named("q1")
+            }],
+            tau: vec![Column {
+                factor: -2.0,
+                ..Column::named("tau1")
+            }],
+            ..Columns::default()
+        };
+        let (path, text) = (
+            Path::new("rig.csv"),
+            "time,q1,qd1,tau1\n0,170,1,5\n1e4,-170,1,6\n",
+        );
+        let log = Table { path, text }.log(1, &columns).unwrap();
+        assert!((log.time[1] - 0.01).abs() < 1e-15);
+        assert!((log.q[0][1].to_degrees() - 190.0).abs() < 1e-9);
+        assert_eq!((log.qd[0][1], log.tau[0][1]), (1.0, -12.0));
     }
 
     #[test]

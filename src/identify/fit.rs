@@ -5,8 +5,8 @@ use super::shooting::Shooting;
 use super::values::Values;
 use crate::model::Dynamics;
 
-/// Most steps of one fit; Gauss-Newton on such problems needs 3 to 15.
-const MOST_STEPS: usize = 40;
+/// Most steps of one fit; Gauss-Newton on such problems needs 3 to 30.
+const MOST_STEPS: usize = 100;
 
 /// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `locals`, with every window's
 /// start state (and forces) free. `scale` fixes the scale of the residuals; without it, it is estimated by their median

@@ -23,7 +23,7 @@ pub(super) struct Pack {
     /// `[row][joint]`
     tau: Vec<Vec<Lane>>,
     pub q: Vec<Vec<Lane>>,
-    /// `[row][joint]`: 1 / noise, or 0 where the lane has no such row.
+    /// `[row][joint]`: 1 / noise, or 0 where the lane has no such row or its log masks it.
     pub weight: Vec<Vec<Lane>>,
 }
 
@@ -63,7 +63,8 @@ impl Pack {
                 for j in 0..n {
                     pack.tau[row][j][lane] = log.tau[j][at];
                     pack.q[row][j][lane] = log.q[j][at];
-                    let counts = lane < members.len() && row < window.rows();
+                    let masked = log.is_masked(j, at);
+                    let counts = lane < members.len() && row < window.rows() && !masked;
                     pack.weight[row][j][lane] = if counts { 1.0 / noise[j] } else { 0.0 };
                 }
             }

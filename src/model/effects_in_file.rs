@@ -2,7 +2,7 @@
 
 use super::dynamics::OwnValue;
 use super::effect::{Effect, EffectParameter};
-use super::fitted::FittedEffect;
+use super::fitted::{FittedEffect, Status};
 use super::reader::{FileError, Section};
 use super::sections::interval;
 use crate::data::Joint;
@@ -31,7 +31,7 @@ fn fitted(
     let Some(joint) = joint.filter(|joint| joint.is_of(joints)) else {
         return Err(section.error_at("joint", format!("`joint` is a number from 1 to {joints}")));
     };
-    let mut known = vec!["name", "joint", "fixed"];
+    let mut known = vec!["name", "joint", "fixed", "status"];
     known.extend(effect.parameters.iter().map(|p| p.name.as_str()));
     section.only(&known)?;
     let values = effect
@@ -49,7 +49,20 @@ fn fitted(
         values,
         own: own.concat(),
         fixed: section.flag("fixed")?,
+        status: status(section)?,
     })
+}
+
+/// `status = "established"`, as closing the loop writes it.
+fn status(section: &Section<'_>) -> Result<Option<Status>, FileError> {
+    let Some(name) = section.text("status")? else {
+        return Ok(None);
+    };
+    let unknown = || {
+        let message = "`status` is \"established\" or \"supported\"";
+        section.error_at("status", message.to_owned())
+    };
+    Status::named(&name.value).map(Some).ok_or_else(unknown)
 }
 
 /// `F_c = 0.16` or `F_c = { value = 0.16, ci95 = [0.15, 0.17] }`.

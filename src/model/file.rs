@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::columns_in_file::columns;
 use super::effect::Effect;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Equations, Model};
@@ -47,7 +48,7 @@ impl Model {
             joints,
             prismatic: sections::prismatic(&section, joints)?,
             sign_width: sections::sign_width(&section, joints)?,
-            columns: sections::columns(top.section("columns")?, joints)?,
+            columns: columns(top.section("columns")?, joints)?,
             parameters: sections::parameters(top.section("parameters")?)?,
             effects: effects_in_file::read(&top, joints, library)?,
             hidden: sections::hidden(top.section("residual")?, joints)?,

@@ -7,6 +7,31 @@ use super::filter::CommandFilter;
 use crate::data::Joint;
 use crate::expr::{Graph, Program, Scope, SignForm};
 
+/// Whether an effect that was found may be relied on by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Significant among all candidates, and confirmed on stretches that its size was not fitted to.
+    Established,
+    /// Lowers the loss on stretches left out of the fit, but is not significant, or not confirmed.
+    Supported,
+}
+
+impl Status {
+    const ALL: [Self; 2] = [Self::Established, Self::Supported];
+
+    /// As model files and reports write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Established => "established",
+            Self::Supported => "supported",
+        }
+    }
+
+    pub(super) fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
+}
+
 /// An effect on a joint of a model, with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedEffect {
@@ -18,6 +43,8 @@ pub struct FittedEffect {
     pub own: Vec<OwnValue>,
     /// Held at these values in every fit.
     pub fixed: bool,
+    /// How sure it is, where closing the loop found it.
+    pub status: Option<Status>,
 }
 
 impl FittedEffect {
@@ -29,6 +56,7 @@ impl FittedEffect {
             values: vec![(0.0, None); effect.parameters.len()],
             own: Vec::new(),
             fixed: false,
+            status: None,
         }
     }
 
@@ -42,6 +70,11 @@ impl FittedEffect {
         let filter = matches!(self.effect.entry, Entry::Command(_));
         let same_filter = filter && self.effect.entry == other.effect.entry;
         self.label() == other.label() || same_filter && self.joint == other.joint
+    }
+
+    /// Whether the other effect is a special case of this one, on the same joint.
+    pub fn contains(&self, other: &Self) -> bool {
+        self.joint == other.joint && self.effect.contains.contains(&other.effect.name)
     }
 
     /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.

@@ -27,6 +27,14 @@ impl Library {
         }
     }
 
+    /// A library without effects and probes, in which nothing can be found.
+    pub fn empty() -> Self {
+        Self {
+            effects: Vec::new(),
+            probes: Vec::new(),
+        }
+    }
+
     /// Add every `*.toml` of a folder; an effect of a known name replaces the known one.
     ///
     /// # Errors

@@ -2,6 +2,7 @@
 
 mod assemble;
 pub mod chain;
+mod columns_in_file;
 mod dynamics;
 mod effect;
 mod effect_file;
@@ -24,7 +25,7 @@ mod written;
 pub use dynamics::{Dynamics, OwnValue, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use filter::{CommandFilter, Filter};
-pub use fitted::FittedEffect;
+pub use fitted::{FittedEffect, Status};
 pub use library::Library;
 pub(crate) use network::to_f32;
 pub use network::{

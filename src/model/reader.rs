@@ -29,6 +29,12 @@ impl fmt::Display for FileError {
     }
 }
 
+/// A name alone, or a table that says more about what it names.
+pub(super) enum NameOrTable<'a> {
+    Name(Located<String>),
+    Table(Section<'a>),
+}
+
 /// A file's text and name.
 pub(super) struct Document {
     pub path: PathBuf,
@@ -228,6 +234,19 @@ impl<'a> Section<'a> {
         self.list(key, "a list of texts", Self::text_of)
     }
 
+    pub fn name_or_table(&self, key: &str) -> Result<Option<NameOrTable<'a>>, FileError> {
+        self.optional(key, Self::name_or_table_of)
+    }
+
+    pub fn names_or_tables(&self, key: &str) -> Result<Option<Vec<NameOrTable<'a>>>, FileError> {
+        self.list(key, "a list of names or tables", Self::name_or_table_of)
+    }
+
+    pub fn is_empty_list(&self, key: &str) -> bool {
+        let list = self.get(key).and_then(|value| value.get_ref().as_array());
+        list.is_some_and(|list| list.is_empty())
+    }
+
     /// A list of lists of texts.
     pub fn matrix(&self, key: &str) -> Result<Option<Vec<Vec<Located<String>>>>, FileError> {
         let rows = "a list of rows";
@@ -359,6 +378,13 @@ impl<'a> Section<'a> {
             at: value.span().start,
             table: table.clone(),
         })
+    }
+
+    fn name_or_table_of(&self, key: &str, value: &Value<'a>) -> Result<NameOrTable<'a>, FileError> {
+        if value.get_ref().is_table() {
+            return self.table_of(key, value).map(NameOrTable::Table);
+        }
+        self.text_of(key, value).map(NameOrTable::Name)
     }
 
     fn text_of(&self, key: &str, value: &Value<'a>) -> Result<Located<String>, FileError> {

@@ -3,7 +3,6 @@
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Motion};
 use super::{MlpSettings, Parameter};
-use crate::data::Columns;
 use crate::expr::Formula;
 
 pub(super) const SYSTEM_KEYS: &[&str] = &["name", "about", "joints", "prismatic", "sign_width"];
@@ -49,35 +48,6 @@ pub(super) fn sign_width(
         }
         _ => Ok(widths),
     }
-}
-
-pub(super) fn columns(section: Option<Section<'_>>, joints: usize) -> Result<Columns, FileError> {
-    let mut columns = Columns::standard(joints);
-    let Some(section) = section else {
-        return Ok(columns);
-    };
-    section.only(&["time", "q", "qd", "tau"])?;
-    if let Some(time) = section.text("time")? {
-        columns.time = time.value;
-    }
-    for (key, names) in [
-        ("q", &mut columns.q),
-        ("qd", &mut columns.qd),
-        ("tau", &mut columns.tau),
-    ] {
-        let Some(given) = section.texts(key)? else {
-            continue;
-        };
-        if given.len() != joints {
-            let message = format!(
-                "`{key}` needs one column a joint: {joints}, found {}",
-                given.len()
-            );
-            return Err(section.error_at(key, message));
-        }
-        *names = given.into_iter().map(|text| text.value).collect();
-    }
-    Ok(columns)
 }
 
 pub(super) fn parameters(section: Option<Section<'_>>) -> Result<Vec<Parameter>, FileError> {

@@ -17,6 +17,9 @@ impl Model {
                 "\n[[effect]]\nname = \"{}\"\njoint = {}\n",
                 effect.effect.name, effect.joint
             );
+            if let Some(status) = effect.status {
+                let _ = writeln!(text, "status = \"{}\"", status.name());
+            }
             for (k, parameter) in effect.effect.parameters.iter().enumerate() {
                 let (value, ci95) = effect.values[k];
                 let entry = value_and_interval(value, ci95) + &of_logs(effect, k);

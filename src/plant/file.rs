@@ -259,6 +259,7 @@ impl Plant {
             values: own,
             own: Vec::new(),
             fixed: false,
+            status: None,
         };
         self.system
             .check_effect(&new, &self.effects)

@@ -68,7 +68,7 @@ fn put_all(
             model_toml: model_file(outcome),
             ..origin.clone()
         };
-        learned.save(&folder.join(CHECKPOINT), &origin)?;
+        learned.network.save(&folder.join(CHECKPOINT), &origin)?;
     }
     Ok(())
 }

@@ -4,9 +4,10 @@ use super::calibration::CalibrationEntry;
 use super::schema::{
     AlternativeEntry, AuditEntry, ContenderEntry, ContradictedEntry, EffectEntry, EffectName,
     ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry, LogsEntry,
-    ModelError, NormEntry, ParameterEntry, Report, TriedEntry, UnexplainedEntry, WithdrawnEntry,
+    ModelError, NormEntry, ParameterEntry, Report, TriedEntry, UnexplainedEntry,
 };
-use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, Withdrawn};
+use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, Tried};
+use crate::data::{Audit, Log};
 use crate::identify::{Fit, FitError};
 use crate::model::{FittedEffect, Origin, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
@@ -38,8 +39,7 @@ impl Report {
                 .iter()
                 .map(alternative)
                 .collect(),
-            withdrawn: outcome.effects.withdrawn.iter().map(withdrawn).collect(),
-            confirmed_on: outcome.effects.confirmed_on,
+            supported: outcome.effects.supported.iter().map(effect).collect(),
             unexplained: left(outcome),
             parameters: model.parameters.iter().map(parameter).collect(),
             contradicted: outcome
@@ -69,6 +69,10 @@ impl Report {
                 })
                 .collect(),
             tried: tried(outcome),
+            network: outcome
+                .learned
+                .as_ref()
+                .map(|learned| learned.check.clone()),
             calibration: outcome.calibration.as_ref().map(CalibrationEntry::new),
             files: FilesEntry {
                 model: MODEL,
@@ -89,6 +93,7 @@ fn effect(finding: &Finding) -> EffectEntry {
         p_value: finding.p_value,
         error_reduction: finding.error_reduction.as_ref().ok().copied(),
         error_reduction_failure: (finding.error_reduction.as_ref().err()).map(ToString::to_string),
+        not_established: finding.reason.clone(),
     }
 }
 
@@ -125,13 +130,6 @@ fn effect_name(effect: &FittedEffect) -> EffectName {
         name: effect.effect.name.clone(),
         joint: effect.joint,
         parameter: shifted(effect),
-    }
-}
-
-fn withdrawn(withdrawn: &Withdrawn) -> WithdrawnEntry {
-    WithdrawnEntry {
-        effect: effect_name(&withdrawn.effect),
-        reason: withdrawn.reason.clone(),
     }
 }
 
@@ -223,7 +221,7 @@ fn model_error(summary: Summary) -> ModelError {
 }
 
 fn logs(outcome: &Outcome) -> LogsEntry {
-    let entry = |log: &crate::data::Log| LogEntry {
+    let entry = |(log, audit): (&Log, &Audit)| LogEntry {
         name: log.name(),
         rows: log.rows(),
         start_s: log.time.first().copied().unwrap_or(0.0),
@@ -233,23 +231,29 @@ fn logs(outcome: &Outcome) -> LogsEntry {
             .iter()
             .map(|span| [span.start_s, span.end_s])
             .collect(),
+        jumps: audit.joints.iter().map(|joint| joint.q.spikes).collect(),
+        dropped_rows: audit.dropped_rows,
     };
+    let (of_train, of_test) = outcome.given.audits.split_at(outcome.given.train.len());
     LogsEntry {
-        train: outcome.given.train.iter().map(entry).collect(),
-        test: outcome.given.test.iter().map(entry).collect(),
+        train: outcome
+            .given
+            .train
+            .iter()
+            .zip(of_train)
+            .map(entry)
+            .collect(),
+        test: outcome.given.test.iter().zip(of_test).map(entry).collect(),
         split: outcome.given.split.clone(),
     }
 }
 
 fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
-    let round = |round: &crate::closeloop::Round| {
-        let entry = |(i, evidence): (usize, &crate::closeloop::Evidence)| TriedEntry {
-            effect: effect_name(&evidence.effect),
-            gain: evidence.gain,
-            p_value: evidence.p_value,
-            chosen: round.chosen == Some(i),
-        };
-        round.evidence.iter().enumerate().map(entry).collect()
+    let entry = |tried: &Tried| TriedEntry {
+        effects: tried.effects.iter().map(effect_name).collect(),
+        gain: tried.gain,
+        chosen: tried.chosen,
     };
+    let round = |round: &Round| round.tried.iter().map(entry).collect();
     outcome.effects.rounds.iter().map(round).collect()
 }

@@ -30,7 +30,7 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
         (Role::After, WITH_EFFECTS, fitted.after.model.dynamics()),
     ];
     if let Some(learned) = &outcome.learned {
-        models.push((Role::Hybrid, WITH_NETWORK, learned.hybrid().clone()));
+        models.push((Role::Hybrid, WITH_NETWORK, learned.network.hybrid().clone()));
     }
     let panel = |joint: Joint| Panel {
         joint,

@@ -24,9 +24,10 @@ pub(super) fn remainder(outcome: &Outcome) -> String {
         ),
         _ => format!("The residuals cannot be told from sensor noise (p = {p})."),
     };
-    let network = match &outcome.errors.hybrid {
-        Some(hybrid) if hybrid.position_rms() > 1.01 * outcome.errors.after.position_rms() => {
-            "The residual network raises the error on the test logs: use model.toml rather than the checkpoint.\n"
+    let network = match &outcome.learned {
+        Some(learned) if !learned.check.used => {
+            "No residual network lowers the error on parts of the training logs that it was not trained on: the hybrid \
+             model is the one without a network.\n"
         }
         _ => "",
     };

@@ -8,7 +8,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::calibration::CalibrationEntry;
-use crate::closeloop::{Curve, Proposal, Separation, Settings, SplitMethod, Unexplained, Verdict};
+use crate::closeloop::{
+    Curve, NetworkCheck, Proposal, Separation, Settings, SplitMethod, Unexplained, Verdict,
+};
 use crate::data::{Finding as AuditFinding, Joint};
 
 /// The JSON schema (draft 2020-12) of [`Report`].
@@ -42,15 +44,13 @@ pub struct Report {
     pub(super) verdict: Verdict,
     /// why, in a sentence
     pub(super) reason: String,
-    /// what the model lacks, in the order in which it was found
+    /// what the model lacks: established effects
     pub(super) effects: Vec<EffectEntry>,
     /// other explanations that these logs do not rule out
     pub(super) alternatives: Vec<AlternativeEntry>,
-    /// effects that were selected and then withdrawn
-    #[serde(rename = "taken_back")]
-    pub(super) withdrawn: Vec<WithdrawnEntry>,
-    /// number of stretches of two seconds, not used to select the effects, that confirm them
-    pub(super) confirmed_on: usize,
+    /// effects that lower the error on logs left out of the fit without being established: the model has them, but
+    /// their names are not to be relied on
+    pub(super) supported: Vec<EffectEntry>,
     pub(super) unexplained: UnexplainedEntry,
     /// parameters of the declared equations, as refitted
     pub(super) parameters: Vec<ParameterEntry>,
@@ -65,8 +65,10 @@ pub struct Report {
     pub(super) logs: LogsEntry,
     /// what the audit found, log by log
     pub(super) audit: Vec<AuditEntry>,
-    /// candidates that were fitted, one list a round of the search
+    /// sets of effects that were fitted, one list a round of the search
     pub(super) tried: Vec<Vec<TriedEntry>>,
+    /// errors by which the residual network is used or not; null where none is trained
+    pub(super) network: Option<NetworkCheck>,
     /// what the training logs could show (--calibrate); null where it was not asked for
     pub(super) calibration: Option<CalibrationEntry>,
     /// paths in the folder of this report
@@ -90,6 +92,9 @@ pub(super) struct EffectEntry {
     /// why that refit failed
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_reduction_failure: Option<String>,
+    /// of an effect that is only supported: what is missing
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_established: Option<String>,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]
@@ -133,13 +138,6 @@ pub(super) struct AlternativeEntry {
     pub experiment: String,
     /// its figures, from simulation; null for alternatives that others come before
     pub separation: Option<Separation>,
-}
-
-#[derive(Debug, Serialize, JsonSchema)]
-pub(super) struct WithdrawnEntry {
-    #[serde(flatten)]
-    pub effect: EffectName,
-    pub reason: String,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]
@@ -258,6 +256,10 @@ pub(super) struct LogEntry {
     pub end_s: f64,
     /// intervals left out, start and end in s
     pub leave_out: Vec<[f64; 2]>,
+    /// angles that jump for a single row, one number a joint: masked in fits, scored in test logs
+    pub jumps: Vec<usize>,
+    /// rows that the logger dropped: put in or left out in fits; in test logs the torque is held over them
+    pub dropped_rows: usize,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]
@@ -268,13 +270,11 @@ pub(super) struct AuditEntry {
 
 #[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct TriedEntry {
-    #[serde(flatten)]
-    pub effect: EffectName,
-    /// relative fall of the loss on held-out stretches
+    pub effects: Vec<EffectName>,
+    /// relative fall of the loss on held-out stretches, from that of the set which the round began with
     #[schemars(range(max = 1))]
     pub gain: f64,
-    #[schemars(range(min = 0, max = 1))]
-    pub p_value: f64,
+    /// whether the next round begins with it
     pub chosen: bool,
 }
 

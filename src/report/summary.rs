@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use super::calibration::line;
 use super::remainder::proposal_line;
-use super::text::headline;
+use super::text::{headline, serious};
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
 use crate::data::Joint;
@@ -15,6 +15,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         headline(outcome).replace("**", ""),
         outcome.reason
     );
+    out = serious(outcome).replace("**", "") + &out;
     for finding in &outcome.effects.findings {
         let (name, joint) = (finding.effect.title(), finding.effect.joint);
         let _ = writeln!(

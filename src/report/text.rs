@@ -5,14 +5,15 @@ use super::calibration::section;
 use super::remainder::remainder;
 use super::wording::{capitalised, listed, probability, reduction, values};
 use crate::closeloop::{Finding, Outcome, SplitMethod, Verdict};
-use crate::data::Severity;
+use crate::data::{Audit, Severity};
+use crate::model::FittedEffect;
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
     let sections = [
         answer(outcome),
         effects(&outcome.effects.findings),
-        confirmed(outcome),
+        supported(outcome),
         errors(outcome),
         parameters(outcome),
         contradicted(outcome),
@@ -31,10 +32,27 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 
 fn answer(outcome: &Outcome) -> String {
     format!(
-        "# {}: {}\n\n{}.\n\n",
+        "# {}: {}\n\n{}{}.\n\n",
         outcome.models.after.model.name,
         headline(outcome),
+        serious(outcome),
         capitalised(&outcome.reason)
+    )
+}
+
+/// What makes results wrong unless something is done about it, as a list to stand above them.
+pub(super) fn serious(outcome: &Outcome) -> String {
+    let of_log = |audit: &Audit| -> Vec<String> {
+        let line = |finding| format!("- **{}**: {finding}\n", audit.log);
+        audit.serious().map(line).collect()
+    };
+    let lines: Vec<String> = outcome.given.audits.iter().flat_map(of_log).collect();
+    if lines.is_empty() {
+        return String::new();
+    }
+    format!(
+        "Serious findings about the logs, to be mended first:\n\n{}\n",
+        lines.concat()
     )
 }
 
@@ -99,66 +117,50 @@ fn alternatives(outcome: &Outcome) -> String {
     out + "\n"
 }
 
-fn confirmed(outcome: &Outcome) -> String {
-    let mut out = match (
-        outcome.effects.findings.is_empty(),
-        outcome.effects.confirmed_on,
-    ) {
-        (true, _) => String::new(),
-        (false, 0) => {
-            "The logs are too short to confirm the effects on data that did not select them.\n"
-                .into()
-        }
-        (false, stretches) => format!(
-            "Each effect also lowers the loss on {stretches} stretches of training data that did not select it.\n"
-        ),
-    };
-    for withdrawn in &outcome.effects.withdrawn {
-        let (label, reason) = (withdrawn.effect.label(), &withdrawn.reason);
+fn supported(outcome: &Outcome) -> String {
+    let supported = &outcome.effects.supported;
+    if supported.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "## Supported effects\n\nThese lower the loss on stretches left out of the fit and are in the model, but their \
+         names are not to be relied on.\n\n",
+    );
+    for finding in supported {
         let _ = writeln!(
             out,
-            "- **{label}** was selected and then withdrawn: {reason}."
+            "- **{}** on joint {}, {}: {}.",
+            finding.effect.title(),
+            finding.effect.joint,
+            values(finding).join(", "),
+            finding.reason.as_deref().unwrap_or_default()
         );
     }
-    if out.is_empty() { out } else { out + "\n" }
+    out + "\n"
 }
 
 fn tried(outcome: &Outcome) -> String {
     let mut out = String::from(
         "## What was tried\n\nGain: relative fall of the loss on stretches held out of the fit.\n\n",
     );
-    let most_effects = outcome.given.settings.select.most_effects;
     for (number, round) in outcome.effects.rounds.iter().enumerate() {
         let _ = writeln!(
             out,
-            "Round {} ({} candidates; the most promising were fitted):\n\n| effect | joint | gain | p | |\n|---|---|---|---|---|",
+            "Round {} ({} candidates; the sets that promised most were fitted):\n\n| effects | gain | |\n|---|---|---|",
             number + 1,
             round.candidates
         );
-        for (i, evidence) in round.evidence.iter().enumerate() {
+        for tried in &round.tried {
+            let effects: Vec<String> = tried.effects.iter().map(FittedEffect::label).collect();
             let _ = writeln!(
                 out,
-                "| {} | {} | {} | {} | {} |",
-                evidence.effect.title(),
-                evidence.effect.joint,
-                reduction(evidence.gain, "loss"),
-                probability(evidence.p_value),
-                if round.chosen == Some(i) { "added" } else { "" }
+                "| {} | {} | {} |",
+                effects.join(", "),
+                reduction(tried.gain, "loss"),
+                if tried.chosen { "chosen" } else { "" }
             );
         }
         out.push('\n');
-    }
-    if outcome.effects.rounds.len() == most_effects
-        && outcome
-            .effects
-            .rounds
-            .last()
-            .is_some_and(|r| r.chosen.is_some())
-    {
-        let _ = writeln!(
-            out,
-            "The search stopped at its limit of {most_effects} effects; there may be more.\n"
-        );
     }
     out
 }
@@ -200,7 +202,7 @@ fn logs(outcome: &Outcome) -> String {
             .iter()
             .filter(|f| f.severity != Severity::Info)
         {
-            let _ = writeln!(out, "  - {}", finding.text);
+            let _ = writeln!(out, "  - {finding}");
         }
     }
     out + "\n"

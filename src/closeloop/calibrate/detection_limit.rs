@@ -3,7 +3,6 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::{candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
-use crate::closeloop::split::set_aside;
 use crate::closeloop::study::Study;
 use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty, with_unit_diagonal};
 use crate::model::{Effect, FittedEffect};
@@ -49,15 +48,11 @@ pub(super) fn detection_limits(
     accepted: &Fitted,
     library: &[Effect],
 ) -> Result<Vec<DetectionLimit>, FitError> {
-    // The search chooses on this part alone.
-    let (chosen_by, _) = set_aside(study.logs, study.settings);
-    let mut part = study.on(&chosen_by);
-    part.identifiability = study.identifiability.clone();
-    let baseline = Baseline::new(&part, accepted)?;
-    let all = candidates(&part, library, &accepted.model.effects);
+    let baseline = Baseline::new(study, accepted)?;
+    let all = candidates(study, library, &accepted.model.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
     #[allow(clippy::cast_precision_loss)] // few trials
-    let level = study.settings.select.false_alarm / trials.max(1) as f64;
+    let level = study.settings.establish.false_alarm / trials.max(1) as f64;
     Ok(all
         .into_iter()
         .map(|candidate| {
@@ -157,8 +152,10 @@ impl<'a> Baseline<'a> {
     /// The smallest size of the last free value of a fit; `None` where the motion does not tell it from the others.
     fn smallest_by(&self, fit: &Fit, switches: usize, level: f64) -> Option<f64> {
         let Settings {
-            select, calibrate, ..
-        } = self.study.settings;
+            establish: settings,
+            calibrate,
+            ..
+        } = &self.study.settings;
         let power = calibrate.power;
         let information = own_information(fit, calibrate.own_information)?;
         let known = uncertainty(&self.study.shooting, fit);
@@ -169,8 +166,8 @@ impl<'a> Baseline<'a> {
             let worthwhile = (2.0 * self.loss * gain / (1.0 - gain) / information).sqrt();
             Some(significant.max(worthwhile) + power * deviation)
         };
-        let plain = needed(select.significant_alone, select.plain)?;
-        Some(needed(level, select.worthwhile)?.min(plain))
+        let plain = needed(settings.significant_alone, settings.plain)?;
+        Some(needed(level, settings.worthwhile)?.min(plain))
     }
 
     /// The accepted model with one more free value, a switch of the effect, at zero.

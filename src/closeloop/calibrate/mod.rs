@@ -18,7 +18,7 @@ use super::fitted::Fitted;
 use super::study::Study;
 use crate::data::Log;
 use crate::data::statistics::wilson;
-use crate::model::{FittedEffect, Library, Model};
+use crate::model::{FittedEffect, Library, Model, Status};
 
 /// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,7 +120,7 @@ pub fn calibrate(
             &format!("simulation {run} of the accepted model"),
         )?;
         unexplained += usize::from(found.unexplained.is_significant());
-        named.push(repeat.named(&found));
+        named.push(Repeat::named(&found));
     }
     for limit in &mut limits {
         if let Some(effect) = hidden(limit, multiple)
@@ -128,7 +128,7 @@ pub fn calibrate(
         {
             let text = format!("simulation with {}", limit.effect.label());
             let found = repeat.find(&logs, rng, &text)?;
-            limit.named = Some(repeat.named(&found));
+            limit.named = Some(Repeat::named(&found));
         }
     }
     Ok(Calibration {
@@ -169,7 +169,9 @@ impl Repeat<'_> {
         found
     }
 
-    fn named(&self, found: &Found) -> Vec<FittedEffect> {
-        found.chosen.after.model.effects[self.declared.effects.len()..].to_vec()
+    fn named(found: &Found) -> Vec<FittedEffect> {
+        let established = found.chosen.standings.iter();
+        let established = established.filter(|s| s.status == Status::Established);
+        established.map(|s| s.effect.clone()).collect()
     }
 }

@@ -90,6 +90,7 @@ fn apart(study: &Study<'_>) -> Vec<Log> {
             q: vec![Vec::new(); log.joints()],
             qd: vec![Vec::new(); log.joints()],
             tau: vec![Vec::new(); log.joints()],
+            masked: vec![Vec::new(); log.joints()],
             leave_out: Vec::new(),
             ..log.clone()
         };

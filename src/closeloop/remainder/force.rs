@@ -25,7 +25,7 @@ pub struct ForceSample {
 ///
 /// # Errors
 /// Logs without a stretch, or a model that diverges over one of them.
-pub(super) fn residual_force(
+pub(in crate::closeloop) fn residual_force(
     study: &Study<'_>,
     fitted: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {

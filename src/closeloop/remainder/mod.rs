@@ -9,6 +9,7 @@ mod unexplained;
 
 pub use self::curve::Curve;
 pub use self::force::ForceSample;
+pub(super) use self::force::residual_force;
 pub use self::omnibus::Omnibus;
 pub use self::proposal::{Proposal, proposal};
 pub use self::residual::ResidualForce;

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::omnibus::{Omnibus, omnibus};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::{acting, gain, left_out_losses, p_value};
+use crate::closeloop::select::{Folds, acting, gain, losses_by, p_value};
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::study::Study;
 use crate::data::Joint;
@@ -69,7 +69,7 @@ pub fn unexplained(
     rng: &mut impl Rng,
 ) -> Unexplained {
     let omnibus = omnibus(study, before, after, rng);
-    let losses = left_out_losses(study, &after.fit);
+    let losses = losses_by(&Folds::of(study).alone(), &after.fit);
     let probed: Vec<Probed> = acting(study, probes)
         .into_par_iter()
         .filter_map(|probe| ask(study, after, probe, &losses))
@@ -95,7 +95,7 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -
     let (place, joint) = (variables(&probe), probe.joint);
     let effects = model.effects_and(&[probe]);
     let fitted = study.with_effects(model, effects).ok()?;
-    let with = left_out_losses(study, &fitted.fit);
+    let with = losses_by(&Folds::of(study).alone(), &fitted.fit);
     Some(Probed {
         place,
         joint,

@@ -1,13 +1,14 @@
 use rayon::prelude::*;
 
 use super::errors::Scorer;
+use crate::closeloop::establish::Standing;
+use crate::closeloop::find::Chosen;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{left_out_losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
 use crate::identify::FitError;
-use crate::model::{FittedEffect, Model, OwnValue, Parameter};
-use crate::sim::metric::Assessment;
+use crate::model::{FittedEffect, Model, OwnValue, Parameter, Status};
 
 /// One effect that was added.
 #[derive(Debug, Clone)]
@@ -22,6 +23,9 @@ pub struct Finding {
     /// Share of the position error on the test logs that this effect alone takes away, or why the refit without it
     /// failed.
     pub error_reduction: Result<f64, FitError>,
+    pub status: Status,
+    /// Why it is not established, in a sentence.
+    pub reason: Option<String>,
 }
 
 impl Finding {
@@ -51,33 +55,32 @@ impl Finding {
 /// refined, `with` the error of the refined one on the test logs.
 pub(in crate::closeloop) fn findings(
     study: &Study<'_>,
-    chosen: &Fitted,
+    chosen: &Chosen,
     refined: &Refined<'_>,
     scorer: &Scorer<'_>,
-    with: &Assessment,
 ) -> Vec<Finding> {
-    let finding = |k: usize| {
-        // The refit without an effect takes the same two steps as the model with it: coarse, then refined.
-        let coarse = study.without_effect(chosen, k);
-        let fine = coarse
-            .clone()
-            .and_then(|less| refined.study.estimate(&less));
-        let reduction = |less: Fitted| {
-            1.0 - with.position_rms() / scorer.fitted(&less).position_rms().max(f64::MIN_POSITIVE)
-        };
+    let (chosen, standings) = (&chosen.after, &chosen.standings);
+    let with = scorer.fitted(chosen).position_rms();
+    let added = study.added(&refined.after.model);
+    let finding = |(k, standing): (usize, &Standing)| {
+        // Both as effects were selected, in coarse steps.
+        let less = study.without_effect(chosen, k);
+        let reduction =
+            |less: &Fitted| 1.0 - with / scorer.fitted(less).position_rms().max(f64::MIN_POSITIVE);
         let (expression, parameters) = described(study.declared, &refined.after.model, k);
         Finding {
             effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
             p_value: p_value(&refined.study, &refined.after, k)
-                .or_else(|| Some(p_of_refit(study, chosen, coarse.as_ref().ok()?)))
+                .or_else(|| Some(p_of_refit(study, chosen, less.as_ref().ok()?)))
                 .unwrap_or(1.0),
-            error_reduction: fine.map(reduction),
+            error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
+            status: standing.status,
+            reason: standing.reason.clone(),
         }
     };
-    let added = study.added(&refined.after.model);
-    added.into_par_iter().map(finding).collect()
+    added.into_par_iter().zip(standings).map(finding).collect()
 }
 
 /// The signed-rank p-value of a model beside the refit without one of its effects.

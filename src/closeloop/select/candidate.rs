@@ -1,10 +1,14 @@
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::data::Joint;
-use crate::identify::{Shooting, predicted_cost};
-use crate::model::{Effect, FittedEffect};
+use crate::identify::{
+    Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, with_unit_diagonal,
+};
+use crate::model::{Dynamics, Effect, EffectParameter, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
 /// shift of a parameter that the file declares fixed.
@@ -70,14 +74,11 @@ pub fn best_start(
     let mut starts = starts(candidate);
     if starts.len() > 1 {
         let locals = study.sample.locals(&fitted.fit.locals);
-        let promised = |start: FittedEffect| {
-            let cost = promised(study, &study.sample.shooting, fitted, &start, &locals)?;
-            Some((start, cost))
+        let best = match has_switch(candidate) {
+            true => best_by_switches(study, fitted, &starts, &locals)?,
+            false => best_by_cost(study, fitted, starts, &locals)?,
         };
-        let promised: Vec<(FittedEffect, f64)> =
-            starts.into_par_iter().filter_map(promised).collect();
-        let best = promised.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-        starts = vec![best.0];
+        starts = vec![best];
     }
     let start = starts.pop()?;
     let cost = promised(study, &study.shooting, fitted, &start, &fitted.fit.locals)?;
@@ -100,16 +101,104 @@ fn promised(
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
 /// them. `None` if the model has an effect that contains the candidate.
 pub fn beside(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
-    let contains = |a: &FittedEffect, b: &FittedEffect| {
-        a.joint == b.joint && a.effect.contains.contains(&b.effect.name)
-    };
     let mut present = fitted.model.effects.iter();
-    if present.any(|present| contains(present, candidate)) {
+    if present.any(|present| present.contains(candidate)) {
         return None;
     }
     let mut beside = fitted.clone();
     let mut added = beside.model.effects.split_off(study.declared.effects.len());
-    added.retain(|present| !contains(candidate, present));
+    added.retain(|present| !candidate.contains(present));
     beside.model.effects.extend(added);
     Some(beside)
+}
+
+/// The starting point that promises the lowest cost on the sample of windows, each compared by a linearisation of its own.
+fn best_by_cost(
+    study: &Study<'_>,
+    fitted: &Fitted,
+    starts: Vec<FittedEffect>,
+    locals: &[Vec<f64>],
+) -> Option<FittedEffect> {
+    let promised = |start: FittedEffect| {
+        let cost = promised(study, &study.sample.shooting, fitted, &start, locals)?;
+        Some((start, cost))
+    };
+    let promised: Vec<(FittedEffect, f64)> = starts.into_par_iter().filter_map(promised).collect();
+    let best = promised.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(best.0)
+}
+
+/// The same for a candidate that is absent at every starting point, compared by one linearisation of all of them: only
+/// the parameters that switch the effect on change anything there.
+fn best_by_switches(
+    study: &Study<'_>,
+    fitted: &Fitted,
+    starts: &[FittedEffect],
+    locals: &[Vec<f64>],
+) -> Option<FittedEffect> {
+    let numbered = starts.iter().enumerate().map(|(number, start)| {
+        let mut start = start.clone();
+        start.effect.name = format!("{} {number}", start.effect.name);
+        start
+    });
+    let numbered: Vec<FittedEffect> = numbered.collect();
+    let model = study.smoothed(&fitted.model.with_effects(fitted.effects_and(&numbered)));
+    let dynamics = model.dynamics();
+    let first = fitted.model.effects.len();
+    let places: Vec<Range<usize>> = (first..model.effects.len())
+        .map(|k| model.place_of(k))
+        .collect();
+    let parameters = &starts[0].effect.parameters;
+    let is_switch = |k: &usize| parameters[(k - places[0].start) % parameters.len()].is_switch();
+    let mut active = study.active(&dynamics);
+    active.retain(|k| *k < places[0].start || is_switch(k));
+    let shooting = &study.sample.shooting;
+    let scale = fitted.fit.scale;
+    let fit = as_it_stands(shooting, &dynamics, &active, locals.to_vec(), scale).ok()?;
+    let all = fit.equations();
+    let cost = |place: &Range<usize>| {
+        let is_own = |column: &Column| {
+            column.parameter < places[0].start || place.contains(&column.parameter)
+        };
+        let own: Vec<usize> = (0..fit.columns.len())
+            .filter(|&i| is_own(&fit.columns[i]))
+            .collect();
+        least_cost(&dynamics, &fit, &all, &own)
+    };
+    let costs = places.iter().map(cost).zip(starts);
+    let best = costs.filter_map(|(cost, start)| Some((cost?, start)));
+    let best = best.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(best.1.clone())
+}
+
+/// The minimum of the quadratic cost over some free values, those that would leave their bounds from where they stand
+/// held.
+fn least_cost(dynamics: &Dynamics, fit: &Fit, all: &WindowTerms, own: &[usize]) -> Option<f64> {
+    let mut free = own.to_vec();
+    loop {
+        let matrix = all.hessian.select_rows(&free).select_columns(&free);
+        let gradient = all.gradient.select_rows(&free);
+        let (mut scaled, unit) = with_unit_diagonal(&matrix);
+        (0..unit.len()).for_each(|i| scaled[(i, i)] += 1e-9);
+        let step = -scaled
+            .cholesky()?
+            .solve(&gradient.component_mul(&unit))
+            .component_mul(&unit);
+        let stopped = (0..free.len()).find(|&i| {
+            let parameter = &dynamics.parameters[fit.columns[free[i]].parameter];
+            let [low, high] = parameter.bounds;
+            parameter.value <= low && step[i] < 0.0 || parameter.value >= high && step[i] > 0.0
+        });
+        match stopped {
+            Some(i) => {
+                free.remove(i);
+            }
+            None => return Some(0.5 * gradient.dot(&step)),
+        }
+    }
+}
+
+/// Whether some value of a parameter switches the effect off, so that it can start from absent.
+pub fn has_switch(candidate: &FittedEffect) -> bool {
+    (candidate.effect.parameters.iter()).any(EffectParameter::is_switch)
 }

@@ -1,68 +1,9 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
-use super::folds::left_out_losses;
+use super::trial::differences;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
-use crate::data::statistics::{mean, standard_error};
 use crate::identify::uncertainty;
-use crate::model::FittedEffect;
-
-/// The evidence for one candidate beside the effects that a model already has.
-#[derive(Debug, Clone)]
-pub struct Evidence {
-    /// The model with this candidate, fitted.
-    pub fitted: Fitted,
-    /// The candidate with its fitted values.
-    pub effect: FittedEffect,
-    /// Fall of the loss on stretches left out of the fit, as a share of what it was.
-    pub gain: f64,
-    /// Probability of such evidence without the effect.
-    pub p_value: f64,
-    /// The loss on each left-out stretch.
-    pub(super) losses: Vec<f64>,
-}
-
-impl Evidence {
-    /// Number of values, one a log where they differ by log, then of the simpler effects that it contains.
-    pub(super) fn complexity(&self) -> (usize, usize) {
-        let Fitted { model, fit } = &self.fitted;
-        let range = model.place_of(model.effects.len() - 1);
-        let columns = fit.columns.iter();
-        let of_logs = columns.filter(|c| c.log.is_some() && range.contains(&c.parameter));
-        let per_log = (self.effect.effect.parameters.iter()).filter(|p| p.per_log);
-        let values = range.len() - per_log.count() + of_logs.count();
-        (values, self.effect.effect.contains.len())
-    }
-
-    /// Judge a model whose last effect is the candidate against the one without it, by their losses on left-out stretches.
-    /// `None` where the fitted values are inconsistent with each other.
-    pub(super) fn of(study: &Study<'_>, fitted: Fitted, without: &[f64]) -> Option<Self> {
-        let effect = fitted.model.effects.last().cloned()?;
-        let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
-        if !effect.effect.is_valid(&values) {
-            return None;
-        }
-        let losses = left_out_losses(study, &fitted.fit);
-        let p_value = p_value(study, &fitted, fitted.model.effects.len() - 1)
-            .unwrap_or_else(|| p_of_gains(without, &losses));
-        Some(Self {
-            gain: gain(without, &losses),
-            p_value,
-            effect,
-            fitted,
-            losses,
-        })
-    }
-
-    /// Whether the losses on left-out stretches do not distinguish this candidate from a better one.
-    pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
-        let differences = differences(&self.losses, &best.losses);
-        mean(&differences) <= settings.as_good * standard_error(&differences)
-            && self.gain > settings.as_much * best.gain
-            && 1.0 - self.gain <= settings.as_little * (1.0 - best.gain)
-    }
-}
 
 /// Fall of the loss as a share of what it was.
 pub fn gain(before: &[f64], after: &[f64]) -> f64 {
@@ -109,6 +50,10 @@ fn f_test(statistic: f64, restrictions: usize, blocks: usize) -> f64 {
         return 1.0;
     }
     let f = statistic * freedom / (q * (blocks as f64 - 1.0));
+    // Values without a spread, as on a joint at rest, say nothing.
+    if !f.is_finite() {
+        return 1.0;
+    }
     FisherSnedecor::new(q, freedom).map_or(1.0, |law| law.sf(f))
 }
 
@@ -129,8 +74,4 @@ pub fn p_of_gains(before: &[f64], after: &[f64]) -> f64 {
     }
     // Half a rank less, since ranks are whole numbers and the normal law is not.
     Normal::standard().sf((sum - 0.5 - mean) / deviation)
-}
-
-fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }

@@ -1,54 +1,120 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::closeloop::study::Study;
-use crate::identify::{Fit, blocks, with_unit_diagonal};
+use crate::identify::{Fit, WindowTerms, blocks, with_unit_diagonal};
 
-/// For each window the fold that it is left out with: its trajectory or, where there are few, a stretch of it.
-fn folds(study: &Study<'_>) -> Vec<usize> {
-    let shooting = &study.shooting;
-    if shooting.logs.len() >= study.settings.select.whole_logs {
-        shooting.windows.iter().map(|window| window.log).collect()
-    } else {
-        blocks(shooting)
+/// The windows of a study in stretches that losses are given for, and in groups that are left out of a fit together.
+pub struct Folds {
+    /// The stretch of each window.
+    pub stretches: Vec<usize>,
+    /// The group of each stretch: its log or, where there are few logs, a part of it.
+    pub groups: Vec<usize>,
+}
+
+impl Folds {
+    pub fn of(study: &Study<'_>) -> Self {
+        let shooting = &study.shooting;
+        let stretches = blocks(shooting);
+        let count = stretches.last().map_or(0, |last| last + 1);
+        let mut log_of = vec![0; count];
+        for (window, &stretch) in shooting.windows.iter().zip(&stretches) {
+            log_of[stretch] = window.log;
+        }
+        let logs = shooting.logs.len();
+        let parts = study.settings.select.fewest_groups.div_ceil(logs);
+        // What is left out together is connected: a model is to hold for motion that it was not fitted to.
+        let group = |(stretch, &log): (usize, &usize)| {
+            let first = log_of.partition_point(|of| *of < log);
+            let own = log_of.partition_point(|of| *of <= log) - first;
+            log * parts + (stretch - first) * parts / own
+        };
+        let groups = log_of.iter().enumerate().map(group).collect();
+        Self { stretches, groups }
+    }
+
+    /// The same stretches, each left out alone.
+    pub fn alone(mut self) -> Self {
+        self.groups = (0..self.groups.len()).collect();
+        self
+    }
+
+    /// The same stretches, of which every second one is left out together with all others like it.
+    pub fn in_halves(mut self) -> Self {
+        let stretches = self.groups.len();
+        self.groups = (0..stretches).map(|stretch| stretch % 2).collect();
+        self
+    }
+
+    /// Number of groups, some of which may be empty.
+    fn count(&self) -> usize {
+        self.groups.iter().max().map_or(0, |last| last + 1)
+    }
+
+    /// Normal equations of each stretch and of each group.
+    pub fn equations(&self, fit: &Fit) -> (Vec<WindowTerms>, Vec<WindowTerms>) {
+        let stretches = fit.equations_by(&self.stretches);
+        let mut groups = vec![fit.zero_equations(); self.count()];
+        for (part, &group) in stretches.iter().zip(&self.groups) {
+            groups[group].cost += part.cost;
+            groups[group].gradient += &part.gradient;
+            groups[group].hessian += &part.hessian;
+        }
+        (stretches, groups)
     }
 }
 
-/// The loss on each fold of a study's windows, with the parameters that a fit to the other folds would give. The fit is not
-/// repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a fold moves the
-/// parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since no other
-/// log determines them.
+/// The loss on each stretch of a study's windows, with the parameters that a fit without the stretch's group would give.
+/// The fit is not repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a group
+/// moves the parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since
+/// no other log determines them.
 pub fn left_out_losses(study: &Study<'_>, fit: &Fit) -> Vec<f64> {
-    let parts = fit.equations_by(&folds(study));
-    let mut all = fit.zero_equations();
-    for part in &parts {
-        all.gradient += &part.gradient;
-        all.hessian += &part.hessian;
-    }
-    parts
-        .iter()
+    losses_by(&Folds::of(study), fit)
+}
+
+/// The same with given folds.
+pub fn losses_by(folds: &Folds, fit: &Fit) -> Vec<f64> {
+    let (stretches, groups) = folds.equations(fit);
+    let all = fit.equations();
+    let steps: Vec<DVector<f64>> = (groups.iter())
         .map(|part| {
             // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
             let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
-            let step = free_step(&(&all.hessian - &part.hessian), &own);
-            part.cost + part.gradient.dot(&step) + 0.5 * step.dot(&(&part.hessian * &step))
+            step_without(&all.hessian, &part.hessian, &own)
         })
-        .collect()
+        .collect();
+    let loss = |(part, &group): (&WindowTerms, &usize)| {
+        let step = &steps[group];
+        part.cost + part.gradient.dot(step) + 0.5 * step.dot(&(&part.hessian * step))
+    };
+    stretches.iter().zip(&folds.groups).map(loss).collect()
 }
 
-/// The part of the information that one fold holds.
+/// The part of the information that one group holds.
 fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
     part.trace() / all.trace().max(f64::MIN_POSITIVE)
 }
 
-fn free_step(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    if right.is_empty() {
-        return right.clone();
-    }
+/// The step of the free values when a part of the windows, with this gradient where they stand, is left out of a fit.
+/// Directions that little else determines hardly move.
+pub fn step_without(
+    all: &DMatrix<f64>,
+    part: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+) -> DVector<f64> {
     // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
-    let (scaled, scale) = with_unit_diagonal(matrix);
-    let inverse = scaled
-        .pseudo_inverse(1e-10)
-        .unwrap_or_else(|_| DMatrix::zeros(right.len(), right.len()));
-    let step = inverse * right.component_mul(&scale);
-    step.component_mul(&scale)
+    let (_, unit) = with_unit_diagonal(all);
+    let rest = DMatrix::from_fn(unit.len(), unit.len(), |i, j| {
+        let known = (all[(i, j)] - part[(i, j)]) * unit[i] * unit[j];
+        if i == j { known + KNOWN } else { known }
+    });
+    match rest.cholesky() {
+        Some(factor) => factor
+            .solve(&gradient.component_mul(&unit))
+            .component_mul(&unit),
+        None => DVector::zeros(unit.len()),
+    }
 }
+
+/// What is known of each value without the windows that are left out, as a share of the information of all: what they
+/// alone determine stays where it is.
+const KNOWN: f64 = 1e-2;

@@ -1,14 +1,24 @@
-//! Stage 4: choose the effects that the logs support.
+//! Stage 4: choose the set of effects that explains the logs best.
 
+mod blocks;
 mod candidate;
 mod evidence;
+mod exchange;
 mod folds;
+mod outlook;
+mod rivals;
 mod search;
+mod sets;
 mod simpler;
+#[cfg(test)]
+mod tests;
+mod trial;
 
+pub(super) use self::blocks::usual_friction;
 pub(super) use self::candidate::{acting, best_start, candidates, starts};
-pub use self::evidence::Evidence;
 pub(super) use self::evidence::{gain, p_of_gains, p_value};
-pub(super) use self::folds::left_out_losses;
+pub(super) use self::folds::{Folds, left_out_losses, losses_by};
+pub use self::rivals::Rival;
 pub(super) use self::search::Search;
-pub use self::search::{Rival, Round};
+pub use self::search::{Round, Tried};
+pub(super) use self::trial::Trial;

@@ -1,66 +1,40 @@
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
-use super::candidate::{beside, best_start, candidates, starts};
-use super::evidence::Evidence;
-use super::folds::left_out_losses;
+use super::blocks::blocks;
+use super::candidate::{beside, best_start, candidates, has_switch};
+use super::exchange::exchanges;
+use super::outlook::Outlook;
+use super::sets::{descent, promising};
 use super::simpler::simpler;
+use super::trial::{Trial, key};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::stage::{Progress, Stage};
 use crate::closeloop::study::Study;
 use crate::identify::FitError;
-use crate::model::{Effect, EffectParameter, FittedEffect};
+use crate::model::{Effect, FittedEffect};
 
-/// One round of the search: the candidates tried beside the effects of a model, best first.
+/// One round of the search: the sets of effects that were fitted, best first.
 #[derive(Debug, Clone)]
 pub struct Round {
-    /// Number of candidates that were screened.
+    /// Number of candidates beside the effects of the model that the round began with.
     pub candidates: usize,
-    /// Those with the largest predicted decrease, fitted, best first.
-    pub evidence: Vec<Evidence>,
-    /// Index of the one that is admitted.
-    pub chosen: Option<usize>,
+    pub tried: Vec<Tried>,
 }
 
-/// A set of effects that explains the logs as well as the chosen one: it has `effect` in place of `instead_of`.
+/// A set of effects that was fitted.
 #[derive(Debug, Clone)]
-pub struct Rival {
-    pub fitted: Fitted,
-    pub effect: FittedEffect,
-    pub instead_of: FittedEffect,
-    /// Fall of the left-out loss by either, beside the other effects.
+pub struct Tried {
+    pub effects: Vec<FittedEffect>,
+    /// Fall of the loss on left-out stretches from that of the model which the round began with, as a share.
     pub gain: f64,
-    pub gain_of_chosen: f64,
+    /// Whether the next round begins with it.
+    pub chosen: bool,
 }
 
-impl Rival {
-    /// Whether the chosen effect is a special case of the rival.
-    pub fn contains_chosen(&self) -> bool {
-        let (own, chosen) = (&self.effect, &self.instead_of);
-        own.joint == chosen.joint && own.effect.contains.contains(&chosen.effect.name)
-    }
-}
-
-/// The effects of a model, in no particular order.
-type Key = Vec<String>;
-
-fn key(effects: &[FittedEffect]) -> Key {
-    let mut key: Key = effects.iter().map(FittedEffect::label).collect();
-    key.sort();
-    key
-}
-
-/// A search for the effects that a model lacks, with the rounds so far.
+/// A search for the set of effects that a model lacks, with the rounds so far.
 pub struct Search<'a, 'p> {
-    study: &'a Study<'a>,
-    library: &'a [Effect],
-    /// Rounds so far, by the effects of the model.
-    known_rounds: HashMap<Key, Round>,
-    /// Models that the search has visited.
-    passed: Vec<Key>,
-    /// The rounds that were to add one more effect, in their order.
+    pub study: &'a Study<'a>,
+    pub library: &'a [Effect],
     pub rounds: Vec<Round>,
     progress: &'p mut dyn FnMut(Progress<'_>),
 }
@@ -75,37 +49,52 @@ impl<'a, 'p> Search<'a, 'p> {
         Self {
             study,
             library,
-            known_rounds: HashMap::new(),
-            passed: Vec::new(),
             rounds: Vec::new(),
             progress,
         }
     }
 
-    /// Add effects of the library while the loss on stretches that are left out of the fit falls significantly,
-    /// then exchange, simplify and remove until each effect is the best choice beside all others.
+    /// The simplest of the sets of effects that lower the loss on left-out stretches most.
     ///
     /// # Errors
     /// A selected model that cannot be fitted again.
-    pub fn select(&mut self, declared: Fitted) -> Result<Fitted, FitError> {
-        let mut fitted = declared;
-        let most = self.study.settings.select.most_effects;
-        while self.study.added(&fitted.model).len() < most {
-            let round = self.round(&fitted, None);
-            self.rounds.push(round.clone());
-            let next = match round.chosen {
-                Some(chosen) => Some(round.evidence[chosen].fitted.clone()),
-                None => self.exchanged(&fitted),
+    pub fn select(&mut self, declared: Fitted) -> Result<Trial, FitError> {
+        let study = self.study;
+        let declared = Trial::of(study, declared);
+        let mut best = self.first(declared.clone());
+        let mut passed = vec![best.key()];
+        for _ in 0..study.settings.select.rounds {
+            let step = study.settings.select.step;
+            let next = match self.better(&best, step, |search, best| search.round(best)) {
+                Some(next) => next,
+                // An exchange adds nothing: any gain will do.
+                None => match self.better(&best, 0.0, |search, best| search.exchanged(best)) {
+                    Some(next) => next,
+                    None => break,
+                },
             };
-            let Some(next) = next else { break };
             // The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
-            let next = self.simplified(self.study.estimate(&next)?);
-            if self.has_passed(&next) {
+            best = Trial::of(study, study.estimate(&next.fitted)?);
+            if passed.contains(&best.key()) {
                 break;
             }
-            fitted = next;
+            passed.push(best.key());
         }
-        Ok(fitted)
+        self.say("simplifying");
+        let simplest = self.simplest(&best)?;
+        let is_declared = study.added(&simplest.fitted.model).is_empty();
+        Ok(if is_declared { declared } else { simplest })
+    }
+
+    /// The best of a round, if it is better than what the round began with by this share of the loss.
+    fn better(
+        &mut self,
+        from: &Trial,
+        share: f64,
+        round: impl FnOnce(&mut Self, &Trial) -> Vec<Trial>,
+    ) -> Option<Trial> {
+        let best = round(self, from).into_iter().next()?;
+        (best.loss() < from.loss() * (1.0 - share)).then_some(best)
     }
 
     /// Report progress.
@@ -117,169 +106,151 @@ impl<'a, 'p> Search<'a, 'p> {
         self.tell(Progress::within(Stage::Select, text));
     }
 
-    fn has_passed(&mut self, fitted: &Fitted) -> bool {
-        let key = key(&fitted.model.effects);
-        let known = self.passed.contains(&key);
-        self.passed.push(key);
-        known
-    }
-
-    /// Fit and rank the candidates that could join `model`; `wanted` is among them whatever its predicted decrease.
-    fn round(&mut self, fitted: &Fitted, wanted: Option<&FittedEffect>) -> Round {
-        let at = key(&fitted.model.effects);
-        let is_wanted = |c: &FittedEffect| wanted.is_some_and(|wanted| wanted.label() == c.label());
-        if let Some(known) = self.known_rounds.get(&at)
-            && (wanted.is_none() || known.evidence.iter().any(|e| is_wanted(&e.effect)))
-        {
-            return known.clone();
-        }
-        let all = candidates(self.study, self.library, &fitted.model.effects);
-        let mut screened = self.screened(fitted, &all);
-        let most = self.study.settings.select.fitted;
-        let rest = screened.split_off(most.min(screened.len()));
-        screened.extend(rest.into_iter().filter(is_wanted));
-        let losses = left_out_losses(self.study, &fitted.fit);
-        self.say(&format!("fitting {} effects", screened.len()));
+    /// The declared model or, where it helps, the model with what most machines have.
+    fn first(&mut self, declared: Trial) -> Trial {
         let study = self.study;
-        let mut evidence: Vec<Evidence> = screened
-            .into_par_iter()
-            .filter_map(|start| weigh(study, fitted, start, &losses))
-            .collect();
-        evidence.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
-        let round = Round {
-            candidates: all.len(),
-            chosen: choose(&evidence, trials, &study.settings.select),
-            evidence,
-        };
-        self.known_rounds.insert(at, round.clone());
-        round
+        let blocks = blocks(study, self.library);
+        self.say("fitting what most machines have");
+        let fitted = self.fitted(&declared, blocks);
+        let settings = &study.settings.select;
+        let fitted = self.noted(&declared, fitted, 0);
+        let is_better = |best: &&Trial| best.loss() < declared.loss() * (1.0 - settings.step);
+        let best = fitted.first().filter(is_better);
+        match best.map(|best| study.estimate(&best.fitted)) {
+            Some(Ok(fitted)) => Trial::of(study, fitted),
+            _ => declared,
+        }
     }
 
-    /// Candidates at their best starting points, by predicted cost.
-    fn screened(&mut self, fitted: &Fitted, all: &[FittedEffect]) -> Vec<FittedEffect> {
+    /// Fit the sets that promise most beside a model, the best first.
+    fn round(&mut self, from: &Trial) -> Vec<Trial> {
+        let study = self.study;
+        let all = candidates(study, self.library, &from.fitted.model.effects);
         self.say(&format!("screening {} effects", all.len()));
-        let study = self.study;
-        let mut screened: Vec<(FittedEffect, f64)> = all
-            .par_iter()
-            .filter_map(|candidate| {
-                let beside = beside(study, fitted, candidate)?;
-                best_start(study, &beside, candidate)
-            })
-            .collect();
-        // A Gauss-Newton step predicts badly for an effect that no value switches off: such candidates are always
-        // fitted.
-        screened.sort_by(|a, b| {
-            has_switch(&a.0)
-                .cmp(&has_switch(&b.0))
-                .then(a.1.total_cmp(&b.1))
-        });
-        screened.into_iter().map(|(start, _)| start).collect()
-    }
-
-    /// Drop effects that another one has made needless, or put simpler ones in their place that do as well.
-    fn simplified(&self, fitted: Fitted) -> Fitted {
-        let study = self.study;
-        let loss = |fitted: &Fitted| left_out_losses(study, &fitted.fit).iter().sum::<f64>();
-        let most = loss(&fitted) * (1.0 + study.settings.select.simpler);
-        let simpler = simpler(
-            self.library,
-            &fitted.model.effects,
-            study.added(&fitted.model),
+        let mut sets = Vec::new();
+        let declared = study.declared.effects.len();
+        if let Some(outlook) = Outlook::of(study, &from.fitted, &all) {
+            let promising = promising(&outlook, &study.settings.select);
+            sets = promising.iter().map(|set| outlook.effects(set)).collect();
+        }
+        // What no value switches off cannot be compared without a fit.
+        sets.extend(
+            all.iter()
+                .filter(|c| !has_switch(c))
+                .filter_map(|candidate| {
+                    let beside = beside(study, &from.fitted, candidate)?;
+                    let (start, _) = best_start(study, &beside, candidate)?;
+                    let mut set = beside.model.effects[declared..].to_vec();
+                    set.push(start);
+                    Some(set)
+                }),
         );
-        let first = simpler.into_par_iter().find_map_first(|effects| {
-            let less = study.with_effects(&fitted, effects).ok()?;
-            (loss(&less) < most).then_some(less)
+        self.say(&format!("fitting {} sets of effects", sets.len()));
+        let fitted = self.fitted(from, sets);
+        self.noted(from, fitted, all.len())
+    }
+
+    /// The declared model with each set of effects in place of those of a trial, fitted at its scale; those that cannot
+    /// be fitted are left out.
+    fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
+        let study = self.study;
+        sets.iter_mut().for_each(without_contained);
+        sets.retain(|set| set.len() <= study.settings.select.most_effects);
+        let mut keys = vec![key(
+            &from.fitted.model.effects[study.added(&from.fitted.model)]
+        )];
+        sets.retain(|set| {
+            let key = key(set);
+            let is_new = !keys.contains(&key);
+            keys.push(key);
+            is_new
         });
-        match first {
-            Some(less) => self.simplified(less),
-            None => fitted,
-        }
+        let trial = |set: Vec<FittedEffect>| {
+            let effects = [study.declared.effects.as_slice(), &set].concat();
+            let fitted = study.with_effects(&from.fitted, effects).ok()?;
+            Some(Trial::of(study, fitted)).filter(|trial| trial.is_valid(study))
+        };
+        sets.into_par_iter().filter_map(trial).collect()
     }
 
-    /// Test each effect of the model again in the presence of all others, since early ones were selected without those
-    /// that followed. Returns the first other model that the evidence supports.
-    fn exchanged(&mut self, fitted: &Fitted) -> Option<Fitted> {
-        self.study.added(&fitted.model).find_map(|k| {
-            let (present, without) = self.without(fitted, k)?;
-            let round = self.round(&without, Some(&present));
-            match round.chosen.map(|chosen| &round.evidence[chosen]) {
-                None => Some(without),
-                Some(best) if best.effect.label() == present.label() => None,
-                Some(best) => Some(best.fitted.clone()),
+    /// Fit the sets in which one effect is exchanged for another like it, the best first.
+    fn exchanged(&mut self, from: &Trial) -> Vec<Trial> {
+        self.say("exchanging effects");
+        let sets = exchanges(self.study, self.library, &from.fitted);
+        let count = sets.len();
+        let fitted = self.fitted(from, sets);
+        self.noted(from, fitted, count)
+    }
+
+    /// Note a round, and return its trials, the best first.
+    fn noted(&mut self, from: &Trial, mut trials: Vec<Trial>, candidates: usize) -> Vec<Trial> {
+        trials.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
+        let gain = |trial: &Trial| 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE);
+        let tried = |(rank, trial): (usize, &Trial)| Tried {
+            effects: trial.fitted.model.effects[self.study.added(&trial.fitted.model)].to_vec(),
+            gain: gain(trial),
+            chosen: rank == 0 && gain(trial) >= self.study.settings.select.step,
+        };
+        let tried = trials.iter().enumerate().map(tried).collect();
+        self.rounds.push(Round { candidates, tried });
+        trials
+    }
+
+    /// Drop effects, or put simpler ones in their place, as long as the set explains the logs as well as the best one.
+    fn simplest(&self, best: &Trial) -> Result<Trial, FitError> {
+        let study = self.study;
+        let declared = study.declared.effects.len();
+        let mut current = self.least(best, best);
+        loop {
+            let added = study.added(&current.fitted.model);
+            let sets = simpler(self.library, &current.fitted.model.effects, added);
+            let mut sets: Vec<_> = sets
+                .into_iter()
+                .map(|set| set[declared..].to_vec())
+                .collect();
+            sets.extend(exchanges(study, self.library, &current.fitted));
+            let mut good = self.as_good_as(best, self.fitted(&current, sets));
+            good.retain(|trial| trial.values() < current.values());
+            match good
+                .into_iter()
+                .min_by(|a, b| a.loss().total_cmp(&b.loss()))
+            {
+                Some(simpler) => current = self.least(&simpler, best),
+                None => return Ok(Trial::of(study, study.estimate(&current.fitted)?)),
             }
-        })
-    }
-
-    /// Effects that explain the logs as well as one of a model's effects does, beside its others.
-    pub fn rivals(&mut self, fitted: &Fitted) -> Vec<Rival> {
-        let settings = &self.study.settings.select;
-        let mut rivals = Vec::new();
-        for k in self.study.added(&fitted.model) {
-            let Some((present, without)) = self.without(fitted, k) else {
-                continue;
-            };
-            let round = self.round(&without, Some(&present));
-            let is_present = |e: &&Evidence| e.effect.label() == present.label();
-            let Some(chosen) = round.evidence.iter().find(is_present) else {
-                continue;
-            };
-            let others = round.evidence.iter().filter(|e| !is_present(e));
-            rivals.extend(
-                others
-                    .filter(|e| e.is_as_good_as(chosen, settings))
-                    .map(|e| Rival {
-                        fitted: e.fitted.clone(),
-                        effect: e.effect.clone(),
-                        instead_of: present.clone(),
-                        gain: e.gain,
-                        gain_of_chosen: chosen.gain,
-                    }),
-            );
         }
-        rivals
     }
 
-    /// The k-th effect, and the model refitted without it.
-    fn without(&self, fitted: &Fitted, k: usize) -> Option<(FittedEffect, Fitted)> {
-        let present = fitted.model.effects[k].clone();
-        Some((present, self.study.without_effect(fitted, k).ok()?))
+    /// The smallest set of a trial's effects that explains the logs as well as the best one, among those that predicted
+    /// losses lead to.
+    fn least(&self, trial: &Trial, best: &Trial) -> Trial {
+        let study = self.study;
+        let Some(outlook) = Outlook::of(study, &trial.fitted, &[]) else {
+            return trial.clone();
+        };
+        let settings = &study.settings.select;
+        let within = |set: &Vec<usize>| {
+            let losses = outlook.losses(set);
+            let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
+            sum <= best.loss() * (1.0 + settings.slack * settings.simpler)
+        };
+        let sets: Vec<_> = descent(&outlook).into_iter().take_while(within).collect();
+        let sets = sets.iter().map(|set| outlook.effects(set)).collect();
+        let good = self.as_good_as(best, self.fitted(trial, sets));
+        let size = |trial: &Trial| trial.fitted.model.effects.len();
+        good.into_iter()
+            .min_by_key(size)
+            .unwrap_or_else(|| trial.clone())
+    }
+
+    fn as_good_as(&self, best: &Trial, mut trials: Vec<Trial>) -> Vec<Trial> {
+        trials.retain(|trial| trial.is_as_good_as(best, &self.study.settings.select));
+        trials
     }
 }
 
-/// Fit a candidate and judge it.
-fn weigh(
-    study: &Study<'_>,
-    model: &Fitted,
-    start: FittedEffect,
-    without: &[f64],
-) -> Option<Evidence> {
-    let mut effects = beside(study, model, &start)?.model.effects;
-    effects.push(start);
-    let fitted = study.with_effects(model, effects).ok()?;
-    Evidence::of(study, fitted, without)
-}
-
-/// Whether some value of a parameter switches the effect off, so that it can start from absent.
-fn has_switch(candidate: &FittedEffect) -> bool {
-    candidate
-        .effect
-        .parameters
-        .iter()
-        .any(EffectParameter::is_switch)
-}
-
-/// Index of the candidate to admit: of all candidates that are significant over so many trials, worthwhile
-/// and as good as the best, the one with the fewest parameters.
-fn choose(evidence: &[Evidence], trials: usize, settings: &SelectSettings) -> Option<usize> {
-    #[allow(clippy::cast_precision_loss)] // few trials
-    let level = settings.false_alarm / trials.max(1) as f64;
-    let sound = |e: &Evidence| {
-        e.p_value < level && e.gain > settings.worthwhile
-            || e.p_value < settings.significant_alone && e.gain > settings.plain
-    };
-    let best = evidence.iter().find(|e| sound(e))?;
-    (0..evidence.len())
-        .filter(|&i| sound(&evidence[i]) && evidence[i].is_as_good_as(best, settings))
-        .min_by_key(|&i| evidence[i].complexity())
+/// Drop effects that another one of the set contains.
+fn without_contained(set: &mut Vec<FittedEffect>) {
+    let all = set.clone();
+    set.retain(|part| !all.iter().any(|whole| whole.contains(part)));
 }

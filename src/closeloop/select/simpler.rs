@@ -2,8 +2,7 @@ use std::ops::Range;
 
 use crate::model::{Effect, FittedEffect};
 
-/// Every set of effects that is one step simpler: one effect less, or one replaced by some of those that it
-/// contains, fewest first. Only effects at the places `added` change.
+/// Every set of effects in which one is replaced by some of those that it contains, fewest first. Only effects at the places `added` change.
 pub(super) fn simpler(
     library: &[Effect],
     effects: &[FittedEffect],
@@ -11,19 +10,12 @@ pub(super) fn simpler(
 ) -> Vec<Vec<FittedEffect>> {
     let mut all = Vec::new();
     for k in added {
-        let mut without = effects.to_vec();
-        let old = without.remove(k);
+        let old = &effects[k];
         for parts in parts_of(library, &old.effect) {
-            let parts = parts
-                .into_iter()
-                .map(|effect| FittedEffect::absent(effect, old.joint));
-            let mut replaced = without.clone();
-            replaced.splice(k..k, parts);
+            let parts = parts.into_iter().map(|effect| part_of(old, effect));
+            let mut replaced = effects.to_vec();
+            replaced.splice(k..=k, parts);
             all.push(replaced);
-        }
-        // The effect that came last is what the round was about: it is replaced at most.
-        if k + 1 < effects.len() {
-            all.insert(0, without);
         }
     }
     all
@@ -47,4 +39,17 @@ fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     sets.retain(|set| size(set) < own(whole));
     sets.sort_by_key(size);
     sets
+}
+
+/// A simpler effect that another contains, at the values of the parameters that have the same names.
+fn part_of(whole: &FittedEffect, part: &Effect) -> FittedEffect {
+    let mut fitted = FittedEffect::absent(part, whole.joint);
+    let known = whole.effect.parameters.iter().zip(&whole.values);
+    for (parameter, slot) in part.parameters.iter().zip(&mut fitted.values) {
+        let mut same = known.clone().filter(|(p, _)| p.name == parameter.name);
+        if let Some((_, (value, _))) = same.next() {
+            *slot = (*value, None);
+        }
+    }
+    fitted
 }

@@ -3,17 +3,6 @@
 use serde::Serialize;
 
 use crate::data::signal::{noise_std, resolution};
-use crate::data::statistics::{mad, quantile};
-
-/// A jump counts as a spike beyond this many median absolute deviations (four standard deviations of
-/// normal noise).
-pub(super) const SPIKE_MADS: f64 = 6.0;
-
-/// A jump below this share of the channel's working range harms no fit, however rare it is.
-pub(super) const SPIKE_SHARE_OF_RANGE: f64 = 0.05;
-
-/// A jump of fewer quantisation steps than this is rounding.
-pub(super) const SPIKE_RESOLUTION_STEPS: f64 = 3.0;
 
 /// One column of a log: what its numbers look like, in the column's own unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -30,7 +19,8 @@ pub struct Channel {
     /// motion; 0 where quantisation hides the noise.
     pub noise_std: f64,
     /// Rows that jump. For a velocity: rows that disagree with the derivative of the angle. For an
-    /// angle or a torque: single rows away from both neighbours, which agree with each other.
+    /// angle or a torque: single rows away from both neighbours, which agree with each other. Those of an angle are not
+    /// among the values that the other numbers are about.
     pub spikes: usize,
     /// Share of the rows that sit at exactly the smallest or largest value, as at a limit; 0 if the
     /// values merely turn round there, or if the limit is zero.
@@ -95,23 +85,6 @@ fn saturated_rows(values: &[f64], limit: f64, range: f64, resolution: f64) -> us
     }
 }
 
-/// Single rows that jump away from both neighbours while the neighbours agree with each other.
-pub(super) fn isolated_spikes(values: &[f64]) -> usize {
-    let jump = |triple: &[f64]| triple[1] - 0.5 * (triple[0] + triple[2]);
-    let jumps: Vec<f64> = values.windows(3).map(jump).collect();
-    let working_range = quantile(values, 0.95) - quantile(values, 0.05);
-    let floor = (SPIKE_MADS * mad(&jumps))
-        .max(SPIKE_SHARE_OF_RANGE * working_range)
-        .max(SPIKE_RESOLUTION_STEPS * resolution(values));
-    let isolated = |triple: &[f64]| {
-        let [before, after] = [triple[1] - triple[0], triple[1] - triple[2]];
-        let smaller = before.abs().min(after.abs());
-        let neighbours_agree = (triple[2] - triple[0]).abs() < 0.5 * smaller;
-        before * after > 0.0 && smaller > floor && neighbours_agree
-    };
-    values.windows(3).filter(|triple| isolated(triple)).count()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,16 +124,5 @@ mod tests {
         let pushes: Vec<f64> = sine(1.0).iter().map(|value| value.max(0.0)).collect();
         assert_eq!(saturated(&pushes), 0.0);
         assert_eq!(saturated(&[2.0; 100]), 0.0);
-    }
-
-    #[test]
-    fn single_rows_that_jump_are_spikes_and_steps_are_not() {
-        let mut values = sine(1.0);
-        assert_eq!(isolated_spikes(&values), 0);
-        values[700] += 0.5;
-        values[2000] -= 3.0;
-        values.iter_mut().skip(3000).for_each(|value| *value += 2.0);
-        assert_eq!(isolated_spikes(&values), 2);
-        assert_eq!(isolated_spikes(&[1.0, 2.0]), 0);
     }
 }

@@ -2,10 +2,11 @@
 
 use serde::Serialize;
 
-use super::channel::{Channel, SPIKE_MADS, SPIKE_RESOLUTION_STEPS, SPIKE_SHARE_OF_RANGE};
+use super::channel::Channel;
 use super::motion::Motion;
 use super::regressors::regressors;
 use crate::data::Joint;
+use crate::data::jumps::{JUMP_MADS, JUMP_RESOLUTION_STEPS, JUMP_SHARE_OF_RANGE};
 use crate::data::lag::{Lag, lag};
 use crate::data::projection::{explained_by, orthonormal};
 use crate::data::signal::{interpolate, resample};
@@ -14,6 +15,9 @@ use crate::data::statistics::{SIGMA_PER_MAD, mad, median};
 /// The longest lag looked for \[s\]. Filters and buses of real rigs stay below 40 ms; a longer search
 /// would find chance agreements.
 pub const MAX_LAG_S: f64 = 0.05;
+
+/// Two columns of one quantity correlate by more than this.
+pub(super) const MIN_CORRELATION: f64 = 0.9;
 
 /// Below this correlation of acceleration and torque, the lag between them means little: on measured
 /// logs of one rig it scattered by several steps.
@@ -74,7 +78,7 @@ pub(super) fn velocity_check(
         rest_rad_s,
         fast_rad_s,
     } = speeds;
-    let found = velocity_lag(motion, step_s).filter(|_| fast_rad_s > 2.0 * rest_rad_s);
+    let found = lag_of(motion, &motion.qd, step_s).filter(|_| fast_rad_s > 2.0 * rest_rad_s);
     let Some(Lag {
         samples,
         correlation,
@@ -90,9 +94,9 @@ pub(super) fn velocity_check(
     // At rest both are zero and agree to the last digit, which is no measure for rows in motion.
     let moving = pairs.iter().filter(|pair| pair.1.abs() > rest_rad_s);
     let spread = mad(&moving.map(off).collect::<Vec<_>>());
-    let floor = (SPIKE_MADS * spread)
-        .max(SPIKE_SHARE_OF_RANGE * scale.abs() * fast_rad_s)
-        .max(SPIKE_RESOLUTION_STEPS * qd.resolution);
+    let floor = (JUMP_MADS * spread)
+        .max(JUMP_SHARE_OF_RANGE * scale.abs() * fast_rad_s)
+        .max(JUMP_RESOLUTION_STEPS * qd.resolution);
     let sizes = || pairs.iter().map(|pair| off(pair).abs());
     let check = VelocityCheck {
         correlation,
@@ -102,6 +106,18 @@ pub(super) fn velocity_check(
         worst_rad_s: sizes().fold(0.0, f64::max),
     };
     (Some(check), sizes().filter(|size| *size > floor).count())
+}
+
+/// Correlation of the logged velocity with the negative derivative, if it is closer than that with the derivative.
+pub(super) fn opposed_velocity(
+    motion: &Motion,
+    check: Option<VelocityCheck>,
+    step_s: f64,
+) -> Option<f64> {
+    let direct = check?.correlation;
+    let negated = |values: &[f64]| values.iter().map(|value| -value).collect::<Vec<f64>>();
+    let found = lag_of(motion, &negated(&motion.qd), step_s)?;
+    (found.correlation > direct && !found.at_edge).then_some(found.correlation)
 }
 
 /// Logged velocity of each row with the derivative of the angle `lag_s` earlier.
@@ -134,9 +150,10 @@ fn reach(step_s: f64) -> isize {
     (MAX_LAG_S / lag_step_s(step_s)).ceil().max(2.0) as isize
 }
 
-fn velocity_lag(motion: &Motion, step_s: f64) -> Option<Lag> {
+/// The lag of a velocity behind the derivative of the angle.
+fn lag_of(motion: &Motion, velocity: &[f64], step_s: f64) -> Option<Lag> {
     let uniform = |values: &[f64]| resample(&motion.time, values, lag_step_s(step_s));
-    let (derived, logged) = (uniform(&motion.velocity), uniform(&motion.qd));
+    let (derived, logged) = (uniform(&motion.velocity), uniform(velocity));
     let ones = vec![1.0; derived.len()];
     let reach = reach(step_s);
     lag(&derived, &logged, &[ones], -reach..=reach)

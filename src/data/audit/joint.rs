@@ -2,17 +2,25 @@
 
 use serde::Serialize;
 
-use super::channel::{Channel, isolated_spikes};
-use super::compare::{Speeds, TorqueLag, VelocityCheck, torque_lag, velocity_check};
+use super::channel::Channel;
+use super::compare::{
+    Speeds, TorqueLag, VelocityCheck, opposed_velocity, torque_lag, velocity_check,
+};
 use super::demand::{TorqueDemand, torque_demand};
 use super::motion::Motion;
+use super::response::{Response, response};
 use crate::data::Joint;
+use crate::data::jumps::rows_that_jump;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
 use crate::data::log::Log;
 use crate::data::statistics::quantile;
 
 /// Slower than this share of the fast speed counts as rest.
 const REST_SHARE_OF_FAST: f64 = 0.01;
+
+/// A motion of fewer quantisation steps (or noise deviations) than this says little: at rest an
+/// encoder flickers over two or three steps, and a creeping joint over five or six.
+pub(super) const VISIBLE_STEPS: f64 = 10.0;
 
 /// Torque and acceleration are compared after smoothing over this on either side \[s\]: accelerations from an encoder
 /// of a few mrad are mostly noise over less.
@@ -31,6 +39,11 @@ pub struct JointAudit {
     /// How the logged velocity compares with the derivative of the angle; `None` where one of them
     /// stands still, the joint is too slow to be told from one at rest, or the log is too short.
     pub velocity: Option<VelocityCheck>,
+    /// Correlation of the logged velocity with the negative derivative of the angle, where it does not follow the
+    /// derivative itself.
+    pub opposed: Option<f64>,
+    /// How the acceleration answers to torque and motion; `None` where there is none, or the log is too short.
+    pub response: Option<Response>,
     /// How the acceleration trails the torque; `None` where the torque is constant, or too little of
     /// the acceleration follows it to tell.
     pub torque_lag: Option<TorqueLag>,
@@ -51,7 +64,11 @@ pub struct JointAudit {
 }
 
 /// Audits every joint of a log.
+///
+/// Angles that jump for a single row are counted, and then masked.
 pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
+    let spikes: Vec<usize> = log.q.iter().map(|q| rows_that_jump(q).len()).collect();
+    let log = &log.without_jumps();
     let smoothed = |half_width_s: f64| -> Vec<Motion> {
         Joint::all(log.joints())
             .map(|joint| Motion::of(log, joint, half_width_s))
@@ -66,17 +83,25 @@ pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
     for joint in Joint::all(log.joints()) {
         let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
         joints[joint].torque_lag = torque_lag(&slow, &fast, joint, log.median_step());
+        joints[joint].q.spikes = spikes[joint];
+        joints[joint].response = response(&slow, &fast, joint);
         joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
     }
     joints
 }
 
 impl JointAudit {
-    /// All but the torque's lag and demand, which need the other joints as well.
+    /// Whether the joint moves visibly in this log.
+    pub fn moves(&self) -> bool {
+        let visible = VISIBLE_STEPS * self.q.resolution.max(self.q.noise_std);
+        !self.q.constant && self.q.range() >= visible
+    }
+
+    /// All but what needs the other joints as well, or the log as it is.
     fn of(log: &Log, joint: Joint, motion: &Motion) -> Self {
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
         let channel = |kind: &str, values, spikes| Channel::of(joint.name(kind), values, spikes);
-        let q_channel = channel("q", q, isolated_spikes(q));
+        let q_channel = channel("q", q, 0);
         let qd_channel = channel("qd", qd, 0);
         // A log too short for derivatives still has a speed: the logged one.
         let velocity = if motion.rows() > 0 {
@@ -95,7 +120,9 @@ impl JointAudit {
         let at_rest = speeds.iter().filter(|speed| **speed <= rest_rad_s).count();
         Self {
             joint,
+            opposed: opposed_velocity(motion, check, log.median_step()),
             velocity: check,
+            response: None,
             torque_lag: None,
             torque_demand: None,
             reversals: reversals(velocity, rest_rad_s),
@@ -108,7 +135,7 @@ impl JointAudit {
                 spikes,
                 ..qd_channel
             },
-            tau: channel("tau", tau, isolated_spikes(tau)),
+            tau: channel("tau", tau, rows_that_jump(tau).len()),
         }
     }
 }

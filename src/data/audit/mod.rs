@@ -1,50 +1,67 @@
-//! What a log is good for: sampling, noise, spikes, lags and excitation, measured before any fit.
+//! What a log is good for: units, signs, sampling, noise, jumps, lags and excitation, measured before any fit.
 //!
-//! The audit reads the log alone and no model. It changes nothing: what it finds is told, and the
-//! fit decides. Intervals that are left out are read like all others.
+//! The audit reads the log alone and no model but for the names of its columns. It changes nothing: what it finds is
+//! told, and the fit decides. Intervals that are left out are read like all others.
 
 mod channel;
 mod compare;
 mod demand;
 mod findings;
 mod joint;
+mod misread;
 mod motion;
 mod quality;
 mod regressors;
+mod response;
 mod table;
 
 pub use channel::Channel;
 pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
 pub use demand::TorqueDemand;
 pub use joint::JointAudit;
-pub use quality::{Audit, Finding, Severity};
+pub use quality::{Audit, Finding, Remedy, Severity};
+pub use response::Response;
 
+use super::columns::Columns;
+use super::dropped::{GAP_STEPS, dropped};
 use super::log::{Interval, Log};
 use super::signal::differences;
 use super::statistics::{deviation, median};
 
-/// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
-/// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
-const GAP_STEPS: f64 = 5.0;
-
-/// Measures the quality of a log.
+/// Measures the quality of a log that was read from these columns.
+///
+/// The numbers are those of the log as it was read. Where columns hold something else than was asked for, the first
+/// findings say so, and the others are about the log as it is meant.
 ///
 /// Works on any log that [`Log::read`] returns; quantities that need more rows or more motion than
 /// the log has are `None` or 0, as their documentation says.
-pub fn audit(log: &Log) -> Audit {
+pub fn audit(log: &Log, columns: &Columns) -> Audit {
+    let (meant, misread) = misread::as_meant(log, columns);
+    let mut audit = measured(&meant.log, meant.joints);
+    let findings = findings::of(&audit, &meant.log);
+    if !misread.is_empty() {
+        audit = measured(log, joint::audit_joints(log));
+    }
+    audit.findings = [misread, findings].concat();
+    audit.findings.sort_by_key(|finding| finding.severity);
+    audit
+}
+
+/// The numbers of an audit.
+fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
     let steps = differences(&log.time);
     let median_step_s = median(&steps);
     let is_gap = |step: &f64| *step > GAP_STEPS * median_step_s;
+    let gap = |pair: &[f64]| Interval {
+        start_s: pair[0],
+        end_s: pair[1],
+    };
     let gaps = log
         .time
         .windows(2)
-        .filter(|pair| is_gap(&(pair[1] - pair[0])))
-        .map(|pair| Interval {
-            start_s: pair[0],
-            end_s: pair[1],
-        });
+        .filter(|pair| is_gap(&(pair[1] - pair[0])));
     let regular: Vec<f64> = steps.iter().copied().filter(|step| !is_gap(step)).collect();
-    let mut audit = Audit {
+    Audit {
         log: log.name(),
         rows: log.rows(),
         duration_s: log.duration(),
@@ -52,12 +69,11 @@ pub fn audit(log: &Log) -> Audit {
         min_step_s: steps.iter().copied().reduce(f64::min).unwrap_or(0.0),
         max_step_s: steps.iter().copied().reduce(f64::max).unwrap_or(0.0),
         jitter: relative_deviation(&regular, median_step_s),
-        gaps: gaps.collect(),
-        joints: joint::audit_joints(log),
+        gaps: gaps.map(gap).collect(),
+        dropped_rows: dropped(log).iter().map(|dropped| dropped.count).sum(),
+        joints,
         findings: vec![],
-    };
-    audit.findings = findings::of(&audit, log);
-    audit
+    }
 }
 
 /// Standard deviation of the steps over their median; 0 for no steps.
@@ -72,6 +88,10 @@ fn relative_deviation(steps: &[f64], median_step_s: f64) -> f64 {
 mod tests {
     use super::*;
 
+    pub(super) fn audit(log: &Log) -> Audit {
+        super::audit(log, &Columns::default())
+    }
+
     pub(super) fn one_joint(time: Vec<f64>, q: Vec<f64>, qd: Vec<f64>, tau: Vec<f64>) -> Log {
         Log {
             path: "rig.csv".into(),
@@ -79,6 +99,7 @@ mod tests {
             q: vec![q],
             qd: vec![qd],
             tau: vec![tau],
+            masked: vec![vec![]],
             leave_out: vec![],
             notes: vec![],
         }

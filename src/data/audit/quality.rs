@@ -1,9 +1,12 @@
 //! The quality of one log, in numbers and in sentences.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::joint::JointAudit;
+use crate::data::Joint;
 use crate::data::log::Interval;
 
 /// The quality of one log.
@@ -25,10 +28,26 @@ pub struct Audit {
     pub jitter: f64,
     /// Steps longer than five median steps.
     pub gaps: Vec<Interval>,
+    /// Rows that are missing in steps of two to five median steps.
+    pub dropped_rows: usize,
     /// One entry a joint.
     pub joints: Vec<JointAudit>,
     /// What an engineer should know before fitting, the most serious first.
     pub findings: Vec<Finding>,
+}
+
+impl Audit {
+    /// Add what was found later, in its place.
+    pub(crate) fn add(&mut self, finding: Finding) {
+        self.findings.push(finding);
+        self.findings.sort_by_key(|finding| finding.severity);
+    }
+
+    /// The findings that make results wrong unless something is done.
+    pub fn serious(&self) -> impl Iterator<Item = &Finding> {
+        let findings = self.findings.iter();
+        findings.filter(|finding| finding.severity == Severity::Serious)
+    }
 }
 
 /// How much a finding matters.
@@ -43,11 +62,75 @@ pub enum Severity {
     Info,
 }
 
-/// One plain sentence about a log, with its evidence and, where there is one, its remedy.
+/// One plain sentence about a log, with its evidence, its place and what mends it.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Finding {
     /// How much it matters.
     pub severity: Severity,
+    /// The joint that it concerns, if it is a single one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<Joint>,
+    /// Where it is in the log: start and end of each stretch in s. Empty where it concerns the whole log.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub spans_s: Vec<[f64; 2]>,
     /// The sentence.
     pub text: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remedy: Option<Remedy>,
+}
+
+/// What to paste to mend what was found.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Remedy {
+    /// Arguments of `--leave-out`.
+    LeaveOut(Vec<String>),
+    /// Lines of the model file, in the table `[columns]`.
+    Columns(Vec<String>),
+}
+
+impl Finding {
+    /// A finding about a whole log.
+    pub(crate) fn new(severity: Severity, text: impl Into<String>) -> Self {
+        Self {
+            severity,
+            joint: None,
+            spans_s: vec![],
+            text: text.into(),
+            remedy: None,
+        }
+    }
+
+    /// The same in these stretches of a log, which can be left out.
+    pub(crate) fn within(self, log: &str, spans: &[Interval]) -> Self {
+        let argument = |span: &Interval| format!("{log}@{}-{}", span.start_s, span.end_s);
+        Self {
+            spans_s: spans
+                .iter()
+                .map(|span| [span.start_s, span.end_s])
+                .collect(),
+            remedy: Some(Remedy::LeaveOut(spans.iter().map(argument).collect())),
+            ..self
+        }
+    }
+}
+
+impl fmt::Display for Finding {
+    /// The sentence, and in brackets what to paste.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)?;
+        self.remedy
+            .iter()
+            .try_for_each(|remedy| write!(f, " ({remedy})"))
+    }
+}
+
+impl fmt::Display for Remedy {
+    /// `--leave-out run1.csv@4.2-5`, or `[columns] time = { column = "time", unit = "ms" }`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LeaveOut(spans) => write!(f, "--leave-out {}", spans.join(" ")),
+            Self::Columns(lines) => write!(f, "[columns] {}", lines.join("; ")),
+        }
+    }
 }

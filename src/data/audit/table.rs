@@ -97,6 +97,9 @@ impl Audit {
                 let label = if index == 0 { label } else { "" };
                 writeln!(f, "{label:<9}{line}")?;
             }
+            if let Some(remedy) = &finding.remedy {
+                writeln!(f, "{:<9}  paste: {remedy}", "")?;
+            }
         }
         Ok(())
     }
@@ -159,8 +162,7 @@ fn wrap(text: &str, width: usize) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::audit;
-    use super::super::tests::swing;
+    use super::super::tests::{audit, swing};
     use super::*;
 
     #[test]

@@ -93,9 +93,7 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
         return Vec::new();
     };
     let end_of_log = log.time[log.rows() - 1] + slack;
-    let starts = (0..).map(|k| begin + f64::from(k) * horizon_s / 2.0);
-    starts
-        .take_while(|start| start + horizon_s <= end_of_log)
+    starts(log, begin, horizon_s, slack)
         .filter_map(|start| {
             let first = row_at(start);
             let end = log.time[first] + horizon_s + slack;
@@ -113,6 +111,26 @@ pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
             })
         })
         .collect()
+}
+
+/// The times at which windows start: every half horizon, as long as a horizon fits into the log. Those that no row
+/// follows within a horizon are passed over, so that a clock that jumps by years costs no time.
+fn starts(log: &Log, begin: f64, horizon_s: f64, slack: f64) -> impl Iterator<Item = f64> {
+    let half = horizon_s / 2.0;
+    let end_of_log = log.time[log.rows() - 1] + slack;
+    let mut number = 0.0;
+    std::iter::from_fn(move || {
+        let mut start = begin + number * half;
+        let next = log
+            .time
+            .get(log.time.partition_point(|t| *t < start - slack))?;
+        if *next > start + horizon_s {
+            number = ((next - horizon_s - begin) / half).ceil();
+            start = begin + number * half;
+        }
+        number += 1.0;
+        (start + horizon_s <= end_of_log).then_some(start)
+    })
 }
 
 /// A log and the model at its values in that log.

@@ -36,10 +36,14 @@ pub(super) fn current(declared: &Dynamics, scaled: &[f32]) -> Dynamics {
     declared.clone().with_values(values)
 }
 
-/// The value of every parameter in its unit; of fixed ones as declared, to the last bit.
+/// The value of every parameter in its unit; of fixed ones as declared, to the last bit. One that rests on a bound stays
+/// within it, however it was rounded.
 pub(super) fn values(declared: &[Parameter], scaled: &[f64]) -> impl Iterator<Item = f64> {
     let pairs = declared.iter().zip(scaled);
-    pairs.map(|(p, scaled)| if p.fixed { p.value } else { scaled * p.scale })
+    pairs.map(|(p, scaled)| match p.fixed {
+        true => p.value,
+        false => (scaled * p.scale).clamp(p.bounds[0], p.bounds[1]),
+    })
 }
 
 /// Every parameter in its unit, from value / scale `[models, parameters]`: a tensor of shape `[models * rows]`, each

@@ -1,9 +1,10 @@
 //! What the measured quality of a log means for fitting a model to it, in plain sentences.
 
+mod jumps;
 mod torque;
 mod velocity;
 
-use super::joint::JointAudit;
+use super::joint::{JointAudit, VISIBLE_STEPS};
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::log::{Interval, Log};
@@ -19,10 +20,6 @@ const TOO_LITTLE_MOTION_S: f64 = 0.5;
 /// cannot be resolved.
 const LARGE_JITTER: f64 = 0.05;
 
-/// A motion of fewer quantisation steps (or noise deviations) than this says little: at rest an
-/// encoder flickers over two or three steps, and a creeping joint over five or six.
-const VISIBLE_STEPS: f64 = 10.0;
-
 /// With a larger share of bad rows, masking single rows does not save a column.
 const MANY_SPIKES: f64 = 0.01;
 
@@ -35,7 +32,10 @@ const MUCH_REST: f64 = 0.5;
 /// Beyond this share the logger reads its source more often than that changes.
 const MANY_REPEATS: f64 = 0.2;
 
-/// All findings about a log, the most serious first, otherwise in the order of the joints.
+/// A smaller share of dropped rows costs hardly a window.
+const FEW_DROPPED: f64 = 0.001;
+
+/// All findings about a log, in the order of the joints.
 pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
     let mut found = Found(vec![]);
     found.about_reading(log);
@@ -51,11 +51,11 @@ pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
         }
         if found.moves(joint) {
             found.about_excitation(joint);
-            found.about_angle(joint, audit.rows);
+            found.about_angle(joint);
+            found.about_jumps(joint, log);
             found.about_velocity(joint, audit);
         }
     }
-    found.0.sort_by_key(|finding| finding.severity);
     found.0
 }
 
@@ -87,8 +87,15 @@ struct Found(Vec<Finding>);
 
 impl Found {
     fn add(&mut self, severity: Severity, text: impl Into<String>) {
-        let text = text.into();
-        self.0.push(Finding { severity, text });
+        self.0.push(Finding::new(severity, text));
+    }
+
+    /// A finding about one joint.
+    fn add_of(&mut self, joint: &JointAudit, severity: Severity, text: impl Into<String>) {
+        self.0.push(Finding {
+            joint: Some(joint.joint),
+            ..Finding::new(severity, text)
+        });
     }
 
     fn about_reading(&mut self, log: &Log) {
@@ -116,19 +123,17 @@ impl Found {
             .iter()
             .max_by(|a, b| a.length_s().total_cmp(&b.length_s()))
         {
-            self.add(
-                Warning,
-                format!(
-                    "{} gap(s), the longest of {} s at t = {} s: leave them out ({}@{}-{})",
-                    gaps.len(),
-                    short(longest.length_s()),
-                    short(longest.start_s),
-                    audit.log,
-                    longest.start_s,
-                    longest.end_s
-                ),
+            let text = format!(
+                "{} gap(s), the longest of {} s at t = {} s: no window spans them, but the first rows after a gap tell \
+                 little of how the joints move; leave them out",
+                gaps.len(),
+                short(longest.length_s()),
+                short(longest.start_s)
             );
+            self.0
+                .push(Finding::new(Warning, text).within(&audit.log, gaps));
         }
+        self.about_dropped_rows(audit);
         if *jitter > LARGE_JITTER {
             self.add(
                 Warning,
@@ -141,6 +146,22 @@ impl Found {
                 ),
             );
         }
+    }
+
+    fn about_dropped_rows(&mut self, audit: &Audit) {
+        let share = audit.dropped_rows as f64 / audit.rows as f64;
+        if audit.dropped_rows == 0 {
+            return;
+        }
+        self.add(
+            if share > FEW_DROPPED { Warning } else { Info },
+            format!(
+                "{} row(s) are missing ({} as many as there are): the torque meanwhile is not known. Fits continue it \
+                 smoothly, and leave out steps in which it jumps; errors hold it from the row before, and so grow",
+                audit.dropped_rows,
+                percent(share)
+            ),
+        );
     }
 
     fn about_amount_of_motion(&mut self, audit: &Audit) {
@@ -166,21 +187,19 @@ impl Found {
 
     /// Whether a joint moves at all; says so if not.
     fn moves(&mut self, joint: &JointAudit) -> bool {
-        let q = &joint.q;
-        let visible = VISIBLE_STEPS * q.resolution.max(q.noise_std);
-        let moves = !q.constant && q.range() >= visible;
-        if !moves {
-            self.add(
+        if !joint.moves() {
+            self.add_of(
+                joint,
                 Serious,
                 format!(
                     "joint {} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or noise \
                      deviations: its parameters will not be identifiable from this log",
                     joint.joint,
-                    short(q.range())
+                    short(joint.q.range())
                 ),
             );
         }
-        moves
+        joint.moves()
     }
 
     fn about_excitation(&mut self, joint: &JointAudit) {
@@ -206,18 +225,8 @@ impl Found {
         }
     }
 
-    fn about_angle(&mut self, joint: &JointAudit, rows: usize) {
+    fn about_angle(&mut self, joint: &JointAudit) {
         let name = &joint.q.name;
-        if joint.q.spikes > 0 {
-            self.add(
-                spike_severity(joint.q.spikes, rows),
-                format!(
-                    "{name} has {} single-row spike(s) ({}): check the encoder's wiring",
-                    joint.q.spikes,
-                    percent(joint.q.spikes as f64 / rows as f64)
-                ),
-            );
-        }
         if joint.repeated_fraction > MANY_REPEATS {
             self.add(
                 Serious,
@@ -232,16 +241,17 @@ impl Found {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::audit;
-    use super::super::tests::{one_joint, swing};
+pub(super) mod tests {
+    use super::super::tests::{audit, one_joint, swing};
     use super::*;
 
     /// Whether the audit says something of this severity that holds all the given words.
-    pub(super) fn says(log: &Log, severity: Severity, words: &[&str]) -> bool {
+    pub(in super::super) fn says(log: &Log, severity: Severity, words: &[&str]) -> bool {
         let audit = audit(log);
         let fits = |finding: &Finding| {
-            finding.severity == severity && words.iter().all(|word| finding.text.contains(word))
+            let remedy = finding.remedy.as_ref().map(ToString::to_string);
+            let whole = format!("{} {}", finding.text, remedy.unwrap_or_default());
+            finding.severity == severity && words.iter().all(|word| whole.contains(word))
         };
         audit.findings.iter().any(fits)
     }
@@ -276,6 +286,20 @@ mod tests {
                 "1 gap(s), the longest of 0.202 s at t = 4.998 s",
                 "rig.csv@4.998-"
             ]
+        ));
+        let every = |row: &usize| row % 100 != 50;
+        let rows: Vec<usize> = (0..log.rows()).filter(every).collect();
+        let thinned = |values: &[f64]| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+        let dropped = one_joint(
+            thinned(&log.time),
+            thinned(&log.q[0]),
+            thinned(&log.qd[0]),
+            thinned(&log.tau[0]),
+        );
+        assert!(says(
+            &dropped,
+            Warning,
+            &["50 row(s) are missing", "1.01 %"]
         ));
         log.notes.push("columns ignored: \"mode\"".to_owned());
         assert!(says(&log, Info, &["columns ignored"]));

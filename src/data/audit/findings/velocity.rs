@@ -2,18 +2,12 @@
 
 use super::super::table::short;
 use super::super::{Audit, JointAudit, MAX_LAG_S, VelocityCheck};
-use super::Severity::{Info, Serious, Warning};
+use super::Severity::{Info, Warning};
 use super::{Found, milliseconds, percent, spike_severity};
 use crate::data::Joint;
 
-/// A velocity that correlates less than this with the derivative of its angle is something else.
-const SAME_QUANTITY: f64 = 0.5;
-
 /// A scale this far from 1 biases every rate-dependent effect by as much.
 const SCALE_OFF: f64 = 0.05;
-
-/// A scale this far from 1 is a unit or a gear ratio.
-const SCALE_WRONG: f64 = 0.2;
 
 /// A backward difference lags by 0.5 steps; shorter lags are within the error of the estimate.
 const LAG_STEPS: f64 = 0.4;
@@ -23,30 +17,8 @@ const LONG_LAG_STEPS: f64 = 1.5;
 
 impl Found {
     pub(super) fn about_velocity(&mut self, joint: &JointAudit, audit: &Audit) {
-        let name = &joint.qd.name;
-        let number = joint.joint;
-        if joint.qd.constant {
-            self.add(
-                Serious,
-                format!(
-                    "{name} is {} rad/s throughout while q{number} moves: {name} is no velocity; \
-                     take velocities from q{number}",
-                    short(joint.qd.max)
-                ),
-            );
-        }
+        let (name, number) = (&joint.qd.name, joint.joint);
         let Some(check) = joint.velocity else { return };
-        if check.correlation < SAME_QUANTITY {
-            self.add(
-                Serious,
-                format!(
-                    "{name} does not follow dq{number}/dt (correlation {}): check which column it is, \
-                     and its sign",
-                    short(check.correlation)
-                ),
-            );
-            return;
-        }
         self.about_velocity_scale(name, number, check);
         self.about_velocity_lag(name, number, check, audit.median_step_s);
         if joint.qd.spikes > 0 {
@@ -56,16 +28,13 @@ impl Found {
 
     fn about_velocity_spikes(&mut self, joint: &JointAudit, check: VelocityCheck, rows: usize) {
         let (name, number) = (&joint.qd.name, joint.joint);
-        let severity = spike_severity(joint.qd.spikes, rows);
-        let remedy = match severity {
-            Serious => format!("do not fit {name}; take velocities from q{number}"),
-            _ => format!("mask them, or take velocities from q{number}"),
-        };
-        self.add(
-            severity,
+        self.add_of(
+            joint,
+            // Never serious: fits read no velocities.
+            spike_severity(joint.qd.spikes, rows).max(Warning),
             format!(
-                "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: \
-                     {remedy}",
+                "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in errors of \
+                 velocities; `qd = []` under [columns] takes velocities from q{number}",
                 joint.qd.spikes,
                 percent(joint.qd.spikes as f64 / rows as f64),
                 short(check.worst_rad_s)
@@ -74,10 +43,9 @@ impl Found {
     }
 
     fn about_velocity_scale(&mut self, name: &str, number: Joint, check: VelocityCheck) {
-        let off = (check.scale - 1.0).abs();
-        if off > SCALE_OFF {
+        if (check.scale - 1.0).abs() > SCALE_OFF {
             self.add(
-                if off > SCALE_WRONG { Serious } else { Warning },
+                Warning,
                 format!(
                     "{name} is {} times dq{number}/dt: check its unit (rad/s) and gear ratio",
                     short(check.scale)
@@ -116,28 +84,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn velocities_that_cannot_be_used_are_named() {
+    fn velocities_that_disagree_in_single_rows_are_counted() {
         let with_qd = |change: fn(usize, f64) -> f64| {
             let mut log = swing();
             let numbered = log.qd[0].iter_mut().enumerate();
             numbered.for_each(|(row, value)| *value = change(row, *value));
             log
         };
-        assert!(says(
-            &with_qd(|_, v| 2.0 * v),
-            Serious,
-            &["qd1 is 2 times dq1/dt"]
-        ));
-        assert!(says(
-            &with_qd(|_, v| -v),
-            Serious,
-            &["qd1 does not follow dq1/dt"]
-        ));
-        assert!(says(
-            &with_qd(|_, _| 0.0),
-            Serious,
-            &["qd1 is 0 rad/s throughout"]
-        ));
         let spiky = with_qd(|row, v| if row % 500 == 250 { v + 9.0 } else { v });
         assert!(says(&spiky, Warning, &["qd1 has 10 sample(s)", "up to 9"]));
     }

@@ -1,0 +1,10 @@
+//! Rigs drawn by chance, by rules that a grid file holds: which effects they hide and how large, how messy their logs
+//! are, and how far off their model files start.
+
+mod matters;
+mod recipe;
+mod rules;
+mod size;
+
+pub use recipe::{Drawn, Recipe};
+pub use rules::Rules;

@@ -1,0 +1,123 @@
+//! The table as Markdown.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use super::table::{Entry, Row, Summary};
+
+/// Errors after up to this share of the best of the others are clearly better than it.
+const CLEARLY: f64 = 0.9;
+/// A network may raise the error after up to this factor.
+const NETWORK: f64 = 1.02;
+
+/// The summary as Markdown.
+pub fn markdown(summary: &Summary) -> String {
+    let mut text = String::from(
+        "Open-loop position error 0.5 s ahead on logs left out of the fit, in mrad: root mean square over all rows \
+         of all windows and all joints; the median window in brackets.\n\n\
+         | rig | fits | declared | declared, fitted | plain structure | published | after | hybrid | after / best of \
+         the others | hybrid / after | s a fit |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    summary.rows.iter().for_each(|row| push_row(&mut text, row));
+    push_totals(&mut text, &summary.rows);
+    text += "\n| rig | named (fits) | verdict (fits) |\n|---|---|---|\n";
+    for row in &summary.rows {
+        let (named, verdicts) = (listed(&row.named), listed(&row.verdicts));
+        let _ = writeln!(text, "| {} | {named} | {verdicts} |", name(row));
+    }
+    if !summary.failures.is_empty() {
+        text += "\n| failed | what | error |\n|---|---|---|\n";
+    }
+    for (fold, method, error) in &summary.failures {
+        let _ = writeln!(text, "| {fold} | {} | {error} |", method.name());
+    }
+    text
+}
+
+fn name(row: &Row) -> String {
+    match &row.group {
+        Some(group) => format!("{}, {group}", row.rig),
+        None => row.rig.clone(),
+    }
+}
+
+fn push_row(text: &mut String, row: &Row) {
+    let of = |model: &str| {
+        let entry = row.models.iter().find(|entry| entry.model == model);
+        entry.map_or("-".to_owned(), cell)
+    };
+    let sets = row.models.iter().filter_map(|entry| {
+        let name = entry.model.strip_prefix("published ")?;
+        Some(format!("{name}: {}", cell(entry)))
+    });
+    let sets: Vec<String> = sets.collect();
+    let ratio = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
+    let _ = writeln!(
+        text,
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
+        name(row),
+        row.folds,
+        of("declared"),
+        of("declared, fitted"),
+        of("plain structure"),
+        sets.join(", "),
+        of("after"),
+        of("hybrid"),
+        ratio(row.ratio),
+        ratio(row.hybrid_ratio),
+        row.seconds
+    );
+}
+
+/// `31.2 (6.1)`; where folds failed, their number, since the rest is no error of all test logs.
+fn cell(entry: &Entry) -> String {
+    match (entry.failed, entry.middle()) {
+        (0, Some(middle)) if middle.windows > 0 => {
+            let [rms, median] = [middle.position_rms, middle.position_median].map(mrad);
+            format!("{rms} ({median})")
+        }
+        (0, _) => "no window".to_owned(),
+        (failed, _) => format!("{failed} failed"),
+    }
+}
+
+fn mrad(rad: f64) -> String {
+    match 1e3 * rad {
+        small if small < 10.0 => format!("{small:.2}"),
+        middle if middle < 100.0 => format!("{middle:.1}"),
+        large => format!("{large:.0}"),
+    }
+}
+
+/// A row without a ratio counts as not reached.
+fn push_totals(text: &mut String, rows: &[Row]) {
+    let count = |value: fn(&Row) -> Option<f64>, limit: f64| {
+        rows.iter()
+            .filter(|row| value(row).is_some_and(|ratio| ratio <= limit))
+            .count()
+    };
+    let _ = writeln!(
+        text,
+        "\nOf {} rows: error after at most that of the best of the others (plain structure, published sets) in {}, at \
+         most {CLEARLY} of it in {}; error with the network at most {NETWORK} of the error after in {}.",
+        rows.len(),
+        count(|row| row.ratio, 1.0),
+        count(|row| row.ratio, CLEARLY),
+        count(|row| row.hybrid_ratio, NETWORK)
+    );
+}
+
+/// `coulomb_friction@1 (4), viscous_friction@1 (2)`, the most frequent first.
+fn listed(counts: &BTreeMap<String, usize>) -> String {
+    let mut all: Vec<(&String, &usize)> = counts.iter().collect();
+    all.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+    let told: Vec<String> = all
+        .into_iter()
+        .map(|(what, count)| format!("{what} ({count})"))
+        .collect();
+    if told.is_empty() {
+        "nothing".to_owned()
+    } else {
+        told.join(", ")
+    }
+}

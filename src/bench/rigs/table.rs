@@ -1,0 +1,265 @@
+//! How closing the loop compares with what else there is, rig by rig.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::errors::{LogErrors, Squares};
+use super::fold::{Fold, Measured};
+use super::method::{Found, Method, Said, Scored};
+use crate::closeloop::{Settings, Verdict};
+use crate::data::statistics::median;
+
+/// What a method gave in a fold, with its time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    pub rig: String,
+    pub fold: String,
+    pub method: Method,
+    /// Hash of what the numbers depend on, and of the program: results of another are not used again.
+    pub configuration: String,
+    pub program: String,
+    pub seconds: f64,
+    /// An error counts as a failure wherever the method counts.
+    pub found: Result<Found, String>,
+}
+
+/// A row of the table: the folds of a rig that leave logs out, or a group of other test logs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    pub rig: String,
+    pub group: Option<String>,
+    /// Number of fits that the row's test logs were scored by.
+    pub folds: usize,
+    pub models: Vec<Entry>,
+    /// Least error of the plain structure and the published sets, and whose it is.
+    pub best: Option<(String, f64)>,
+    /// Error after over that.
+    pub ratio: Option<f64>,
+    /// Error with the residual network over the error after.
+    pub hybrid_ratio: Option<f64>,
+    /// Effects and verdicts, each with the number of folds.
+    pub named: BTreeMap<String, usize>,
+    pub verdicts: BTreeMap<String, usize>,
+    /// Run time of closing the loop in a fold \[s\]: median.
+    pub seconds: f64,
+}
+
+/// The error of a model in a row.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Entry {
+    pub model: String,
+    /// Number of folds in which there is no such model, since its fit failed.
+    pub failed: usize,
+    /// Over all test logs of the folds that did not fail.
+    pub pooled: Vec<Horizon>,
+    /// Over each test log.
+    pub logs: Vec<(String, Vec<Horizon>)>,
+}
+
+/// Open-loop position error at a horizon.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Horizon {
+    pub horizon_s: f64,
+    /// Root mean square over all rows of all windows and all joints \[rad\]; null without a window.
+    pub position_rms: f64,
+    /// Median over the windows of a window's own root mean square \[rad\].
+    pub position_median: f64,
+    pub windows: usize,
+    pub diverged: usize,
+}
+
+/// The results of all rigs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    pub rows: Vec<Row>,
+    /// Fold, method and error of each failure.
+    pub failures: Vec<(String, Method, String)>,
+    pub seconds: f64,
+}
+
+/// Pool the results of the folds.
+pub fn summarise(rigs: &[Measured], lines: &[Line]) -> Summary {
+    let row = |rig| {
+        let lines = Lines { rig, lines };
+        lines
+            .groups()
+            .into_iter()
+            .map(move |group| lines.row(group))
+    };
+    let failure = |line: &Line| {
+        let error = line.found.as_ref().err()?;
+        Some((
+            format!("{}, {}", line.rig, line.fold),
+            line.method,
+            error.clone(),
+        ))
+    };
+    Summary {
+        rows: rigs.iter().flat_map(row).collect(),
+        failures: lines.iter().filter_map(failure).collect(),
+        seconds: lines.iter().map(|line| line.seconds).sum(),
+    }
+}
+
+/// The results of one rig.
+#[derive(Clone, Copy)]
+struct Lines<'a> {
+    rig: &'a Measured,
+    lines: &'a [Line],
+}
+
+impl<'a> Lines<'a> {
+    /// The rows of the rig.
+    fn groups(self) -> Vec<Option<&'a str>> {
+        let also = self.rig.rig.also.keys();
+        std::iter::once(None)
+            .chain(also.map(|group| Some(group.as_str())))
+            .collect()
+    }
+
+    fn row(self, group: Option<&str>) -> Row {
+        let folds = self.folds(group);
+        let models = Method::ALL.into_iter().flat_map(|method| {
+            let scored = method.scores(self.rig).into_iter();
+            scored.map(move |what| (method, what))
+        });
+        let models: Vec<(Scored, Entry)> = models
+            .map(|(method, what)| {
+                let entry = self.entry(method, &what, &folds, group);
+                (what, entry)
+            })
+            .collect();
+        let error = |what: &Scored| models.iter().find(|(w, _)| w == what)?.1.error();
+        let rivals = models.iter().filter(|(what, _)| what.is_rival());
+        let best = rivals
+            .filter_map(|(what, entry)| Some((what.to_string(), entry.error()?)))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let after = error(&Scored::After);
+        let closed: Vec<&Line> = folds
+            .iter()
+            .filter_map(|fold| self.of(fold, Method::CloseLoop))
+            .collect();
+        let said: Vec<&Said> = closed.iter().filter_map(|line| line.said()).collect();
+        let seconds: Vec<f64> = closed.iter().map(|line| line.seconds).collect();
+        Row {
+            rig: self.rig.rig.name.clone(),
+            group: group.map(str::to_owned),
+            folds: folds.len(),
+            ratio: after
+                .zip(best.as_ref())
+                .map(|(after, (_, best))| after / best),
+            hybrid_ratio: error(&Scored::Hybrid)
+                .zip(after)
+                .map(|(hybrid, after)| hybrid / after),
+            best,
+            named: counts(said.iter().flat_map(|said| said.names.clone())),
+            verdicts: counts(said.iter().map(|said| word(said.verdict))),
+            seconds: median(&seconds),
+            models: models.into_iter().map(|(_, entry)| entry).collect(),
+        }
+    }
+
+    /// Folds with test logs of a row.
+    fn folds(self, group: Option<&str>) -> Vec<&'a Fold> {
+        let in_group = |fold: &&Fold| {
+            fold.places
+                .iter()
+                .any(|place| place.group.as_deref() == group)
+        };
+        self.rig.folds.iter().filter(in_group).collect()
+    }
+
+    /// The result of a method in a fold.
+    fn of(self, fold: &Fold, method: Method) -> Option<&'a Line> {
+        let rig = &self.rig.rig.name;
+        let is_it =
+            |line: &&Line| line.rig == *rig && line.fold == fold.name && line.method == method;
+        self.lines.iter().find(is_it)
+    }
+
+    fn entry(
+        self,
+        method: Method,
+        what: &Scored,
+        folds: &[&'a Fold],
+        group: Option<&str>,
+    ) -> Entry {
+        let mut logs: Vec<(String, &LogErrors)> = Vec::new();
+        let mut failed = 0;
+        for fold in folds {
+            let Some(errors) = self.of(fold, method).and_then(|line| line.errors(what)) else {
+                failed += 1;
+                continue;
+            };
+            let in_group = fold.places.iter().zip(errors);
+            let in_group = in_group.filter(|(place, _)| place.group.as_deref() == group);
+            logs.extend(in_group.map(|(place, errors)| (place.log.clone(), errors)));
+        }
+        let all: Vec<&LogErrors> = logs.iter().map(|(_, errors)| *errors).collect();
+        Entry {
+            model: what.to_string(),
+            failed,
+            pooled: horizons(&all),
+            logs: logs
+                .iter()
+                .map(|(log, errors)| (log.clone(), horizons(&[*errors])))
+                .collect(),
+        }
+    }
+}
+
+impl Line {
+    fn said(&self) -> Option<&Said> {
+        self.found.as_ref().ok()?.said.as_ref()
+    }
+
+    fn errors(&self, what: &Scored) -> Option<&[LogErrors]> {
+        let errors = &self.found.as_ref().ok()?.errors;
+        errors
+            .iter()
+            .find(|(scored, _)| scored == what)
+            .map(|(_, errors)| errors.as_slice())
+    }
+}
+
+impl Entry {
+    /// The error of the table, where no fold failed \[rad\].
+    pub fn error(&self) -> Option<f64> {
+        let middle = self.middle()?;
+        (self.failed == 0 && middle.windows > 0).then_some(middle.position_rms)
+    }
+
+    /// The horizon of the table.
+    pub fn middle(&self) -> Option<&Horizon> {
+        self.pooled.get(self.pooled.len() / 2)
+    }
+}
+
+fn horizons(logs: &[&LogErrors]) -> Vec<Horizon> {
+    let horizons_s = Settings::default().score.horizons_s;
+    let horizon = |(k, horizon_s)| {
+        let squares = Squares::pooled(logs.iter().map(|errors| &errors[k]));
+        Horizon {
+            horizon_s,
+            position_rms: squares.rms(),
+            position_median: squares.median(),
+            windows: squares.windows.len(),
+            diverged: squares.diverged,
+        }
+    };
+    horizons_s.into_iter().enumerate().map(horizon).collect()
+}
+
+fn counts(all: impl Iterator<Item = String>) -> BTreeMap<String, usize> {
+    all.fold(BTreeMap::new(), |mut counts, one| {
+        *counts.entry(one).or_default() += 1;
+        counts
+    })
+}
+
+/// `partly explained`
+fn word(verdict: Verdict) -> String {
+    let json = serde_json::to_value(verdict).expect("a verdict is a word");
+    json.as_str().unwrap_or_default().replace('_', " ")
+}

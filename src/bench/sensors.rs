@@ -1,0 +1,191 @@
+//! What is logged of a rig: encoders, torque sensor, clock, and rows that are lost on the way.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, Normal};
+use serde::{Deserialize, Serialize};
+
+/// Flaws of a logger; all zero for a good one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Flaws {
+    /// Standard deviation of the time between two rows, as a share of it.
+    pub jitter: f64,
+    /// Share of the rows that are lost.
+    pub dropped: f64,
+    /// Rows that are lost at once, at most.
+    pub burst: usize,
+    /// Standard deviation of the logged torque, and the step in which it is logged, zero for a fine one: in parts of the
+    /// largest torque of the joint.
+    pub torque_noise: f64,
+    pub torque_quantum: f64,
+    /// Time constant of the filter behind the difference quotient of the positions \[s\].
+    pub filter_s: f64,
+}
+
+impl Flaws {
+    /// Whether a logger can have them.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn check(&self) -> Result<(), String> {
+        let sizes = [
+            self.jitter,
+            self.torque_noise,
+            self.torque_quantum,
+            self.filter_s,
+        ];
+        let sound = sizes.iter().all(|size| *size >= 0.0)
+            && (0.0..0.5).contains(&self.dropped)
+            && (self.dropped == 0.0 || self.burst > 0);
+        let needs =
+            "`flaws` needs numbers not below zero, `dropped` below a half, and `burst` with it";
+        if sound { Ok(()) } else { Err(needs.to_owned()) }
+    }
+
+    /// What is logged of a command to a joint whose largest torque is `limit` \[N m\].
+    pub fn torque(&self, command: f64, limit: f64, rng: &mut impl Rng) -> f64 {
+        match (self.torque_noise, self.torque_quantum) {
+            (0.0, 0.0) => command,
+            (noise, quantum) => sensed(command, limit * noise, limit * quantum, rng),
+        }
+    }
+}
+
+/// The steps of a clock: its ticks are off their times, but the times that it tells are right.
+pub struct Clock<'c> {
+    step_s: f64,
+    flaws: &'c Flaws,
+    ticks: u32,
+}
+
+/// A tick is off by at most this share of a step, so that time rises.
+const FARTHEST: f64 = 0.45;
+
+impl<'c> Clock<'c> {
+    pub fn new(rate_hz: f64, flaws: &'c Flaws) -> Self {
+        Self {
+            step_s: 1.0 / rate_hz,
+            flaws,
+            ticks: 0,
+        }
+    }
+
+    /// Time of the next tick \[s\].
+    pub fn next(&mut self, rng: &mut impl Rng) -> f64 {
+        self.ticks += 1;
+        let off = match self.flaws.jitter {
+            // A step ends at two ticks, both of them off.
+            jitter if jitter > 0.0 => normal(FRAC_1_SQRT_2 * jitter, rng),
+            _ => 0.0,
+        };
+        (f64::from(self.ticks) + off.clamp(-FARTHEST, FARTHEST)) * self.step_s
+    }
+}
+
+/// Which rows are lost.
+pub struct Losses<'c> {
+    flaws: &'c Flaws,
+    /// Rows of the present loss that are still to come.
+    left: usize,
+}
+
+impl<'c> Losses<'c> {
+    pub fn new(flaws: &'c Flaws) -> Self {
+        Self { flaws, left: 0 }
+    }
+
+    /// Whether the next row is lost.
+    pub fn next(&mut self, rng: &mut impl Rng) -> bool {
+        if self.left > 0 {
+            self.left -= 1;
+            return true;
+        }
+        if self.flaws.dropped == 0.0 {
+            return false;
+        }
+        #[allow(clippy::cast_precision_loss)] // a few rows
+        let mean = 0.5 * (1 + self.flaws.burst) as f64;
+        // Losses of `mean` rows begin in this share of the rows between them.
+        let begins = self.flaws.dropped / (mean * (1.0 - self.flaws.dropped));
+        let lost = rng.random::<f64>() < begins;
+        if lost {
+            self.left = rng.random_range(0..self.flaws.burst);
+        }
+        lost
+    }
+}
+
+/// A value with white noise of this standard deviation, in whole steps of `quantum` unless that is zero.
+pub fn sensed(value: f64, noise: f64, quantum: f64, rng: &mut impl Rng) -> f64 {
+    let value = value + normal(noise, rng);
+    match quantum {
+        quantum if quantum > 0.0 => (value / quantum).round() * quantum,
+        _ => value,
+    }
+}
+
+fn normal(deviation: f64, rng: &mut impl Rng) -> f64 {
+    let normal = Normal::new(0.0, deviation).expect("the grid was checked");
+    normal.sample(rng)
+}
+
+/// The speed of a joint as a rig's controller takes it from the angles: the difference quotient, filtered.
+#[derive(Clone, Default)]
+pub struct Speed {
+    previous: Option<f64>,
+    value: f64,
+}
+
+impl Speed {
+    /// The speed \[rad/s\] at an angle measured `dt` s after the previous one, behind a first-order filter of time
+    /// constant `filter_s`; zero at the first.
+    pub fn at(&mut self, angle: f64, dt: f64, filter_s: f64) -> f64 {
+        let raw = (angle - self.previous.unwrap_or(angle)) / dt;
+        self.previous = Some(angle);
+        self.value += (raw - self.value) * dt / (filter_s + dt);
+        self.value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{Clock, Flaws, Losses};
+
+    const MESSY: Flaws = Flaws {
+        jitter: 0.2,
+        dropped: 0.03,
+        burst: 4,
+        torque_noise: 0.0,
+        torque_quantum: 0.0,
+        filter_s: 0.0,
+    };
+
+    #[test]
+    fn steps_of_a_clock_vary_as_much_as_asked_for_and_time_rises() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let mut clock = Clock::new(100.0, &MESSY);
+        let times: Vec<f64> = (0..20_000).map(|_| clock.next(rng)).collect();
+        let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(steps.iter().all(|step| *step > 0.0));
+        let square = steps.iter().map(|step| (step - 0.01).powi(2)).sum::<f64>();
+        let deviation = (square / steps.len() as f64).sqrt() / 0.01;
+        assert!((deviation - 0.2).abs() < 0.01, "{deviation}");
+        assert!((times[19_999] - 200.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn rows_are_lost_in_the_share_asked_for_and_several_at_once() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(3);
+        let mut losses = Losses::new(&MESSY);
+        let lost: Vec<bool> = (0..100_000).map(|_| losses.next(rng)).collect();
+        let count = lost.iter().filter(|lost| **lost).count();
+        assert!((2700..3300).contains(&count), "{count}");
+        let longest = lost.split(|lost| !lost).map(<[bool]>::len).max();
+        assert!((2..=8).contains(&longest.unwrap()), "{longest:?}");
+    }
+}

@@ -1,0 +1,122 @@
+//! Stage 5: which of the selected effects are established.
+
+use rayon::prelude::*;
+
+use super::select::{Folds, Trial, gain, losses_by, p_of_gains, p_value};
+use super::settings::EstablishSettings;
+use super::study::Study;
+use crate::model::{FittedEffect, Status};
+
+/// How sure an effect of the model is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Standing {
+    pub effect: FittedEffect,
+    pub status: Status,
+    /// Fall of the loss on left-out stretches by this effect beside the others, as a share.
+    pub gain: f64,
+    /// Probability of such evidence without the effect.
+    pub p_value: f64,
+    /// Why it is not established, in a sentence.
+    pub reason: Option<String>,
+}
+
+/// Judge each effect that a model has beyond the declared ones by the model refitted without it, `without`; where that
+/// failed, the model needs the effect. `trials` is the number of candidates, at all their starting points.
+pub(super) fn establish(
+    study: &Study<'_>,
+    chosen: &Trial,
+    without: &[Option<Trial>],
+    trials: usize,
+) -> Vec<Standing> {
+    let halves = Folds::of(study).in_halves();
+    let crossed = |trial: &Trial| losses_by(&halves, &trial.fitted.fit);
+    let with = crossed(chosen);
+    let added = study.added(&chosen.fitted.model);
+    let standing = |(k, less): (usize, &Option<Trial>)| {
+        let effect = chosen.fitted.model.effects[k].clone();
+        let Some(less) = less else {
+            return Standing {
+                effect,
+                status: Status::Established,
+                gain: 1.0,
+                p_value: 0.0,
+                reason: None,
+            };
+        };
+        let crossed_less = crossed(less);
+        let evidence = Evidence {
+            gain: gain(&less.losses, &chosen.losses),
+            p_of_values: p_value(study, &chosen.fitted, k),
+            p_of_falls: p_of_gains(&crossed_less, &with),
+            crossed_gain: gain(&crossed_less, &with),
+        };
+        let reason = evidence.lack(trials, &study.settings.establish);
+        Standing {
+            effect,
+            status: if reason.is_none() {
+                Status::Established
+            } else {
+                Status::Supported
+            },
+            gain: evidence.gain,
+            p_value: evidence.p_of_values.unwrap_or(evidence.p_of_falls),
+            reason,
+        }
+    };
+    added.into_par_iter().zip(without).map(standing).collect()
+}
+
+/// The models refitted without each of the added effects; `None` where that failed.
+pub(super) fn without_each(study: &Study<'_>, chosen: &Trial) -> Vec<Option<Trial>> {
+    let less = |k: usize| {
+        Some(Trial::of(
+            study,
+            study.without_effect(&chosen.fitted, k).ok()?,
+        ))
+    };
+    study
+        .added(&chosen.fitted.model)
+        .into_par_iter()
+        .map(less)
+        .collect()
+}
+
+/// What speaks for one effect beside the others.
+struct Evidence {
+    gain: f64,
+    /// By the cluster-robust Wald test; `None` for an effect that no value switches off.
+    p_of_values: Option<f64>,
+    /// By the falls of the loss, each half of the stretches judged with the values that fit the other.
+    p_of_falls: f64,
+    crossed_gain: f64,
+}
+
+impl Evidence {
+    /// What is missing for the effect to be established.
+    fn lack(&self, trials: usize, settings: &EstablishSettings) -> Option<String> {
+        #[allow(clippy::cast_precision_loss)] // few trials
+        let level = settings.false_alarm / trials.max(1) as f64;
+        let p = self.p_of_values.unwrap_or(self.p_of_falls);
+        let significant = p < level
+            || self.gain > settings.plain && p.min(self.p_of_falls) < settings.significant_alone;
+        if self.gain < settings.worthwhile {
+            return Some(format!(
+                "it lowers the loss on left-out stretches by {:.1} % only",
+                100.0 * self.gain
+            ));
+        }
+        if !significant {
+            return Some(format!(
+                "p = {p:.2e} is too large among {trials} candidates"
+            ));
+        }
+        let confirmed =
+            self.p_of_falls <= settings.confirmed || self.crossed_gain >= settings.plain;
+        (!confirmed).then(|| {
+            format!(
+                "with values fitted to one half of the stretches it changes the loss on the other by {:.0} % (p = {:.2})",
+                -100.0 * self.crossed_gain, self.p_of_falls
+            )
+        })
+    }
+}

@@ -1,0 +1,126 @@
+//! Forces that no column holds: a person pushes, a cable pulls, a limb touches. The fitted model follows the log there
+//! only with a further torque that is far beyond what it needs elsewhere.
+
+use super::remainder::ForceSample;
+use super::study::Study;
+use crate::data::statistics::{SIGMA_PER_MAD, median};
+use crate::data::{Audit, Finding, Interval, Joint, Severity};
+
+/// A residual force counts as a push beyond this many standard deviations of the others,
+const PUSH: f64 = 8.0;
+
+/// and from this share of the joint's largest torque on: less is what the smoothing of friction leaves of a clean log.
+const PUSH_SHARE: f64 = 0.1;
+
+/// A push goes on next to its strongest stretch as long as the force stays beyond this many standard deviations,
+const ITS_EDGE: f64 = 4.0;
+
+/// for this many stretches at least: an end stop or a joint that sticks is over in one.
+const ITS_STRETCHES: usize = 2;
+
+/// One push on one joint.
+#[derive(Debug)]
+struct Push {
+    log: usize,
+    joint: Joint,
+    span: Interval,
+    /// Largest further force, N m or N.
+    force: f64,
+    /// The same over what the model needs elsewhere.
+    times: f64,
+}
+
+/// Add to the audits of the study's logs where something pushed, as far as the residual forces of a fitted model tell.
+pub(super) fn tell_pushes(study: &Study<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
+    let stretch_s = study.settings.remainder.stretch_s;
+    for joint in Joint::all(study.declared.joints) {
+        let least = PUSH_SHARE * study.top_torque[joint];
+        for push in pushes(forces, joint, stretch_s, least) {
+            audits[push.log].add(push.finding(&study.logs[push.log].name()));
+        }
+    }
+}
+
+/// The pushes on a joint of at least so much force, in stretches of `stretch_s`.
+fn pushes(samples: &[ForceSample], joint: Joint, stretch_s: f64, least: f64) -> Vec<Push> {
+    let force = |sample: &ForceSample| sample.force[joint];
+    let sizes: Vec<f64> = samples.iter().map(|sample| force(sample).abs()).collect();
+    let deviation = SIGMA_PER_MAD * median(&sizes);
+    let is_far = |sample: &ForceSample| force(sample).abs() > ITS_EDGE * deviation;
+    let goes_on = |a: &ForceSample, b: &ForceSample| {
+        let adjacent = a.log == b.log && b.time_s - a.time_s < 1.5 * stretch_s;
+        adjacent && is_far(a) && is_far(b)
+    };
+    let push = |run: &[ForceSample]| {
+        let largest = run
+            .iter()
+            .map(|sample| force(sample).abs())
+            .fold(0.0, f64::max);
+        let is_push = run.len() >= ITS_STRETCHES && largest > least.max(PUSH * deviation);
+        is_push.then(|| Push {
+            log: run[0].log,
+            joint,
+            span: Interval {
+                start_s: run[0].time_s - 0.5 * stretch_s,
+                end_s: run[run.len() - 1].time_s + 0.5 * stretch_s,
+            },
+            force: largest,
+            times: largest / deviation,
+        })
+    };
+    samples.chunk_by(goes_on).filter_map(push).collect()
+}
+
+impl Push {
+    fn finding(&self, log: &str) -> Finding {
+        let rounded = |t: f64| (100.0 * t).round() / 100.0;
+        let span = Interval {
+            start_s: rounded(self.span.start_s),
+            end_s: rounded(self.span.end_s),
+        };
+        let text = format!(
+            "from {span} the model follows joint {} only with a further force of up to {:.3} N m (N), {:.0} times what it \
+             needs elsewhere: did something push or touch the rig? If so, leave it out",
+            self.joint, self.force, self.times
+        );
+        Finding {
+            joint: Some(self.joint),
+            ..Finding::new(Severity::Warning, text).within(log, &[span])
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forces of one joint in stretches of 0.15 s.
+    fn samples(force: impl Fn(usize) -> f64) -> Vec<ForceSample> {
+        let sample = |k: usize| ForceSample {
+            log: 0,
+            time_s: 0.15 * k as f64,
+            q: vec![0.0],
+            qd: vec![0.0],
+            tau: vec![0.0],
+            force: vec![force(k)],
+        };
+        (0..100).map(sample).collect()
+    }
+
+    #[test]
+    fn a_force_that_lasts_is_a_push_and_a_single_knock_is_none() {
+        let usual = |k: usize| 0.01 * (k as f64).sin();
+        let found = |force: &dyn Fn(usize) -> f64, least: f64| {
+            pushes(&samples(force), Joint::at(0), 0.15, least)
+        };
+        assert!(found(&usual, 0.0).is_empty());
+        let pushed = |k: usize| usual(k) + if (40..44).contains(&k) { 2.0 } else { 0.0 };
+        let one = found(&pushed, 0.1);
+        assert_eq!(one.len(), 1, "{one:?}");
+        assert!(
+            (one[0].span.start_s - 5.925).abs() < 1e-9 && (one[0].span.end_s - 6.525).abs() < 1e-9
+        );
+        assert!(found(&pushed, 3.0).is_empty());
+        assert!(found(&|k| usual(k) + if k == 40 { 2.0 } else { 0.0 }, 0.1).is_empty());
+    }
+}

@@ -1,0 +1,262 @@
+use std::ops::{AddAssign, Range};
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::candidate::{beside, best_start, has_switch};
+use super::folds::{Folds, step_without};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::study::Study;
+use crate::identify::{Column, Fit, WindowTerms, as_it_stands, with_unit_diagonal};
+use crate::model::{Dynamics, EffectParameter, FittedEffect};
+
+/// What sets of effects promise beside a fitted model: its loss as a quadratic function of its own parameters and those
+/// of every candidate at once. Sets are compared on it without a fit, and candidates that help only together are seen
+/// together.
+pub struct Outlook {
+    /// The effects that the model has beyond the declared ones, then the candidates at their best starting points.
+    pub items: Vec<FittedEffect>,
+    /// How many of the items the model has.
+    present: usize,
+    /// The free values of each item.
+    columns_of: Vec<Vec<usize>>,
+    /// Free values that belong to no item.
+    base: Vec<usize>,
+    /// Of each free value: how far it is from its bounds, and from being switched off.
+    room: Vec<[f64; 2]>,
+    to_zero: Vec<f64>,
+    groups_of: Vec<usize>,
+    stretches: Vec<WindowTerms>,
+    groups: Vec<WindowTerms>,
+    all: WindowTerms,
+}
+
+/// A set of items, in rising order.
+pub type Set = Vec<usize>;
+
+/// The predicted minimum of the loss for one set.
+struct Minimum {
+    free: Vec<usize>,
+    /// Displacement of the values that are not free: those of effects that are dropped, and those that stop at a bound.
+    held: DVector<f64>,
+    moved: Vec<usize>,
+}
+
+impl Outlook {
+    /// The loss of `fitted` and of all candidates beside it; `None` where the model diverges.
+    pub fn of(study: &Study<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
+        let options: Vec<FittedEffect> = candidates
+            .par_iter()
+            .filter(|candidate| has_switch(candidate))
+            .filter_map(|candidate| {
+                let beside = beside(study, fitted, candidate)?;
+                if candidate
+                    .effect
+                    .parameters
+                    .iter()
+                    .all(EffectParameter::is_switch)
+                {
+                    return Some(candidate.clone());
+                }
+                Some(best_start(study, &beside, candidate)?.0)
+            })
+            .collect();
+        let model = fitted.model.with_effects(fitted.effects_and(&options));
+        let model = study.smoothed(&model);
+        let dynamics = model.dynamics();
+        let added = study.declared.effects.len()..model.effects.len();
+        let places: Vec<Range<usize>> = added.clone().map(|k| model.place_of(k)).collect();
+        let present = study.added(&fitted.model).len();
+        // Beside an absent effect the values that give it its shape change nothing.
+        let shapes = |k: &usize| {
+            let item = places.iter().position(|place| place.contains(k));
+            item.is_some_and(|item| {
+                let parameters = &model.effects[added.start + item].effect.parameters;
+                item >= present && !parameters[k - places[item].start].is_switch()
+            })
+        };
+        let mut active = study.active(&dynamics);
+        active.retain(|k| !shapes(k));
+        let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
+        let fit = as_it_stands(&study.shooting, &dynamics, &active, locals, scale).ok()?;
+        let items = model.effects[added].to_vec();
+        Some(Self::from_fit(
+            study, &dynamics, &fit, items, &places, present,
+        ))
+    }
+
+    fn from_fit(
+        study: &Study<'_>,
+        dynamics: &Dynamics,
+        fit: &Fit,
+        items: Vec<FittedEffect>,
+        places: &[Range<usize>],
+        present: usize,
+    ) -> Self {
+        let values = crate::identify::Values::of(dynamics, study.logs);
+        let of_item = |place: &Range<usize>| -> Vec<usize> {
+            let columns = fit.columns.iter().enumerate();
+            let own = columns.filter(|(_, column)| place.contains(&column.parameter));
+            own.map(|(i, _)| i).collect()
+        };
+        let columns_of: Vec<Vec<usize>> = places.iter().map(of_item).collect();
+        let is_base = |i: &usize| !columns_of.iter().any(|of| of.contains(i));
+        let room = |column: &Column| {
+            let [low, high] = dynamics.parameters[column.parameter].bounds;
+            let at = values.get(*column);
+            [(low - at).min(0.0), (high - at).max(0.0)]
+        };
+        let to_zero = |column: &Column| {
+            let place = places.iter().zip(&items);
+            let mut of = place.filter(|(place, _)| place.contains(&column.parameter));
+            let is_switch = of.next().is_some_and(|(place, item)| {
+                item.effect.parameters[column.parameter - place.start].is_switch()
+            });
+            if is_switch { -values.get(*column) } else { 0.0 }
+        };
+        let folds = Folds::of(study);
+        let (stretches, groups) = folds.equations(fit);
+        Self {
+            base: (0..fit.columns.len()).filter(is_base).collect(),
+            room: fit.columns.iter().map(room).collect(),
+            to_zero: fit.columns.iter().map(to_zero).collect(),
+            groups_of: folds.groups,
+            all: fit.equations(),
+            items,
+            present,
+            columns_of,
+            stretches,
+            groups,
+        }
+    }
+
+    /// The items that the model has.
+    pub fn present(&self) -> Set {
+        (0..self.present).collect()
+    }
+
+    /// The items of a set.
+    pub fn effects(&self, set: &[usize]) -> Vec<FittedEffect> {
+        set.iter().map(|&item| self.items[item].clone()).collect()
+    }
+
+    /// Predicted loss of a set on each stretch, with the parameters that a fit without the stretch's group would give.
+    pub fn losses(&self, set: &[usize]) -> Option<Vec<f64>> {
+        let minimum = self.minimum(set)?;
+        let (free, moved) = (&minimum.free, &minimum.moved);
+        let rows: Vec<usize> = [free.as_slice(), moved].concat();
+        let at = self.step(&minimum)?.select_rows(&rows);
+        let all = sub(&self.all.hessian, free, free);
+        let without = |group: &WindowTerms| {
+            let gradient =
+                group.gradient.select_rows(free) + sub(&group.hessian, free, &rows) * &at;
+            let step = step_without(&all, &sub(&group.hessian, free, free), &gradient);
+            let mut there = at.clone();
+            there.rows_mut(0, free.len()).add_assign(&step);
+            there
+        };
+        let steps: Vec<DVector<f64>> = self.groups.iter().map(without).collect();
+        let loss = |(part, &group): (&WindowTerms, &usize)| {
+            let step = &steps[group];
+            let gradient = part.gradient.select_rows(&rows);
+            let hessian = sub(&part.hessian, &rows, &rows);
+            // A quadratic may undershoot; no loss is negative.
+            (part.cost + gradient.dot(step) + 0.5 * step.dot(&(hessian * step))).max(0.0)
+        };
+        Some(
+            self.stretches
+                .iter()
+                .zip(&self.groups_of)
+                .map(loss)
+                .collect(),
+        )
+    }
+
+    /// Which values of a set are free at the minimum of the loss, and where the others stand.
+    fn minimum(&self, set: &[usize]) -> Option<Minimum> {
+        let mut free = self.base.clone();
+        let mut held = DVector::zeros(self.room.len());
+        let mut moved = Vec::new();
+        for (item, columns) in self.columns_of.iter().enumerate() {
+            if set.contains(&item) {
+                free.extend(columns);
+            } else if item < self.present {
+                for &i in columns {
+                    held[i] = self.to_zero[i];
+                    moved.push(i);
+                }
+            }
+        }
+        let mut minimum = Minimum { free, held, moved };
+        if !self.is_determined(&minimum.free) {
+            return None;
+        }
+        loop {
+            let step = self.step(&minimum)?;
+            let beyond = |&i: &usize| {
+                let [low, high] = self.room[i];
+                (step[i] - step[i].clamp(low, high)).abs() / step[i].abs().max(f64::MIN_POSITIVE)
+            };
+            let worst = minimum
+                .free
+                .iter()
+                .copied()
+                .max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+            match worst.filter(|i| beyond(i) > 1e-9) {
+                None => return Some(minimum),
+                Some(i) => {
+                    minimum.held[i] = step[i].clamp(self.room[i][0], self.room[i][1]);
+                    minimum.free.retain(|k| *k != i);
+                    minimum.moved.push(i);
+                }
+            }
+        }
+    }
+
+    /// Whether the logs tell the values of the items from each other and from those of the model: the information of
+    /// each that is left when those before it are free.
+    fn is_determined(&self, free: &[usize]) -> bool {
+        let (mut scaled, _) = with_unit_diagonal(&sub(&self.all.hessian, free, free));
+        for i in 0..free.len() {
+            scaled[(i, i)] += RIDGE;
+        }
+        let Some(factor) = scaled.cholesky() else {
+            return false;
+        };
+        let own = factor.l_dirty().diagonal();
+        (self.base.len()..free.len()).all(|i| own[i].powi(2) > OWN_INFORMATION)
+    }
+
+    /// The displacement of all values at the minimum of the loss.
+    fn step(&self, minimum: &Minimum) -> Option<DVector<f64>> {
+        let Minimum { free, held, moved } = minimum;
+        let matrix = sub(&self.all.hessian, free, free);
+        let displaced = sub(&self.all.hessian, free, moved) * held.select_rows(moved);
+        let solution = solve(&matrix, &(self.all.gradient.select_rows(free) + displaced))?;
+        let mut step = held.clone();
+        for (&i, value) in free.iter().zip(solution.iter()) {
+            step[i] = -value;
+        }
+        Some(step)
+    }
+}
+
+fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), columns.len(), |i, j| {
+        matrix[(rows[i], columns[j])]
+    })
+}
+
+/// Smallest information of a direction, in units in which each value alone has 1: items that say the same share it.
+const RIDGE: f64 = 1e-9;
+/// An effect of which less than this share of the information is its own is not told from the rest of the model.
+const OWN_INFORMATION: f64 = 1e-4;
+
+fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
+    let (mut scaled, unit) = with_unit_diagonal(matrix);
+    for i in 0..unit.len() {
+        scaled[(i, i)] += RIDGE;
+    }
+    let solution = scaled.cholesky()?.solve(&right.component_mul(&unit));
+    Some(solution.component_mul(&unit))
+}

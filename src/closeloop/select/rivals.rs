@@ -1,0 +1,96 @@
+use rayon::prelude::*;
+
+use super::candidate::candidates;
+use super::outlook::Outlook;
+use super::search::Search;
+use super::trial::{Trial, differences};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::SelectSettings;
+use crate::closeloop::study::Study;
+use crate::data::statistics::{mean, standard_error};
+use crate::model::FittedEffect;
+
+/// A set of effects that explains the logs as well as the chosen one: it has `effect` in place of `instead_of`.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    pub fitted: Fitted,
+    pub effect: FittedEffect,
+    pub instead_of: FittedEffect,
+    /// Fall of the left-out loss by either, beside the other effects.
+    pub gain: f64,
+    pub gain_of_chosen: f64,
+}
+
+impl Rival {
+    /// Whether the chosen effect is a special case of the rival.
+    pub fn contains_chosen(&self) -> bool {
+        self.effect.contains(&self.instead_of)
+    }
+}
+
+impl Search<'_, '_> {
+    /// Effects that explain the logs as well as one of the chosen ones does, beside the others; `without` gives the model
+    /// refitted without each of them, `of` which of them are asked for.
+    pub fn rivals(&self, chosen: &Trial, without: &[Option<Trial>], of: &[bool]) -> Vec<Rival> {
+        let study = self.study;
+        let added = study.added(&chosen.fitted.model);
+        let all = candidates(study, self.library, &chosen.fitted.model.effects);
+        let Some(outlook) = Outlook::of(study, &chosen.fitted, &all) else {
+            return Vec::new();
+        };
+        let of_effect = |(k, less): (usize, &Option<Trial>)| {
+            let less = less.as_ref().filter(|_| of[k])?;
+            Some(instead_of(study, chosen, less, &outlook, k))
+        };
+        let places = (0..added.len()).into_par_iter();
+        let rivals: Vec<Vec<Rival>> = places.zip(without).filter_map(of_effect).collect();
+        rivals.concat()
+    }
+}
+
+/// Effects that do as well as the k-th of those that were added, which `less` is without.
+fn instead_of(
+    study: &Study<'_>,
+    chosen: &Trial,
+    less: &Trial,
+    outlook: &Outlook,
+    k: usize,
+) -> Vec<Rival> {
+    let settings = &study.settings.select;
+    let declared = study.declared.effects.len();
+    let present = &chosen.fitted.model.effects[declared + k];
+    let others: Vec<usize> = outlook.present().into_iter().filter(|i| *i != k).collect();
+    let mut options: Vec<(f64, &FittedEffect)> = (outlook.present().len()..outlook.items.len())
+        .filter_map(|item| {
+            let set = [others.as_slice(), &[item]].concat();
+            Some((outlook.losses(&set)?.iter().sum(), &outlook.items[item]))
+        })
+        .collect();
+    options.sort_by(|a, b| a.0.total_cmp(&b.0));
+    options.retain(|(loss, _)| *loss <= settings.slack * settings.as_little * chosen.loss());
+    options.truncate(settings.rivals);
+    let gain = |trial: &Trial| 1.0 - trial.loss() / less.loss().max(f64::MIN_POSITIVE);
+    let rival = |(_, effect): &(f64, &FittedEffect)| {
+        let mut effects = chosen.fitted.model.effects.clone();
+        effects[declared + k] = (*effect).clone();
+        let trial = Trial::of(study, study.with_effects(&chosen.fitted, effects).ok()?);
+        let as_good = trial.is_valid(study) && is_as_good(&trial, chosen, less, settings);
+        as_good.then(|| Rival {
+            effect: trial.fitted.model.effects[declared + k].clone(),
+            instead_of: present.clone(),
+            gain: gain(&trial),
+            gain_of_chosen: gain(chosen),
+            fitted: trial.fitted,
+        })
+    };
+    options.iter().filter_map(rival).collect()
+}
+
+/// Whether the losses on left-out stretches do not tell a set from the chosen one.
+fn is_as_good(trial: &Trial, chosen: &Trial, less: &Trial, settings: &SelectSettings) -> bool {
+    let differences = differences(&trial.losses, &chosen.losses);
+    let saved = |trial: &Trial| less.loss() - trial.loss();
+    mean(&differences) <= settings.as_good * standard_error(&differences)
+        && saved(trial) > settings.as_much * saved(chosen)
+        && trial.loss() <= settings.as_little * chosen.loss()
+}

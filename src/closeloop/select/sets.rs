@@ -1,0 +1,99 @@
+use std::collections::HashSet;
+
+use rayon::prelude::*;
+
+use super::outlook::{Outlook, Set};
+use crate::closeloop::settings::SelectSettings;
+
+/// Sets of an outlook's items that promise to lower the loss on left-out stretches, found by a beam search: from the
+/// items of the model, one is added or dropped at a time, and the best few sets of a step lead to the next.
+pub fn promising(outlook: &Outlook, settings: &SelectSettings) -> Vec<Set> {
+    let start = outlook.present();
+    let total = |set: &Set| Some(outlook.losses(set)?.iter().sum::<f64>());
+    let Some(first) = total(&start) else {
+        return Vec::new();
+    };
+    let mut seen: HashSet<Set> = HashSet::from([start.clone()]);
+    let mut ranked: Vec<(f64, Set)> = vec![(first, start.clone())];
+    let mut beam = vec![start];
+    let mut best = first;
+    for _ in 0..settings.depth {
+        let mut next: Vec<Set> = beam
+            .iter()
+            .flat_map(|set| neighbours(outlook, set, settings.most_effects))
+            .collect();
+        next.retain(|set| seen.insert(set.clone()));
+        let mut scored: Vec<(f64, Set)> = next
+            .into_par_iter()
+            .filter_map(|set| Some((total(&set)?, set)))
+            .collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scored.truncate(settings.beam);
+        beam = scored.iter().map(|(_, set)| set.clone()).collect();
+        let lowest = scored.first().map_or(f64::INFINITY, |(loss, _)| *loss);
+        ranked.extend(scored);
+        if lowest > best * (1.0 - settings.step) {
+            break;
+        }
+        best = best.min(lowest);
+    }
+    shortlist(ranked, settings.fitted)
+}
+
+/// Sets with one item more or less; an item takes the place of those that it contains.
+fn neighbours(outlook: &Outlook, set: &Set, most: usize) -> Vec<Set> {
+    let items = &outlook.items;
+    let contains = |whole: usize, part: usize| items[whole].contains(&items[part]);
+    let toggled = |item: usize| {
+        let mut other = set.clone();
+        match set.binary_search(&item) {
+            Ok(place) => {
+                other.remove(place);
+            }
+            Err(_) => {
+                other.retain(|part| !contains(item, *part));
+                other.push(item);
+                other.sort_unstable();
+            }
+        }
+        other
+    };
+    let is_new = |item: &usize| !set.iter().any(|&whole| contains(whole, *item));
+    let all = (0..items.len()).filter(is_new).map(toggled);
+    all.filter(|set| set.len() <= most).collect()
+}
+
+/// Sets with ever fewer of the items of the model, each the best by predicted loss on left-out stretches with one item
+/// less than the one before.
+pub fn descent(outlook: &Outlook) -> Vec<Set> {
+    let mut sets = Vec::new();
+    let mut current = outlook.present();
+    while !current.is_empty() {
+        let without = |k: usize| {
+            let mut less = current.clone();
+            less.remove(k);
+            Some((outlook.losses(&less)?.iter().sum::<f64>(), less))
+        };
+        let less: Vec<(f64, Set)> = (0..current.len())
+            .into_par_iter()
+            .filter_map(without)
+            .collect();
+        let Some((_, less)) = less.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        sets.push(less.clone());
+        current = less;
+    }
+    sets
+}
+
+/// The best set of each size, then the best of the rest.
+fn shortlist(mut ranked: Vec<(f64, Set)>, most: usize) -> Vec<Set> {
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut sizes = HashSet::new();
+    let (mut first, rest): (Vec<_>, Vec<_>) =
+        (ranked.into_iter()).partition(|(_, set)| sizes.insert(set.len()));
+    first.extend(rest);
+    first.truncate(most);
+    first.into_iter().map(|(_, set)| set).collect()
+}

@@ -1,0 +1,74 @@
+use super::folds::left_out_losses;
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::settings::SelectSettings;
+use crate::closeloop::study::Study;
+use crate::data::statistics::{mean, standard_error};
+use crate::model::{EffectParameter, FittedEffect};
+
+/// A model with some set of effects, fitted and judged by stretches left out of the fit.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    pub fitted: Fitted,
+    /// Loss on each stretch, with the parameters that a fit without it would give. Comparable among trials that were
+    /// fitted at the same scale.
+    pub losses: Vec<f64>,
+}
+
+impl Trial {
+    pub fn of(study: &Study<'_>, fitted: Fitted) -> Self {
+        let losses = left_out_losses(study, &fitted.fit);
+        Self { fitted, losses }
+    }
+
+    /// Loss over all stretches.
+    pub fn loss(&self) -> f64 {
+        self.losses.iter().sum()
+    }
+
+    /// Number of free values, then of simpler effects that the added ones contain.
+    pub fn values(&self) -> (usize, usize) {
+        let effects = &self.fitted.model.effects;
+        let contained = effects.iter().map(|effect| effect.effect.contains.len());
+        (self.fitted.fit.columns.len(), contained.sum())
+    }
+
+    /// Whether every added effect has values that are consistent with each other, and a shape that the logs determine: a
+    /// value that gives an effect its shape and stands at a bound was not found there.
+    pub fn is_valid(&self, study: &Study<'_>) -> bool {
+        let added = &self.fitted.model.effects[study.added(&self.fitted.model)];
+        added.iter().all(|effect| {
+            let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
+            let mut shapes = effect.effect.parameters.iter().zip(&values);
+            let is_inside = |(parameter, value): (&EffectParameter, &f64)| {
+                let [low, high] = parameter.bounds;
+                parameter.is_switch() || parameter.whole || (low < *value && *value < high)
+            };
+            effect.effect.is_valid(&values) && shapes.all(is_inside)
+        })
+    }
+
+    /// Identifies the set of effects, in no particular order.
+    pub fn key(&self) -> Vec<String> {
+        key(&self.fitted.model.effects)
+    }
+
+    /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and
+    /// not significantly so.
+    pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
+        let rise = self.loss() / best.loss().max(f64::MIN_POSITIVE) - 1.0;
+        let differences = differences(&self.losses, &best.losses);
+        let within = mean(&differences) <= settings.simplest * standard_error(&differences);
+        rise < settings.negligible || within && rise < settings.simpler
+    }
+}
+
+/// The effects of a model, in no particular order.
+pub fn key(effects: &[FittedEffect]) -> Vec<String> {
+    let mut key: Vec<String> = effects.iter().map(FittedEffect::label).collect();
+    key.sort();
+    key
+}
+
+pub fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}

@@ -1,0 +1,159 @@
+//! Columns that hold something else than the model file says, and the lines under `[columns]` that mend it.
+//!
+//! A file a kind. They are looked for one after the other, each in the log as the ones before would mend it:
+//! no angle can be judged before its turns are counted, no speed before its time is in seconds.
+
+mod degrees;
+mod sign;
+mod time;
+mod turns;
+mod velocity;
+
+use std::borrow::Cow;
+
+use super::joint::{JointAudit, audit_joints};
+use super::quality::{Finding, Remedy, Severity};
+use crate::data::column::{Quantity, unwrap};
+use crate::data::columns::Columns;
+use crate::data::local_cubic::slopes;
+use crate::data::{Joint, Log};
+
+/// A log and what its joints look like.
+pub(super) struct Reading<'l> {
+    pub log: Cow<'l, Log>,
+    pub joints: Vec<JointAudit>,
+}
+
+/// One way in which columns are misread.
+struct Misread {
+    joint: Option<Joint>,
+    text: String,
+    changes: Vec<Change>,
+}
+
+/// One change of one column.
+struct Change {
+    quantity: Quantity,
+    /// `None` for the time.
+    joint: Option<Joint>,
+    to: To,
+}
+
+#[derive(Clone, Copy)]
+enum To {
+    Unit(&'static str),
+    Opposite,
+    Wrapped,
+    /// Velocities of all joints from the angles.
+    Derived,
+}
+
+/// What is misread in a log, as findings, and the log as it is meant.
+pub(super) fn as_meant<'l>(log: &'l Log, columns: &Columns) -> (Reading<'l>, Vec<Finding>) {
+    let mut reading = Reading::of(Cow::Borrowed(log));
+    let mut found = vec![];
+    for look in [
+        turns::misread,
+        time::misread,
+        velocity::misread,
+        degrees::misread,
+        sign::misread,
+    ] {
+        let misread = look(&reading);
+        if misread.is_empty() {
+            continue;
+        }
+        let mut log = reading.log.into_owned();
+        misread
+            .iter()
+            .flat_map(|one| &one.changes)
+            .for_each(|change| change.apply(&mut log));
+        reading = Reading::of(Cow::Owned(log));
+        found.extend(misread);
+    }
+    let findings = with_remedies(&found, columns, log.joints());
+    (reading, findings)
+}
+
+impl<'l> Reading<'l> {
+    fn of(log: Cow<'l, Log>) -> Self {
+        Self {
+            joints: audit_joints(&log),
+            log,
+        }
+    }
+}
+
+/// Lines of all changes together, so that each is right beside the others.
+fn with_remedies(found: &[Misread], columns: &Columns, joints: usize) -> Vec<Finding> {
+    let mut mended = columns.whole(joints);
+    for change in found.iter().flat_map(|one| &one.changes) {
+        if let Some(columns) = &mut mended {
+            change.mend(columns);
+        }
+    }
+    let finding = |one: &Misread| {
+        let mut lines: Vec<String> = vec![];
+        for change in &one.changes {
+            lines.extend(mended.iter().map(|columns| columns.line(change.quantity)));
+        }
+        lines.dedup();
+        Finding {
+            joint: one.joint,
+            remedy: Some(Remedy::Columns(lines)),
+            ..Finding::new(Severity::Serious, one.text.clone())
+        }
+    };
+    found.iter().map(finding).collect()
+}
+
+impl Change {
+    /// In the log.
+    fn apply(&self, log: &mut Log) {
+        let values = match (self.quantity, self.joint) {
+            (Quantity::Angle, Some(joint)) => &mut log.q[joint],
+            (Quantity::Velocity, Some(joint)) => &mut log.qd[joint],
+            (Quantity::Torque, Some(joint)) => &mut log.tau[joint],
+            _ => &mut log.time,
+        };
+        let factor = match self.to {
+            To::Unit(unit) => self.quantity.size_of(unit).unwrap_or(1.0),
+            To::Opposite => -1.0,
+            To::Wrapped => {
+                unwrap(values, std::f64::consts::TAU);
+                1.0
+            }
+            To::Derived => {
+                log.qd = log.q.iter().map(|q| slopes(&log.time, q)).collect();
+                return;
+            }
+        };
+        values.iter_mut().for_each(|value| *value *= factor);
+    }
+
+    /// In the model file.
+    fn mend(&self, columns: &mut Columns) {
+        if matches!(self.to, To::Derived) {
+            columns.qd = None;
+            return;
+        }
+        let list = match self.quantity {
+            Quantity::Time => None,
+            Quantity::Angle => Some(&mut columns.q),
+            Quantity::Velocity => columns.qd.as_mut(),
+            Quantity::Torque => Some(&mut columns.tau),
+        };
+        let column = match (list, self.joint) {
+            (Some(list), Some(joint)) => &mut list[joint],
+            (None, None) => &mut columns.time,
+            _ => return,
+        };
+        match self.to {
+            To::Unit(unit) if column.unit.is_none() => column.unit = Some(unit),
+            To::Unit(unit) => column.factor *= self.quantity.size_of(unit).unwrap_or(1.0),
+            To::Opposite => column.factor = -column.factor,
+            To::Wrapped => column.wrapped = true,
+            To::Derived => {}
+        }
+    }
+}

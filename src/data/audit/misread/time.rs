@@ -1,0 +1,67 @@
+//! Time in another unit than seconds.
+
+use super::{Change, Misread, Reading, To};
+use crate::data::audit::table::short;
+use crate::data::column::Quantity;
+
+/// No rig that is worth a model is logged more slowly than this \[s\], and none faster than the other: rigs are logged at
+/// 5 Hz to 50 kHz.
+const LONGEST_STEP_S: f64 = 0.2;
+const SHORTEST_STEP_S: f64 = 2e-5;
+
+/// Logged speeds over the derivative of the angles are 1, but for the unit of time, if they are within this share of it.
+const SAME: f64 = 0.2;
+
+pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
+    let step_s = reading.log.median_step();
+    if step_s <= LONGEST_STEP_S {
+        return vec![];
+    }
+    let units = Quantity::Time.units().iter();
+    let fitting =
+        units.filter(|(_, size)| (SHORTEST_STEP_S..=LONGEST_STEP_S).contains(&(step_s * size)));
+    let mut fitting: Vec<(&'static str, f64)> = fitting.copied().collect();
+    // Speeds in rad/s say which.
+    let told = fitting
+        .iter()
+        .copied()
+        .find(|(_, size)| speeds_agree(reading, *size));
+    if let Some(unit) = told {
+        fitting = vec![unit];
+    }
+    let Some(&(unit, _)) = fitting.first() else {
+        return vec![];
+    };
+    let speeds = match told {
+        Some((_, size)) => format!(
+            ", and logged velocities are {} times the derivative of the angles",
+            short(1.0 / size)
+        ),
+        None => String::new(),
+    };
+    vec![Misread {
+        joint: None,
+        text: format!(
+            "the median step is {} s, {} rows last {} s{speeds}: the time looks like {unit}",
+            short(step_s),
+            reading.log.rows(),
+            short(reading.log.duration())
+        ),
+        changes: vec![Change {
+            quantity: Quantity::Time,
+            joint: None,
+            to: To::Unit(unit),
+        }],
+    }]
+}
+
+/// Whether all velocities would be derivatives of their angles if a unit of time were so many seconds; false where
+/// none can be compared.
+fn speeds_agree(reading: &Reading<'_>, size: f64) -> bool {
+    let checks: Vec<f64> = reading
+        .joints
+        .iter()
+        .filter_map(|joint| Some(joint.velocity?.scale))
+        .collect();
+    !checks.is_empty() && checks.iter().all(|scale| (scale * size - 1.0).abs() < SAME)
+}

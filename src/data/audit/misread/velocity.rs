@@ -1,0 +1,134 @@
+//! Velocities that are none, or in units that do not belong to those of the angles, told by the derivatives of the angles.
+
+use std::f64::consts::TAU;
+
+use super::{Change, Misread, Reading, To};
+use crate::data::audit::JointAudit;
+use crate::data::audit::compare::MIN_CORRELATION;
+use crate::data::audit::table::short;
+use crate::data::column::Quantity;
+
+/// A velocity that correlates less than this with the derivative of its angle is something else.
+const SAME_QUANTITY: f64 = 0.5;
+
+/// A ratio within this share of that of two units is theirs: filters and gear tolerances change a speed by less.
+const SAME: f64 = 0.05;
+
+/// A ratio this far from 1 is another unit or a gear ratio.
+const SCALE_WRONG: f64 = 0.2;
+
+/// Logged velocity over derivative of the angle, and which column is then in which unit.
+const RATIOS: [(f64, Quantity, &str); 4] = [
+    (360.0 / TAU, Quantity::Velocity, "deg/s"),
+    (TAU / 360.0, Quantity::Angle, "deg"),
+    (60.0 / TAU, Quantity::Velocity, "rpm"),
+    (TAU, Quantity::Angle, "rev"),
+];
+
+pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
+    let moving = reading.joints.iter().filter(|joint| joint.moves());
+    moving.filter_map(of_joint).collect()
+}
+
+fn of_joint(audit: &JointAudit) -> Option<Misread> {
+    let (text, quantity, to) = wrong(audit)?;
+    Some(Misread {
+        joint: Some(audit.joint),
+        text,
+        changes: vec![Change {
+            quantity,
+            joint: Some(audit.joint),
+            to,
+        }],
+    })
+}
+
+/// What is wrong, and the change that mends it. A velocity of opposite sign is for another place.
+fn wrong(audit: &JointAudit) -> Option<(String, Quantity, To)> {
+    let (q, qd) = (&audit.q.name, &audit.qd.name);
+    let derived = |text: String| {
+        let text = format!("{text}: take velocities from {q}");
+        Some((text, Quantity::Velocity, To::Derived))
+    };
+    if audit.qd.constant {
+        return derived(format!(
+            "{qd} is {} rad/s throughout while {q} moves",
+            short(audit.qd.max)
+        ));
+    }
+    let check = audit.velocity?;
+    if audit
+        .opposed
+        .is_some_and(|correlation| correlation > MIN_CORRELATION)
+    {
+        return None;
+    }
+    if check.correlation < SAME_QUANTITY {
+        let correlation = short(check.correlation);
+        return derived(format!(
+            "{qd} does not follow d{q}/dt (correlation {correlation})"
+        ));
+    }
+    if (check.scale - 1.0).abs() <= SCALE_WRONG {
+        return None;
+    }
+    let text = format!("{qd} is {} times d{q}/dt", short(check.scale));
+    let fits = |(size, ..): &&(f64, Quantity, &str)| (check.scale / size - 1.0).abs() < SAME;
+    let Some(&(_, quantity, unit)) = RATIOS.iter().find(fits) else {
+        return derived(format!(
+            "{text}, a unit or a gear ratio that is not known here"
+        ));
+    };
+    let column = if quantity == Quantity::Angle { q } else { qd };
+    Some((
+        format!("{text}: {column} looks like {unit}"),
+        quantity,
+        To::Unit(unit),
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::findings::tests::says;
+    use super::super::super::tests::swing;
+    use crate::data::Severity::Serious;
+
+    #[test]
+    fn velocities_that_cannot_be_used_are_named() {
+        type Change = fn(usize, f64) -> f64;
+        let with_qd = |change: Change| {
+            let mut log = swing();
+            let numbered = log.qd[0].iter_mut().enumerate();
+            numbered.for_each(|(row, value)| *value = change(row, *value));
+            log
+        };
+        let cases: [(Change, &[&str]); 5] = [
+            (
+                |_, v| 2.0 * v,
+                &["qd1 is 2 times dq1/dt", "[columns] qd = []"],
+            ),
+            (
+                |row, v| if row % 700 > 350 { v } else { -v },
+                &["qd1 does not follow dq1/dt", "qd = []"],
+            ),
+            (|_, _| 0.0, &["qd1 is 0 rad/s throughout", "qd = []"]),
+            (
+                |_, v| v.to_degrees(),
+                &[
+                    "qd1 looks like deg/s",
+                    "qd = [{ column = \"qd1\", unit = \"deg/s\" }]",
+                ],
+            ),
+            (
+                |_, v| -v,
+                &[
+                    "qd1 follows -dq1/dt",
+                    "qd = [{ column = \"qd1\", factor = -1 }]",
+                ],
+            ),
+        ];
+        for (change, words) in cases {
+            assert!(says(&with_qd(change), Serious, words), "{words:?}");
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Rows that a logger dropped: steps of two or more periods in place of one.
+
+use super::jumps::interpolated;
+use super::log::{Interval, Log};
+
+/// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
+/// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
+pub const GAP_STEPS: f64 = 5.0;
+
+/// A step longer than this many median steps lacks a row: midway between one period and two, and beyond what jitter of a
+/// fifth of a period does.
+const DROPPED_STEPS: f64 = 1.7;
+
+/// The torque passes a missing row smoothly if its change over the step, per period, is at most this many times the
+/// largest change from row to row close by.
+const SMOOTH: f64 = 2.0;
+
+/// Rows on either side that tell how smoothly the torque changes.
+const CLOSE_BY: usize = 4;
+
+/// A torque's change by less than this share of its range moves nothing that a sensor sees, wherever in the step it came.
+const SMALL_CHANGE: f64 = 0.01;
+
+/// A step in which rows are missing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Dropped {
+    /// The last row before.
+    pub row: usize,
+    /// How many are missing.
+    pub count: usize,
+}
+
+/// The steps in which rows are missing, gaps not counted.
+pub(super) fn dropped(log: &Log) -> Vec<Dropped> {
+    let step_s = log.median_step();
+    let of_step = |(row, pair): (usize, &[f64])| {
+        let steps = (pair[1] - pair[0]) / step_s;
+        let missing = steps > DROPPED_STEPS && steps <= GAP_STEPS;
+        missing.then_some(Dropped {
+            row,
+            count: (steps.round() as usize).max(2) - 1,
+        })
+    };
+    log.time
+        .windows(2)
+        .enumerate()
+        .filter_map(of_step)
+        .collect()
+}
+
+impl Log {
+    /// The log with rows in the place of those that the logger dropped, masked, so that the torque changes as smoothly
+    /// as it does around them. Where it does not pass a step smoothly, nobody knows when it changed: such steps
+    /// are left out, unless windows of `window_s` around them make up more than half of the log.
+    pub(super) fn completed(&self, window_s: f64) -> Log {
+        let missing = dropped(self);
+        let rough: Vec<&Dropped> = missing.iter().filter(|d| !self.is_smooth_over(d)).collect();
+        let mut log = self.clone();
+        if rough.len() as f64 * window_s <= 0.5 * self.duration() {
+            log.leave_out.extend(rough.iter().map(|dropped| Interval {
+                start_s: self.time[dropped.row],
+                end_s: self.time[dropped.row + 1],
+            }));
+        }
+        for dropped in missing.iter().rev() {
+            log.insert(dropped);
+        }
+        log
+    }
+
+    /// Whether the torques of all joints change over the step as they do from row to row around it.
+    fn is_smooth_over(&self, dropped: &Dropped) -> bool {
+        let (row, count) = (dropped.row, dropped.count as f64 + 1.0);
+        let from = row.saturating_sub(CLOSE_BY);
+        let to = (row + 1 + CLOSE_BY).min(self.rows() - 1);
+        self.tau.iter().all(|tau| {
+            let change = |at: usize| (tau[at + 1] - tau[at]).abs();
+            let close_by = (from..to).filter(|at| *at != row).map(change);
+            let largest = close_by.fold(0.0, f64::max);
+            let range = tau.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b))
+                - tau.iter().fold(f64::INFINITY, |a, b| a.min(*b));
+            change(row) <= (SMALL_CHANGE * range).max(count * SMOOTH * largest)
+        })
+    }
+
+    /// Puts masked rows into a step, at equal times.
+    fn insert(&mut self, dropped: &Dropped) {
+        let Dropped { row, count } = *dropped;
+        let around = [row.saturating_sub(1), row, row + 1, row + 2];
+        let (from, to) = (self.time[row], self.time[row + 1]);
+        let shares: Vec<f64> = (1..=count)
+            .map(|k| k as f64 / (count as f64 + 1.0))
+            .collect();
+        let times: Vec<f64> = shares
+            .iter()
+            .map(|share| from + share * (to - from))
+            .collect();
+        for q in &mut self.q {
+            let at = |t: &f64| interpolated(&self.time, q, around, *t);
+            let new: Vec<f64> = times.iter().map(at).collect();
+            q.splice(row + 1..row + 1, new);
+        }
+        for channel in self.qd.iter_mut().chain(&mut self.tau) {
+            let (a, b) = (channel[row], channel[row + 1]);
+            let new: Vec<f64> = shares.iter().map(|share| a + share * (b - a)).collect();
+            channel.splice(row + 1..row + 1, new);
+        }
+        self.time.splice(row + 1..row + 1, times);
+        for masked in &mut self.masked {
+            masked
+                .iter_mut()
+                .filter(|at| **at > row)
+                .for_each(|at| *at += count);
+            masked.extend(row + 1..=row + count);
+            masked.sort_unstable();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 10 s at 100 Hz of which the rows 300, 301 and 700 are missing.
+    fn log(tau: fn(f64) -> f64) -> Log {
+        let rows = (0..1000).filter(|row| ![300, 301, 700].contains(row));
+        let time: Vec<f64> = rows.map(|row| f64::from(row) * 0.01).collect();
+        let of = |f: fn(f64) -> f64| vec![time.iter().map(|t| f(*t)).collect()];
+        Log {
+            q: of(|t| (3.0 * t).sin()),
+            qd: of(|t| 3.0 * (3.0 * t).cos()),
+            tau: of(tau),
+            masked: vec![vec![10, 800]],
+            time,
+            ..Log::empty(1)
+        }
+    }
+
+    #[test]
+    fn a_smooth_torque_is_continued_over_missing_rows() {
+        let full = log(|t| (2.0 * t).cos()).completed(0.5);
+        assert_eq!((full.rows(), full.leave_out.len()), (1000, 0));
+        assert_eq!(full.masked, [[10, 300, 301, 700, 803]]);
+        for row in [300, 301, 700] {
+            let t = f64::from(u16::try_from(row).unwrap()) * 0.01;
+            assert!((full.time[row] - t).abs() < 1e-9);
+            assert!((full.q[0][row] - (3.0 * t).sin()).abs() < 1e-5);
+            assert!((full.tau[0][row] - (2.0 * t).cos()).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_torque_that_jumps_while_rows_are_missing_leaves_the_step_out() {
+        let steps = log(|t| if t > 3.0 { 1.0 } else { -1.0 });
+        let full = steps.completed(0.5);
+        assert_eq!(
+            full.leave_out,
+            [Interval {
+                start_s: 2.99,
+                end_s: 3.02
+            }]
+        );
+        assert!(
+            steps.completed(20.0).leave_out.is_empty(),
+            "little else would remain"
+        );
+    }
+
+    #[test]
+    fn jitter_and_gaps_are_no_dropped_rows() {
+        let mut jittery = log(|_| 0.0);
+        let rows = jittery.rows();
+        jittery.time = (0..rows)
+            .map(|i| 0.01 * (i as f64 + 0.3 * (i % 2) as f64))
+            .collect();
+        assert!(dropped(&jittery).is_empty());
+        jittery.time.iter_mut().skip(500).for_each(|t| *t += 1.0);
+        assert!(dropped(&jittery).is_empty());
+    }
+}

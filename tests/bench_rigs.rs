@@ -1,0 +1,300 @@
+//! The comparison on measured rigs: its file, and a small rig of simulated logs end to end.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use residyn::bench::rigs::{Fold, Line, Measured, Method, RigsError, Tools, read, summarise};
+use residyn::bench::{Cell, Source, read as grid};
+use residyn::model::Library;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::{refuses, residyn, succeeds, text};
+
+fn config(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("configs/bench")
+        .join(name)
+}
+
+/// Three logs of a pendulum with dry friction.
+fn record(folder: &Path, seconds: f64) {
+    fs::create_dir_all(folder).unwrap();
+    let mut cell: Cell = grid(&config("smoke.toml")).unwrap().remove(0);
+    let Source::Simulated(simulation) = &mut cell.source else {
+        panic!("the grid's rigs are simulated")
+    };
+    simulation.condition.seconds = seconds;
+    let model = Library::built_in().model(&cell.model).unwrap();
+    for log in cell.record(&model).unwrap().0 {
+        log.write(folder.join(&log.path)).unwrap();
+    }
+}
+
+/// The rig's true values, without its friction, as the published set.
+const RIGS: &str = r#"
+plain = ["coulomb_friction"]
+
+[[rig]]
+name = "rig"
+folder = "logs"
+model = "pendulum"
+parameters = { C_i = 5.0 }
+logs = ["log1.csv", "log2.csv"]
+test = "each_log"
+leave_out = ["log2.csv@7.5-8"]
+published = [{ name = "1.0", model = "pendulum", parameters = { C_g = -19.62, C_i = 6.6667 } }]
+also = { third = ["log3.csv"] }
+"#;
+
+/// A folder with a file of rigs and three logs of 6 s.
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new(rigs: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        record(&folder.path().join("logs"), 6.0);
+        fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Run the command with these flags too.
+    fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
+        let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
+        let data = text(self.folder.path());
+        let rigs = [
+            "bench",
+            "rigs",
+            "--rigs",
+            text(&rigs),
+            "--data",
+            data,
+            "--out",
+            text(&out),
+        ];
+        run(&[rigs.as_slice(), more].concat());
+    }
+}
+
+/// Error of a model in a row, 0.5 s ahead \[rad\].
+fn error(row: &Value, model: &str) -> f64 {
+    let models = row["models"].as_array().unwrap();
+    let entry = models.iter().find(|entry| entry["model"] == model).unwrap();
+    entry["pooled"][1]["position_rms"].as_f64().unwrap()
+}
+
+#[test]
+fn each_log_is_left_out_in_turn_and_the_errors_are_pooled() {
+    let bench = Bench::new(RIGS);
+    record(&bench.path("logs"), 12.0);
+    let library = Library::built_in();
+    let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+    let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
+    let tools = Tools {
+        library: &library,
+        learner: None,
+        seed: 0,
+    };
+    let run = |fold: &Fold, method: Method| Line {
+        rig: rig.rig.name.clone(),
+        fold: fold.name.clone(),
+        method,
+        configuration: String::new(),
+        program: String::new(),
+        seconds: 1.0,
+        found: Ok(method.run(&rig, fold, &tools, &mut |_| ()).unwrap()),
+    };
+    let lines = rig
+        .folds
+        .iter()
+        .flat_map(|fold| Method::ALL.map(|method| run(fold, method)));
+    let lines: Vec<Line> = lines.collect();
+    let summary = summarise(std::slice::from_ref(&rig), &lines);
+    let summary = serde_json::to_value(summary).unwrap();
+    let rows = summary["rows"].as_array().unwrap();
+    assert_eq!(
+        (rows.len(), &rows[0]["folds"], &rows[1]["folds"]),
+        (2, &2.into(), &1.into())
+    );
+    assert_eq!(rows[1]["group"], "third");
+    for row in rows {
+        assert_eq!(row["named"]["coulomb_friction@1"], row["folds"], "{row}");
+        let (after, plain) = (error(row, "after"), error(row, "plain structure"));
+        assert!((after / plain - 1.0).abs() < 0.05, "{after} {plain}");
+        for frictionless in ["declared, fitted", "published 1.0"] {
+            assert!(after < 0.2 * error(row, frictionless), "{row}");
+        }
+        assert_eq!(
+            (&row["best"][0], &row["hybrid_ratio"]),
+            (&"plain structure".into(), &1.0.into())
+        );
+    }
+    let logs = &rows[0]["models"][0]["logs"];
+    assert_eq!(
+        (&logs[0][0], &logs[1][0]),
+        (&"log1.csv".into(), &"log2.csv".into())
+    );
+    let windows = |log: usize| logs[log][1][1]["windows"].as_u64().unwrap();
+    assert!(windows(1) < windows(0), "left-out windows are not scored");
+}
+
+#[test]
+fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
+    let rigs = RIGS.replace("[\"log1.csv\", \"log2.csv\"]", "[\"log2.csv\"]");
+    let bench = Bench::new(&rigs.replace("each_log", "halves").replace("also", "#"));
+    bench.command(&["--json"], |arguments| {
+        let summary: Value = serde_json::from_str(&succeeds(arguments)).unwrap();
+        assert_eq!(summary["rows"].as_array().unwrap().len(), 1);
+        assert_eq!(summary["rows"][0]["folds"], 2);
+    });
+    let path = bench.path("out/rig/first half/closeloop.json");
+    let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    line["found"] = serde_json::json!({"Err": "the fit diverged"});
+    fs::write(&path, line.to_string()).unwrap();
+    // Stored results are used again.
+    bench.command(&["--json"], |arguments| {
+        let output = residyn(arguments);
+        assert_eq!(output.status.code(), Some(1));
+        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(summary["failures"][0][2], "the fit diverged");
+        assert_eq!(summary["rows"][0]["ratio"], Value::Null);
+    });
+    let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
+    assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
+    assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
+}
+
+#[test]
+fn results_of_other_logs_or_models_are_not_used_again() {
+    let bench = Bench::new(RIGS);
+    let fingerprint = || {
+        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+        let library = Library::built_in();
+        Measured::open(rig, bench.folder.path(), &library)
+            .unwrap()
+            .fingerprint
+    };
+    let first = fingerprint();
+    assert_eq!(first, fingerprint());
+    let log = fs::read_to_string(bench.path("logs/log3.csv")).unwrap();
+    let shorter = log.trim_end().rsplit_once('\n').unwrap().0;
+    fs::write(bench.path("logs/log3.csv"), shorter).unwrap();
+    let second = fingerprint();
+    fs::write(bench.path("rigs.toml"), RIGS.replace("5.0", "5.1")).unwrap();
+    assert!(first != second && second != fingerprint());
+}
+
+#[test]
+fn the_rigs_of_the_repository_are_read() {
+    let rigs = read(&config("rigs.toml")).unwrap();
+    let names: Vec<&str> = rigs.iter().map(|rig| rig.name.as_str()).collect();
+    assert_eq!(names.len(), 5, "{names:?}");
+    let library = Library::built_in();
+    for rig in &rigs {
+        let sets = rig.published.iter().map(|set| &set.model);
+        for declared in sets.chain([&rig.declared]) {
+            let model = library.model(&declared.model).unwrap();
+            for name in declared.parameters.keys() {
+                assert!(
+                    model.parameters.iter().any(|p| p.name == *name),
+                    "{}: {name}",
+                    rig.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_file_of_rigs_is_refused_with_the_line_and_a_remedy() {
+    let place = |from: &str, to: &str| {
+        assert!(RIGS.contains(from));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rigs.toml");
+        fs::write(&path, RIGS.replace(from, to)).unwrap();
+        match read(&path).unwrap_err() {
+            RigsError::File { line, message, .. } => (line, message),
+            other => panic!("{other}"),
+        }
+    };
+    let (line, message) = place("folder =", "folders =");
+    assert_eq!(line, 6, "{message}");
+    assert!(
+        message.contains("unknown field `folders`, expected one of"),
+        "{message}"
+    );
+    let (line, message) = place(", \"log2.csv\"]", "]");
+    assert_eq!(
+        (line, message.contains("test by `halves`")),
+        (9, true),
+        "{message}"
+    );
+    let (line, message) = place("@7.5-8", "@8-7.5");
+    assert_eq!(
+        (line, message.contains("an interval starts")),
+        (11, true),
+        "{message}"
+    );
+    let (line, message) = place(RIGS, &format!("{RIGS}{}", RIGS.replace("plain =", "#")));
+    assert_eq!(
+        (line, message.contains("give another name")),
+        (17, true),
+        "{message}"
+    );
+}
+
+#[test]
+fn what_the_models_and_logs_of_a_rig_lack_is_told() {
+    for (from, to, part) in [
+        (
+            "C_i = 5.0",
+            "J = 5.0",
+            "rig: pendulum has no parameter `J`; it has C_g, C_i",
+        ),
+        ("coulomb_friction", "coulomb", "unknown effect `coulomb`"),
+        ("log2.csv@", "log9.csv@", "no log is called \"log9.csv\""),
+        (
+            "\"logs\"",
+            "\"other\"",
+            "give the folder of measured logs with --data",
+        ),
+        ("\"log3.csv\"", "\"log9.csv\"", "log9.csv"),
+        (
+            "model = \"pendulum\"\nparameters",
+            "model = \"pendulam\"\nparameters",
+            "pendulam",
+        ),
+    ] {
+        Bench::new(&RIGS.replace(from, to)).command(&[], |arguments| {
+            let message = refuses(arguments);
+            assert!(message.contains(part), "{to}: {message}");
+        });
+    }
+    let message = refuses(&[
+        "bench",
+        "rigs",
+        "--rigs",
+        "no-such-file.toml",
+        "--data",
+        ".",
+    ]);
+    assert!(
+        message.contains("give a file of rigs with --rigs"),
+        "{message}"
+    );
+    let message = refuses(&[
+        "bench",
+        "rigs",
+        "--data",
+        ".",
+        "--only",
+        "nothing-of-the-kind",
+    ]);
+    assert!(message.contains("no rig's name contains"), "{message}");
+}

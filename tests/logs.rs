@@ -1,0 +1,520 @@
+//! Logs as rigs write them: what is wrong with one is named, with what to paste to mend it, and what cannot be used is
+//! neither used nor passed over in silence.
+
+use std::f64::consts::{PI, TAU};
+use std::fs;
+use std::path::Path;
+
+use residyn::closeloop::{Fitted, Split, SplitMethod, Study, Unexplained, unexplained};
+use residyn::data::{Columns, Remedy, Severity, audit};
+use residyn::expr::SignForm;
+use residyn::plant::Plant;
+use residyn::report::summary;
+use residyn::{Library, Log, Model, Outcome, Request, Settings, Verdict, close_loop};
+use serde_json::Value;
+
+use crate::common::{catalog, rng, simulate};
+use crate::support::{measured, refuses, residyn, succeeds, text};
+
+/// A pendulum with dry friction, thrown so that it turns over.
+const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 1.5e-3 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 2, duration_s = 12, start = [0, 12] }
+effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
+"#;
+
+fn rig() -> Plant {
+    Plant::from_text(Path::new("rig.toml"), RIG, &Library::built_in()).unwrap()
+}
+
+/// The rig's equations, friction too.
+fn whole_model() -> Model {
+    rig().declared().with_effects(rig().effects.clone())
+}
+
+fn recorded(name: &str, seed: u64) -> Log {
+    let mut log = rig().record(&mut rng(seed)).unwrap();
+    log.path = name.into();
+    log
+}
+
+/// A folder with the log of the rig, changed, and the model of its declared values.
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn with(change: impl Fn(&mut Log)) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut log = recorded("run.csv", 0);
+        change(&mut log);
+        log.write(folder.path().join("run.csv")).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> String {
+        text(&self.folder.path().join(name)).to_owned()
+    }
+
+    /// A model file of the pendulum with these lines under `[columns]`.
+    fn model(&self, columns: &[String]) -> String {
+        let system = include_str!("../models/pendulum.toml");
+        let system = system
+            .replace("15.0", "-17.4")
+            .replace("3.0, unit", "4.6, unit");
+        let file = format!("{system}\n[columns]\n{}\n", columns.join("\n"));
+        let path = self.path("model.toml");
+        fs::write(&path, file).unwrap();
+        path
+    }
+
+    /// The findings of this severity of `residyn audit`, whose exit status must say whether some are serious.
+    fn findings(&self, severity: &str, model: Option<&str>) -> Vec<Value> {
+        let log = self.path("run.csv");
+        let model = model.map_or(vec![], |model| vec!["--model", model]);
+        let arguments = [vec!["audit", "--json", &log], model].concat();
+        let output = residyn(&arguments);
+        let audits: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let all = audits[0]["findings"].as_array().unwrap().clone();
+        let serious = all.iter().any(|finding| finding["severity"] == "serious");
+        assert_eq!(output.status.code(), Some(i32::from(serious)));
+        let of_severity = |finding: &Value| finding["severity"] == severity;
+        all.into_iter().filter(of_severity).collect()
+    }
+}
+
+/// What can be pasted: `remedy` of all findings under one key.
+fn remedies(findings: &[Value], key: &str) -> Vec<String> {
+    let of_one = |finding: &Value| finding["remedy"][key].as_array().cloned();
+    let mut lines: Vec<String> = findings
+        .iter()
+        .filter_map(of_one)
+        .flatten()
+        .map(|line| line.as_str().unwrap().to_owned())
+        .collect();
+    lines.dedup();
+    lines
+}
+
+fn each(values: &mut [f64], change: impl Fn(f64) -> f64) {
+    values.iter_mut().for_each(|value| *value = change(*value));
+}
+
+fn within_turn(angle: f64) -> f64 {
+    (angle + PI).rem_euclid(TAU) - PI
+}
+
+/// What a logger does to a log, and words of the finding that names it.
+type Case = (fn(&mut Log), &'static str);
+
+const MISREAD: [Case; 14] = [
+    (
+        |log| each(&mut log.time, |t| 1e3 * t),
+        "the time looks like ms",
+    ),
+    (
+        |log| each(&mut log.time, |t| 1e6 * t),
+        "the time looks like us",
+    ),
+    (
+        |log| each(&mut log.time, |t| 1e9 * t),
+        "the time looks like ns",
+    ),
+    (
+        |log| each(&mut log.tau[0], |tau| -tau),
+        "tau1 has the opposite sign",
+    ),
+    (|log| each(&mut log.qd[0], |qd| -qd), "qd1 follows -dq1/dt"),
+    (
+        |log| each(&mut log.q[0], f64::to_degrees),
+        "q1 looks like deg",
+    ),
+    (
+        |log| each(&mut log.qd[0], f64::to_degrees),
+        "qd1 looks like deg/s",
+    ),
+    (
+        |log| each(&mut log.qd[0], |qd| 30.0 / PI * qd),
+        "qd1 looks like rpm",
+    ),
+    (
+        |log| {
+            each(&mut log.q[0], f64::to_degrees);
+            each(&mut log.qd[0], f64::to_degrees);
+        },
+        "q1 and qd1 look like deg and deg/s",
+    ),
+    (
+        |log| each(&mut log.q[0], within_turn),
+        "q1 jumps by a full turn (6.28",
+    ),
+    (
+        |log| each(&mut log.q[0], |q| within_turn(q).to_degrees()),
+        "q1 jumps by a full turn (360)",
+    ),
+    (|log| log.qd[0].fill(0.0), "qd1 is 0 rad/s throughout"),
+    (
+        |log| {
+            each(&mut log.time, |t| 1e6 * t);
+            each(&mut log.q[0], within_turn);
+            each(&mut log.tau[0], |tau| -tau);
+        },
+        "the time looks like us",
+    ),
+    (
+        |log| {
+            each(&mut log.q[0], |q| -q);
+            each(&mut log.qd[0], |qd| -qd);
+        },
+        "tau1",
+    ),
+];
+
+#[test]
+fn what_is_misread_is_named_and_mended_by_the_lines_to_paste() {
+    let good = Desk::with(|_| {});
+    assert_eq!(good.findings("serious", None), Vec::<Value>::new());
+    for (change, words) in MISREAD {
+        let desk = Desk::with(change);
+        let serious = desk.findings("serious", None);
+        let named = |finding: &Value| finding["text"].as_str().unwrap().contains(words);
+        assert!(serious.iter().any(named), "{words}: {serious:#?}");
+        let model = desk.model(&remedies(&serious, "columns"));
+        let left = desk.findings("serious", Some(&model));
+        assert!(left.is_empty(), "{words}: {left:#?}");
+    }
+}
+
+/// What is mended is the log as it was meant.
+#[test]
+fn pasted_lines_give_back_the_log() {
+    let desk = Desk::with(|log| {
+        each(&mut log.time, |t| 1e9 * t);
+        each(&mut log.q[0], |q| within_turn(q).to_degrees());
+        each(&mut log.tau[0], |tau| -tau);
+    });
+    let lines = remedies(&desk.findings("serious", None), "columns");
+    let model = Library::built_in().model(Path::new(&desk.model(&lines)));
+    let read = Log::read(desk.path("run.csv"), 1, &model.unwrap().columns).unwrap();
+    let meant = recorded("run.csv", 0);
+    let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+    assert!(near(&read.time, &meant.time) && near(&read.tau[0], &meant.tau[0]));
+    assert!(near(&read.q[0], &meant.q[0]));
+}
+
+#[test]
+fn a_clock_in_nanoseconds_is_refused_at_once_with_its_line() {
+    let desk = Desk::with(|log| each(&mut log.time, |t| 1e9 * t));
+    let (log, out) = (desk.path("run.csv"), desk.path("out"));
+    let message = refuses(&[
+        "closeloop",
+        "--model",
+        "pendulum",
+        "--train",
+        &log,
+        "--out",
+        &out,
+    ]);
+    let line = r#"[columns] time = { column = "time", unit = "ns" }"#;
+    assert!(message.contains(line), "{message}");
+}
+
+#[test]
+fn velocities_come_from_the_angles_where_a_log_has_none() {
+    let desk = Desk::with(|_| {});
+    let path = desk.path("run.csv");
+    let without = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        [cells[0], cells[1], cells[3]].join(",") + "\n"
+    };
+    let text: String = fs::read_to_string(&path)
+        .unwrap()
+        .lines()
+        .map(without)
+        .collect();
+    fs::write(&path, text).unwrap();
+    assert!(desk.findings("serious", None).is_empty());
+    let read = Log::read_standard(&path).unwrap();
+    let exact = recorded("run.csv", 0);
+    let off = read.qd[0]
+        .iter()
+        .zip(&exact.qd[0])
+        .map(|(a, b)| (a - b).powi(2));
+    let rms = (off.sum::<f64>() / exact.rows() as f64).sqrt();
+    // The logged velocity is a backward difference, half a step late and with the noise of two readings.
+    assert!(rms < 0.6, "{rms} rad/s beside up to 12");
+}
+
+#[test]
+fn a_reading_that_jumps_is_placed_and_can_be_left_out() {
+    let desk = Desk::with(|log| log.q[0][600] += 50.0);
+    let warnings = desk.findings("warning", None);
+    let spans = remedies(&warnings, "leave_out");
+    assert_eq!(spans, ["run.csv@5.995-6.045"], "{warnings:#?}");
+    let (model, log) = (desk.model(&[]), desk.path("run.csv"));
+    let error = |more: &[&str]| -> f64 {
+        let arguments = ["evaluate", "--json", "--horizon", "0.5", "--model", &model];
+        let all = [&arguments[..], &["--test", &log], more].concat();
+        let found: Value = serde_json::from_str(&succeeds(&all)).unwrap();
+        found["position_rmse"][0][0].as_f64().unwrap()
+    };
+    let (with, without) = (error(&[]), error(&["--leave-out", &spans[0]]));
+    assert!(with > 1.0 && without < 0.3, "{with} {without}");
+}
+
+/// A fit of the rig's equations to logs as fits read them, and what it leaves.
+fn left(logs: &[Log], model: &Model) -> (Fitted, Unexplained) {
+    let settings = Settings::default();
+    let logs: Vec<Log> = logs.iter().map(|log| log.for_fits(0.5)).collect();
+    let mut study = Study::new(model, &logs, &settings);
+    let fitted = study.fit_declared(&[]).unwrap();
+    let left = unexplained(&study, &[], &fitted, &fitted, &mut rng(0));
+    (fitted, left)
+}
+
+fn friction(fitted: &Fitted) -> f64 {
+    fitted.model.effects[0].values[0].0
+}
+
+#[test]
+fn single_readings_that_jump_are_masked_in_fits() {
+    let mut logs = [recorded("a.csv", 1), recorded("b.csv", 2)];
+    let (clean, nothing) = left(&logs, &whole_model());
+    assert!(!nothing.is_significant(), "{nothing:?}");
+    logs[0].q[0][600] += 50.0;
+    logs[1].q[0][300] -= 2.0;
+    let (masked, nothing) = left(&logs, &whole_model());
+    assert!(!nothing.is_significant(), "{nothing:?}");
+    let off = friction(&masked) / friction(&clean) - 1.0;
+    assert!(
+        off.abs() < 0.01,
+        "{} {}",
+        friction(&masked),
+        friction(&clean)
+    );
+}
+
+/// The log without every row for which it says so.
+fn thinned(log: &Log, dropped: impl Fn(usize) -> bool) -> Log {
+    let rows: Vec<usize> = (0..log.rows()).filter(|row| !dropped(*row)).collect();
+    let of = |values: &Vec<f64>| rows.iter().map(|row| values[*row]).collect::<Vec<f64>>();
+    let all = |channels: &[Vec<f64>]| channels.iter().map(of).collect::<Vec<_>>();
+    Log {
+        time: of(&log.time),
+        q: all(&log.q),
+        qd: all(&log.qd),
+        tau: all(&log.tau),
+        ..log.clone()
+    }
+}
+
+#[test]
+fn dropped_rows_leave_nothing_unexplained() {
+    let dropped = |row: usize| row > 0 && ((row * 7919) % 47 == 3 || (row * 104_729) % 211 < 2);
+    let logs: Vec<Log> = (1..4).map(|seed| recorded("a.csv", seed)).collect();
+    let thin: Vec<Log> = logs.iter().map(|log| thinned(log, dropped)).collect();
+    let missing = audit(&thin[0], &Columns::default()).dropped_rows;
+    assert_eq!(missing, logs[0].rows() - thin[0].rows());
+    let (whole, _) = left(&logs, &whole_model());
+    let (found, nothing) = left(&thin, &whole_model());
+    assert!(!nothing.is_significant(), "{nothing:?}");
+    let off = friction(&found) / friction(&whole) - 1.0;
+    assert!(
+        off.abs() < 0.05,
+        "{} {}",
+        friction(&found),
+        friction(&whole)
+    );
+    // What does not act is still seen.
+    let (_, something) = left(&thin, &rig().declared());
+    assert!(something.is_significant(), "{something:?}");
+}
+
+/// Closing the loop with a library in which nothing can be found.
+fn closed(model: &Model, train: Vec<Log>, test: Vec<Log>) -> Outcome {
+    let library = Library::empty();
+    let request = Request::new(model, &library, Split::given(train, test));
+    close_loop(request, &mut rng(0), &mut |_| {}).unwrap()
+}
+
+#[test]
+fn a_push_by_hand_is_told_with_its_range() {
+    let mut pushed = recorded("pushed.csv", 1);
+    // A force that no column holds.
+    pushed.tau[0][500..540]
+        .iter_mut()
+        .for_each(|tau| *tau -= 3.0);
+    let outcome = closed(
+        &whole_model(),
+        vec![pushed, recorded("b.csv", 2)],
+        vec![recorded("c.csv", 3)],
+    );
+    let audits = &outcome.given.audits;
+    let spans = |audit: &residyn::data::Audit| {
+        let pushes = audit
+            .findings
+            .iter()
+            .filter(|f| f.text.contains("further force"));
+        pushes
+            .map(|push| (push.spans_s[0], push.remedy.clone()))
+            .collect::<Vec<_>>()
+    };
+    let found = spans(&audits[0]);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let ([from, to], remedy) = &found[0];
+    assert!(
+        (4.7..5.1).contains(from) && (5.3..5.7).contains(to),
+        "{from} {to}"
+    );
+    assert!(matches!(remedy, Some(Remedy::LeaveOut(spans)) if spans[0].starts_with("pushed.csv@")));
+    assert!(spans(&audits[1]).is_empty() && spans(&audits[2]).is_empty());
+}
+
+#[test]
+fn a_rig_at_rest_is_inconclusive() {
+    let still: [fn(usize) -> f64; 2] = [
+        |_| 0.3,
+        // An encoder between two of its steps.
+        |row| 0.3 + 1.5e-3 * f64::from(u8::from((row * 7919) % 10 == 0)),
+    ];
+    for angle in still {
+        let desk = Desk::with(|log| {
+            (0..log.rows()).for_each(|row| log.q[0][row] = angle(row));
+            log.qd[0].fill(0.0);
+            log.tau[0].fill(0.1);
+        });
+        let (log, out) = (desk.path("run.csv"), desk.path("out"));
+        let output = residyn(&[
+            "closeloop",
+            "--json",
+            "--model",
+            "pendulum",
+            "--train",
+            &log,
+            "--out",
+            &out,
+        ]);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{errors}");
+        assert!(errors.contains("joint 1 moves by"), "{errors}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(report["verdict"], "inconclusive");
+        assert!(
+            report["reason"]
+                .as_str()
+                .unwrap()
+                .contains("no joint moves")
+        );
+        assert_eq!(report["effects"], Value::Array(vec![]));
+    }
+}
+
+/// The horizons of the report on one log of this length, without test logs.
+fn horizons(duration_s: f64) -> Vec<f64> {
+    let mut plant = rig();
+    plant.recording.duration_s = duration_s;
+    let log = plant.record(&mut rng(0)).unwrap();
+    let (library, model) = (Library::empty(), whole_model());
+    let request = Request::of(&model, &library, vec![log]);
+    let outcome = close_loop(request, &mut rng(0), &mut |_| {}).unwrap();
+    if duration_s < 5.0 {
+        assert_eq!(outcome.verdict, Verdict::Inconclusive);
+    }
+    let horizons = &outcome.errors.after.horizons;
+    horizons.iter().map(|errors| errors.horizon_s).collect()
+}
+
+#[test]
+fn one_short_log_is_split_so_that_it_can_be_judged() {
+    assert_eq!(horizons(12.0), [0.1, 0.5, 1.0]);
+    assert_eq!(horizons(3.2), [0.1, 0.5]);
+    assert_eq!(horizons(1.6), [0.1]);
+    let split = Split::of(vec![recorded("a.csv", 0)], &Settings::default().split);
+    let SplitMethod::EndOfEachLog { share, .. } = split.method else {
+        panic!("{:?}", split.method);
+    };
+    assert!((share - 0.25).abs() < 1e-9, "{share}");
+}
+
+#[test]
+fn a_log_too_short_for_any_test_says_what_to_give() {
+    let desk = Desk::with(|log| *log = thinned(log, |row| row > 60));
+    let (log, out) = (desk.path("run.csv"), desk.path("out"));
+    let message = refuses(&[
+        "closeloop",
+        "--model",
+        "pendulum",
+        "--train",
+        &log,
+        "--out",
+        &out,
+    ]);
+    assert!(message.contains("--test"), "{message}");
+}
+
+/// Whether the audit calls a column of a log misread.
+fn is_called_misread(log: &Log, columns: &Columns) -> Option<String> {
+    let mut findings = audit(log, columns).findings.into_iter();
+    let misread = findings.find(|finding| {
+        finding.severity == Severity::Serious && matches!(finding.remedy, Some(Remedy::Columns(_)))
+    });
+    misread.map(|finding| format!("{}: {finding}", log.path.display()))
+}
+
+/// The logs are as their rigs wrote them, in the units and with the signs that their converters document.
+#[test]
+fn no_measured_log_is_called_misread() {
+    let sets = [
+        "dfki_simple_pendulum",
+        "dfki_double_pendulum_a0",
+        "dfki_double_pendulum_c0",
+        "dfki_double_pendulum_c1",
+        "multiarm_single_pendulum",
+        "kuka_lwr4",
+        "panda",
+        "schunk_lwa4p",
+        "ur10",
+    ];
+    let mut called = Vec::new();
+    for folder in sets.into_iter().filter_map(measured) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|extension| extension == "csv") {
+                let log = Log::read_standard(&path).unwrap();
+                called.extend(is_called_misread(&log, &Columns::default()));
+            }
+        }
+    }
+    assert!(called.is_empty(), "{called:#?}");
+}
+
+#[test]
+fn no_simulated_log_is_called_misread() {
+    let cases = catalog(SignForm::Smooth { width: 0.01 });
+    let mut called = Vec::new();
+    for (case, seed) in cases.iter().zip(0..) {
+        let start = vec![0.4; case.dynamics.states()];
+        let mut log = simulate(&case.dynamics, &start, 3.0, 1500, seed);
+        log.path = case.name.clone().into();
+        let runs_away = log.q.iter().flatten().any(|q| !(q.abs() < 1e3));
+        if !runs_away {
+            called.extend(is_called_misread(&log, &Columns::default()));
+        }
+    }
+    assert!(called.is_empty(), "{called:#?}");
+}
+
+#[test]
+fn serious_findings_stand_before_the_answer() {
+    let mut opposite = recorded("opposite.csv", 1);
+    each(&mut opposite.tau[0], |tau| -tau);
+    let outcome = closed(&whole_model(), vec![opposite], vec![recorded("b.csv", 2)]);
+    let printed = summary(&outcome, Path::new("report"));
+    assert!(printed.starts_with("Serious findings"), "{printed}");
+    let mended =
+        r#"tau1 has the opposite sign ([columns] tau = [{ column = "tau1", factor = -1 }])"#;
+    assert!(printed.contains(mended), "{printed}");
+}
