@@ -122,7 +122,7 @@ fn a_description_can_be_rebuilt_with_numpy() {
     for (name, model) in models::all() {
         let (_folder, path) = written(find("json").unwrap(), name, &model);
         let (samples, own) = expected(&model);
-        if let Some(theirs) = predictions(name, || DESCRIPTION.predict(&path, &samples)) {
+        if let Some(theirs) = predictions(name, || DESCRIPTION.ask(&path, &samples)) {
             agree(name, &own, &theirs, 1e-9);
         }
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::closeloop::Settings;
 use crate::data::{Log, statistics::median};
 use crate::model::Dynamics;
-use crate::sim::metric::{Assessment, OpenLoop, WindowError, assess};
+use crate::sim::metric::{Assessment, OpenLoop, assess};
 
 /// The errors of a model on a test log, one a horizon of [`ScoreSettings`](crate::closeloop::ScoreSettings).
 pub type LogErrors = Vec<Squares>;
@@ -44,22 +44,25 @@ pub fn by_log(assessment: &Assessment, logs: usize) -> Vec<LogErrors> {
 
 impl Squares {
     fn of(horizon: &OpenLoop, log: usize) -> Self {
-        let windows: Vec<&WindowError> = horizon
-            .windows
-            .iter()
-            .filter(|window| window.log == log)
-            .collect();
-        let of_window = |window: &WindowError| Self {
-            sum: window.position.iter().sum(),
-            count: window.rows * window.position.len(),
-            ..Self::default()
+        let windows = horizon.windows.iter().filter(|window| window.log == log);
+        let windows = windows.map(|window| {
+            let count = window.rows * window.position.len();
+            Self::of_window(window.position.iter().sum(), count, window.diverged)
+        });
+        Self::pooled(&windows.collect::<Vec<_>>())
+    }
+
+    /// One window: the sum over its rows and joints, and their number.
+    pub(super) fn of_window(sum: f64, count: usize, diverged: bool) -> Self {
+        let window = Self {
+            sum,
+            count,
+            windows: Vec::new(),
+            diverged: usize::from(diverged),
         };
-        let own = |window: &&WindowError| of_window(window).rms();
         Self {
-            sum: windows.iter().map(|window| of_window(window).sum).sum(),
-            count: windows.iter().map(|window| of_window(window).count).sum(),
-            windows: windows.iter().map(own).collect(),
-            diverged: windows.iter().filter(|window| window.diverged).count(),
+            windows: vec![window.rms()],
+            ..window
         }
     }
 

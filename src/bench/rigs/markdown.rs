@@ -15,8 +15,8 @@ pub fn markdown(summary: &Summary) -> String {
     let mut text = String::from(
         "Open-loop position error 0.5 s ahead on logs left out of the fit, in mrad: root mean square over all rows \
          of all windows and all joints; the median window in brackets.\n\n\
-         | rig | fits | declared | declared, fitted | plain structure | published | after | hybrid | after / best of \
-         the others | hybrid / after | s a fit |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+         | rig | fits | declared | declared, fitted | plain structure | published | mujoco.sysid | after | hybrid | after / best of \
+         the others | hybrid / after | s a fit |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     summary.rows.iter().for_each(|row| push_row(&mut text, row));
     push_totals(&mut text, &summary.rows);
@@ -24,6 +24,9 @@ pub fn markdown(summary: &Summary) -> String {
     for row in &summary.rows {
         let (named, verdicts) = (listed(&row.named), listed(&row.verdicts));
         let _ = writeln!(text, "| {} | {named} | {verdicts} |", name(row));
+    }
+    for (method, reason) in &summary.not_run {
+        let _ = writeln!(text, "\nNot run: {}: {reason}", method.name());
     }
     if !summary.failures.is_empty() {
         text += "\n| failed | what | error |\n|---|---|---|\n";
@@ -54,30 +57,32 @@ fn push_row(text: &mut String, row: &Row) {
     let ratio = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
     let _ = writeln!(
         text,
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
         name(row),
         row.folds,
         of("declared"),
         of("declared, fitted"),
         of("plain structure"),
         sets.join(", "),
+        of("mujoco.sysid"),
         of("after"),
         of("hybrid"),
         ratio(row.ratio),
         ratio(row.hybrid_ratio),
         row.seconds
+            .map_or("-".to_owned(), |seconds| format!("{seconds:.0}"))
     );
 }
 
 /// `31.2 (6.1)`; where folds failed, their number, since the rest is no error of all test logs.
 fn cell(entry: &Entry) -> String {
-    match (entry.failed, entry.middle()) {
-        (0, Some(middle)) if middle.windows > 0 => {
-            let [rms, median] = [middle.position_rms, middle.position_median].map(mrad);
+    match (entry.failed, entry.error(), entry.middle()) {
+        (0, Some(rms), Some(middle)) => {
+            let [rms, median] = [rms, middle.position_median].map(mrad);
             format!("{rms} ({median})")
         }
-        (0, _) => "no window".to_owned(),
-        (failed, _) => format!("{failed} failed"),
+        (0, ..) => "-".to_owned(),
+        (failed, ..) => format!("{failed} failed"),
     }
 }
 
@@ -98,7 +103,7 @@ fn push_totals(text: &mut String, rows: &[Row]) {
     };
     let _ = writeln!(
         text,
-        "\nOf {} rows: error after at most that of the best of the others (plain structure, published sets) in {}, at \
+        "\nOf {} rows: error after at most that of the best of the others (plain structure, published sets, mujoco.sysid) in {}, at \
          most {CLEARLY} of it in {}; error with the network at most {NETWORK} of the error after in {}.",
         rows.len(),
         count(|row| row.ratio, 1.0),

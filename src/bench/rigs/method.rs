@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::errors::{LogErrors, by_log, errors_on};
 use super::fold::{Fold, Measured};
+use super::mujoco::Task;
 use crate::bench::answer::answer;
 use crate::closeloop::{
     Progress, Request, ResidualLearner, Settings, Split, Study, StudyError, Verdict, close_loop,
@@ -27,6 +28,8 @@ pub enum Scored {
     Plain,
     /// A published parameter set as it is.
     Published(String),
+    /// The declared model, fitted by mujoco.sysid with damping, dry friction and armature on every joint.
+    MujocoSysid,
     /// What closing the loop found.
     After,
     /// With the residual network; where there is none, the same as after.
@@ -34,13 +37,15 @@ pub enum Scored {
 }
 
 /// A piece of work in a fold. Each is stored by itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Score the declared model and the published sets as they are.
     AsTheyAre,
     /// Fit the plain structure.
     Plain,
+    /// Let mujoco.sysid fit the declared model.
+    MujocoSysid,
     /// Close the loop.
     CloseLoop,
 }
@@ -67,6 +72,7 @@ impl fmt::Display for Scored {
             Self::Declared => "declared",
             Self::Fitted => "declared, fitted",
             Self::Plain => "plain structure",
+            Self::MujocoSysid => "mujoco.sysid",
             Self::Published(name) => return write!(f, "published {name}"),
             Self::After => "after",
             Self::Hybrid => "hybrid",
@@ -77,7 +83,7 @@ impl fmt::Display for Scored {
 impl Scored {
     /// Whether closing the loop has to do at least as well.
     pub fn is_rival(&self) -> bool {
-        matches!(self, Self::Plain | Self::Published(_))
+        matches!(self, Self::Plain | Self::Published(_) | Self::MujocoSysid)
     }
 }
 
@@ -90,13 +96,19 @@ pub struct Tools<'a> {
 }
 
 impl Method {
-    pub const ALL: [Self; 3] = [Self::AsTheyAre, Self::Plain, Self::CloseLoop];
+    pub const ALL: [Self; 4] = [
+        Self::AsTheyAre,
+        Self::Plain,
+        Self::MujocoSysid,
+        Self::CloseLoop,
+    ];
 
     /// As its files are called.
     pub fn name(self) -> &'static str {
         match self {
             Self::AsTheyAre => "as_they_are",
             Self::Plain => "plain",
+            Self::MujocoSysid => "mujoco_sysid",
             Self::CloseLoop => "closeloop",
         }
     }
@@ -110,7 +122,20 @@ impl Method {
         match self {
             Self::AsTheyAre => std::iter::once(Scored::Declared).chain(published).collect(),
             Self::Plain => vec![Scored::Plain],
+            Self::MujocoSysid => vec![Scored::MujocoSysid],
             Self::CloseLoop => vec![Scored::Fitted, Scored::After, Scored::Hybrid],
+        }
+    }
+
+    /// Changes with everything that the result depends on; `program` stands for this build of the program.
+    pub fn fingerprint(self, rig: &Measured, fold: &Fold, seed: u64, program: &str) -> String {
+        match self {
+            // Another build of the program changes nothing in what MuJoCo is given.
+            Self::MujocoSysid => Task::new(&rig.declared, &fold.train, &fold.test)
+                .map_or_else(|error| error.to_string(), |task| task.fingerprint()),
+            Self::AsTheyAre | Self::Plain | Self::CloseLoop => {
+                format!("{} {seed} {program}", rig.fingerprint)
+            }
         }
     }
 
@@ -124,12 +149,16 @@ impl Method {
         fold: &Fold,
         tools: &Tools<'_>,
         progress: &mut dyn FnMut(Progress<'_>),
-    ) -> Result<Found, StudyError> {
+    ) -> anyhow::Result<Found> {
         let (errors, said) = match self {
             Self::AsTheyAre => (as_they_are(rig, fold), None),
             Self::Plain => {
                 let fitted = fit(&rig.plain, tools.library, &fold.train)?;
                 (vec![(Scored::Plain, errors_of(&fitted, fold))], None)
+            }
+            Self::MujocoSysid => {
+                let task = Task::new(&rig.declared, &fold.train, &fold.test)?;
+                (vec![(Scored::MujocoSysid, task.run()?)], None)
             }
             Self::CloseLoop => closed(rig, fold, tools, progress)?,
         };

@@ -16,9 +16,8 @@ pub struct Line {
     pub rig: String,
     pub fold: String,
     pub method: Method,
-    /// Hash of what the numbers depend on, and of the program: results of another are not used again.
-    pub configuration: String,
-    pub program: String,
+    /// Of what the numbers depend on: see [`Method::fingerprint`].
+    pub fingerprint: String,
     pub seconds: f64,
     /// An error counts as a failure wherever the method counts.
     pub found: Result<Found, String>,
@@ -32,7 +31,7 @@ pub struct Row {
     /// Number of fits that the row's test logs were scored by.
     pub folds: usize,
     pub models: Vec<Entry>,
-    /// Least error of the plain structure and the published sets, and whose it is.
+    /// Least error of the others (plain structure, published sets, mujoco.sysid), and whose it is.
     pub best: Option<(String, f64)>,
     /// Error after over that.
     pub ratio: Option<f64>,
@@ -41,8 +40,8 @@ pub struct Row {
     /// Effects and verdicts, each with the number of folds.
     pub named: BTreeMap<String, usize>,
     pub verdicts: BTreeMap<String, usize>,
-    /// Run time of closing the loop in a fold \[s\]: median.
-    pub seconds: f64,
+    /// Run time of closing the loop in a fold \[s\]: median over the folds in which it was run.
+    pub seconds: Option<f64>,
 }
 
 /// The error of a model in a row.
@@ -51,6 +50,8 @@ pub struct Entry {
     pub model: String,
     /// Number of folds in which there is no such model, since its fit failed.
     pub failed: usize,
+    /// Number of folds in which the method was not run.
+    pub missing: usize,
     /// Over all test logs of the folds that did not fail.
     pub pooled: Vec<Horizon>,
     /// Over each test log.
@@ -73,13 +74,15 @@ pub struct Horizon {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     pub rows: Vec<Row>,
+    /// Methods that were not run, each with the reason.
+    pub not_run: BTreeMap<Method, String>,
     /// Fold, method and error of each failure.
     pub failures: Vec<(String, Method, String)>,
     pub seconds: f64,
 }
 
 /// Pool the results of the folds.
-pub fn summarise(rigs: &[Measured], lines: &[Line]) -> Summary {
+pub fn summarise(rigs: &[Measured], lines: &[Line], not_run: BTreeMap<Method, String>) -> Summary {
     let row = |rig| {
         let lines = Lines { rig, lines };
         lines
@@ -97,6 +100,7 @@ pub fn summarise(rigs: &[Measured], lines: &[Line]) -> Summary {
     };
     Summary {
         rows: rigs.iter().flat_map(row).collect(),
+        not_run,
         failures: lines.iter().filter_map(failure).collect(),
         seconds: lines.iter().map(|line| line.seconds).sum(),
     }
@@ -120,44 +124,40 @@ impl<'a> Lines<'a> {
 
     fn row(self, group: Option<&str>) -> Row {
         let folds = self.folds(group);
-        let models = Method::ALL.into_iter().flat_map(|method| {
-            let scored = method.scores(self.rig).into_iter();
-            scored.map(move |what| (method, what))
-        });
-        let models: Vec<(Scored, Entry)> = models
-            .map(|(method, what)| {
-                let entry = self.entry(method, &what, &folds, group);
-                (what, entry)
-            })
-            .collect();
+        let models = self.models(&folds, group);
         let error = |what: &Scored| models.iter().find(|(w, _)| w == what)?.1.error();
-        let rivals = models.iter().filter(|(what, _)| what.is_rival());
-        let best = rivals
-            .filter_map(|(what, entry)| Some((what.to_string(), entry.error()?)))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let after = error(&Scored::After);
-        let closed: Vec<&Line> = folds
+        let ratio = |what: Option<f64>, of: Option<f64>| Some(what? / of?);
+        let (after, best) = (error(&Scored::After), best(&models));
+        let closed = folds
             .iter()
-            .filter_map(|fold| self.of(fold, Method::CloseLoop))
-            .collect();
+            .filter_map(|fold| self.of(fold, Method::CloseLoop));
+        let closed: Vec<&Line> = closed.collect();
         let said: Vec<&Said> = closed.iter().filter_map(|line| line.said()).collect();
         let seconds: Vec<f64> = closed.iter().map(|line| line.seconds).collect();
         Row {
             rig: self.rig.rig.name.clone(),
             group: group.map(str::to_owned),
             folds: folds.len(),
-            ratio: after
-                .zip(best.as_ref())
-                .map(|(after, (_, best))| after / best),
-            hybrid_ratio: error(&Scored::Hybrid)
-                .zip(after)
-                .map(|(hybrid, after)| hybrid / after),
+            ratio: ratio(after, best.as_ref().map(|(_, error)| *error)),
+            hybrid_ratio: ratio(error(&Scored::Hybrid), after),
             best,
             named: counts(said.iter().flat_map(|said| said.names.clone())),
             verdicts: counts(said.iter().map(|said| word(said.verdict))),
-            seconds: median(&seconds),
+            seconds: (!seconds.is_empty()).then(|| median(&seconds)),
             models: models.into_iter().map(|(_, entry)| entry).collect(),
         }
+    }
+
+    /// Every model with its error in a row.
+    fn models(self, folds: &[&'a Fold], group: Option<&str>) -> Vec<(Scored, Entry)> {
+        let of_method = |method: Method| {
+            let scored = method.scores(self.rig).into_iter();
+            scored.map(move |what| {
+                let entry = self.entry(method, &what, folds, group);
+                (what, entry)
+            })
+        };
+        Method::ALL.into_iter().flat_map(of_method).collect()
     }
 
     /// Folds with test logs of a row.
@@ -186,9 +186,13 @@ impl<'a> Lines<'a> {
         group: Option<&str>,
     ) -> Entry {
         let mut logs: Vec<(String, &LogErrors)> = Vec::new();
-        let mut failed = 0;
+        let (mut failed, mut missing) = (0, 0);
         for fold in folds {
-            let Some(errors) = self.of(fold, method).and_then(|line| line.errors(what)) else {
+            let Some(line) = self.of(fold, method) else {
+                missing += 1;
+                continue;
+            };
+            let Some(errors) = line.errors(what) else {
                 failed += 1;
                 continue;
             };
@@ -200,6 +204,7 @@ impl<'a> Lines<'a> {
         Entry {
             model: what.to_string(),
             failed,
+            missing,
             pooled: horizons(&all),
             logs: logs
                 .iter()
@@ -224,16 +229,24 @@ impl Line {
 }
 
 impl Entry {
-    /// The error of the table, where no fold failed \[rad\].
+    /// The error of the table, where there is one of every fold \[rad\].
     pub fn error(&self) -> Option<f64> {
         let middle = self.middle()?;
-        (self.failed == 0 && middle.windows > 0).then_some(middle.position_rms)
+        (self.failed + self.missing == 0 && middle.windows > 0).then_some(middle.position_rms)
     }
 
     /// The horizon of the table.
     pub fn middle(&self) -> Option<&Horizon> {
         self.pooled.get(self.pooled.len() / 2)
     }
+}
+
+/// The least error of those that closing the loop has to match, and whose it is.
+fn best(models: &[(Scored, Entry)]) -> Option<(String, f64)> {
+    let rivals = models.iter().filter(|(what, _)| what.is_rival());
+    rivals
+        .filter_map(|(what, entry)| Some((what.to_string(), entry.error()?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 fn horizons(logs: &[&LogErrors]) -> Vec<Horizon> {

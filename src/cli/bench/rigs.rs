@@ -1,5 +1,8 @@
+use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::env;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
@@ -7,12 +10,16 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use super::{Answer, Common, inputs, program_id, progress, told, unless_panic};
-use crate::bench::rigs::{Fold, Line, Measured, Method, Rig, Tools, markdown, read, summarise};
+use crate::bench::rigs::{
+    Fold, Found, Line, Measured, Method, Rig, Tools, markdown, read, summarise,
+};
+use crate::closeloop::Progress;
+use crate::formats::ClientError;
 use crate::model::Library;
 use crate::runs::RunFolder;
 use crate::train::ResidualTrainer;
 
-/// Compare closing the loop with a plain structure and published parameters on measured rigs, on logs left out of the fit
+/// Compare closing the loop with a plain structure, published parameters and mujoco.sysid on measured rigs
 ///
 /// Each log in turn is left out of the fit and scored. Results are stored one by one in DIR/RIG/LOG; an interrupted run
 /// is resumed, and a later run repeats only what has changed since. DIR/rigs.md and DIR/rigs.json compare the errors.
@@ -30,11 +37,40 @@ pub(super) struct Rigs {
     /// Folder of the results
     #[arg(long, default_value = "bench-rigs", value_name = "DIR")]
     out: PathBuf,
-    /// Only rigs whose name contains one of these
+    /// Only rigs whose name contains one of these; RIG/TEXT: of these only results whose name, LOG/METHOD, contains TEXT
     #[arg(long, num_args = 1.., value_name = "RIG")]
-    only: Vec<String>,
+    only: Vec<Selection>,
     #[command(flatten)]
     common: Common,
+}
+
+/// What `--only` asks for.
+#[derive(Debug, Clone)]
+struct Selection {
+    rig: String,
+    result: String,
+}
+
+impl FromStr for Selection {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        let (rig, result) = text.split_once('/').unwrap_or((text, ""));
+        Ok(Self {
+            rig: rig.to_owned(),
+            result: result.to_owned(),
+        })
+    }
+}
+
+impl Rigs {
+    /// Whether a rig is asked for, and which of its results.
+    fn wants(&self, rig: &str, result: Option<&str>) -> bool {
+        let is_it = |only: &Selection| {
+            rig.contains(&only.rig) && result.is_none_or(|name| name.contains(&only.result))
+        };
+        self.only.is_empty() || self.only.iter().any(is_it)
+    }
 }
 
 /// "No" where something failed.
@@ -53,7 +89,9 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
             seed: arguments.common.seed,
         },
     };
-    let summary = summarise(&rigs, &store.run(&rigs)?);
+    let work = work(arguments, &rigs)?;
+    let (lines, not_run) = store.run(&work)?;
+    let summary = summarise(&rigs, &lines, not_run);
     let text = markdown(&summary);
     store.folder.write("rigs.json", &summary)?;
     store.folder.write_text("rigs.md", &text)?;
@@ -72,13 +110,38 @@ fn open(arguments: &Rigs, library: &Library) -> Result<Vec<Measured>> {
     let data =
         data.context("no measured logs; give their folder with --data or in RESIDYN_DATA")?;
     let mut rigs: Vec<Rig> = read(&arguments.rigs)?;
-    let only = &arguments.only;
-    rigs.retain(|rig| only.is_empty() || only.iter().any(|text| rig.name.contains(text)));
+    rigs.retain(|rig| arguments.wants(&rig.name, None));
     if rigs.is_empty() {
         bail!("no rig's name contains what --only asks for");
     }
     let open = |rig| Ok(Measured::open(rig, &data, library)?);
     rigs.into_iter().map(open).collect()
+}
+
+/// A piece of work, whose result is stored by itself.
+struct Work<'a> {
+    rig: &'a Measured,
+    fold: &'a Fold,
+    method: Method,
+}
+
+fn work<'a>(arguments: &Rigs, rigs: &'a [Measured]) -> Result<Vec<Work<'a>>> {
+    let folds = rigs
+        .iter()
+        .flat_map(|rig| rig.folds.iter().map(move |fold| (rig, fold)));
+    let all = folds.flat_map(|(rig, fold)| Method::ALL.map(|method| Work { rig, fold, method }));
+    let wanted = |work: &Work<'_>| arguments.wants(&work.rig.rig.name, Some(&work.name()));
+    let work: Vec<Work<'_>> = all.filter(wanted).collect();
+    if work.is_empty() {
+        bail!("no result's name contains what --only asks for");
+    }
+    Ok(work)
+}
+
+impl Work<'_> {
+    fn name(&self) -> String {
+        format!("{}/{}", self.fold.name, self.method.name())
+    }
 }
 
 /// Stored results.
@@ -90,68 +153,59 @@ struct Store<'a> {
 }
 
 impl Store<'_> {
-    /// Results of all methods in all folds; stored ones are not computed again.
-    fn run(&self, rigs: &[Measured]) -> Result<Vec<Line>> {
-        let folds = rigs
-            .iter()
-            .flat_map(|rig| rig.folds.iter().map(move |fold| (rig, fold)));
-        let work = folds.flat_map(|(rig, fold)| Method::ALL.map(|method| (rig, fold, method)));
-        let work: Vec<(&Measured, &Fold, Method)> = work.collect();
-        let bar = progress::bar(work.len());
-        let mut lines = Vec::with_capacity(work.len());
-        for (rig, fold, method) in work {
-            let folder = self
-                .folder
-                .within(file_name(&rig.rig.name))
-                .within(file_name(&fold.name));
-            let file = format!("{}.json", method.name());
-            let configuration = format!("{} {}", rig.fingerprint, self.tools.seed);
-            let known = folder.text(&file)?;
-            let known: Option<Line> = known.and_then(|text| serde_json::from_str(&text).ok());
-            let is_it =
-                |line: &Line| line.configuration == configuration && line.program == self.program;
-            lines.push(match known.filter(is_it) {
-                Some(line) => line,
-                None => {
-                    let line = self.line(rig, fold, method, configuration, &bar);
-                    folder.write(&file, &line)?;
-                    line
-                }
-            });
+    /// The results, and which methods cannot be run here; stored results are not computed again.
+    fn run(&self, all: &[Work<'_>]) -> Result<(Vec<Line>, BTreeMap<Method, String>)> {
+        let bar = progress::bar(all.len());
+        let (mut lines, mut not_run) = (Vec::with_capacity(all.len()), BTreeMap::new());
+        for work in all {
+            match self.line(work, &bar)? {
+                Ok(line) => lines.push(line),
+                Err(reason) => _ = not_run.insert(work.method, reason),
+            }
             bar.inc(1);
         }
         bar.finish_and_clear();
-        Ok(lines)
+        Ok((lines, not_run))
     }
 
-    fn line(
-        &self,
-        rig: &Measured,
-        fold: &Fold,
-        method: Method,
-        configuration: String,
-        bar: &ProgressBar,
-    ) -> Line {
+    /// The stored result, or that of doing the work now, or why it cannot be done here.
+    fn line(&self, work: &Work<'_>, bar: &ProgressBar) -> Result<Result<Line, String>> {
+        let Work { rig, fold, method } = *work;
+        let folder = [&rig.rig.name, &fold.name].map(|name| name.replace(['/', '\\'], "-"));
+        let folder = self.folder.within(folder.iter().collect::<PathBuf>());
+        let file = format!("{}.json", method.name());
+        let fingerprint = method.fingerprint(rig, fold, self.tools.seed, &self.program);
+        // A result of another version may not be readable.
+        let known = folder
+            .text(&file)?
+            .and_then(|text| serde_json::from_str(&text).ok());
+        if let Some(line) = known.filter(|line: &Line| line.fingerprint == fingerprint) {
+            return Ok(Ok(line));
+        }
         let begun = Instant::now();
-        let place = format!("{}, {}, {}", rig.rig.name, fold.name, method.name());
-        bar.set_message(place.clone());
-        let mut show = |now: crate::closeloop::Progress<'_>| {
-            bar.set_message(format!("{place}: {}", now.text));
-        };
-        let found = unless_panic(|| method.run(rig, fold, &self.tools, &mut show));
-        Line {
+        let found = self.found(work, bar);
+        let error = found.as_ref().ok().and_then(|found| found.as_ref().err());
+        if let Some(ClientError::Unavailable(reason)) = error.and_then(|error| error.downcast_ref())
+        {
+            return Ok(Err(reason.clone()));
+        }
+        let line = Line {
             rig: rig.rig.name.clone(),
             fold: fold.name.clone(),
             method,
-            configuration,
-            program: self.program.clone(),
+            fingerprint,
             seconds: begun.elapsed().as_secs_f64(),
-            found: found.and_then(|found| found.map_err(|error| told(&error.into()))),
-        }
+            found: found.and_then(|found| found.map_err(|error| told(&error))),
+        };
+        folder.write(&file, &line)?;
+        Ok(Ok(line))
     }
-}
 
-/// A name as that of a folder.
-fn file_name(name: &str) -> String {
-    name.replace(['/', '\\'], "-")
+    fn found(&self, work: &Work<'_>, bar: &ProgressBar) -> Result<Result<Found>, String> {
+        let Work { rig, fold, method } = *work;
+        let place = format!("{}/{}", rig.rig.name, work.name());
+        bar.set_message(place.clone());
+        let mut show = |now: Progress<'_>| bar.set_message(format!("{place}: {}", now.text));
+        unless_panic(|| method.run(rig, fold, &self.tools, &mut show))
+    }
 }

@@ -78,7 +78,7 @@ fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
         .flatten()
         .any(|name| name.starts_with("binaries/"));
     match runs {
-        true => CLIENT.predict(path, samples),
+        true => CLIENT.ask(path, samples),
         false => Err(ClientError::Unavailable(
             "the unit holds no library; name a C compiler in CC".to_owned(),
         )),

@@ -2,6 +2,8 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use thiserror::Error;
 
 use super::{Predictions, Samples};
@@ -45,7 +47,7 @@ impl Client {
     /// No client available, or one that fails on the file.
     pub fn predict(&self, path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
         match self {
-            Self::Python(client) => client.predict(path, samples),
+            Self::Python(client) => client.ask(path, samples),
             Self::Own(predict) => predict(path, samples),
             Self::None(reason) => Err(ClientError::Unavailable((*reason).to_owned())),
         }
@@ -53,15 +55,19 @@ impl Client {
 }
 
 impl PythonClient {
-    /// Run it as `python SCRIPT FILE SAMPLES.json`; it prints [`Predictions`] as JSON. The interpreter is
-    /// `$RESIDYN_PYTHON`, else `python3`.
+    /// Run it as `python SCRIPT FILE QUESTION.json`; it prints its answer as JSON, [`Predictions`] at [`Samples`] say. The
+    /// interpreter is `$RESIDYN_PYTHON`, else `python3`.
     ///
     /// # Errors
     /// No interpreter, a missing package, or a file that the script cannot read.
-    pub fn predict(&self, path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
+    pub fn ask<A: DeserializeOwned>(
+        &self,
+        path: &Path,
+        question: &impl Serialize,
+    ) -> Result<A, ClientError> {
         let python =
             std::env::var_os("RESIDYN_PYTHON").unwrap_or_else(|| OsString::from("python3"));
-        let output = self.run(&python, path, samples)?;
+        let output = self.run(&python, path, question)?;
         let errors = String::from_utf8_lossy(&output.stderr);
         if errors.contains("ModuleNotFoundError") {
             let last = errors.lines().last().unwrap_or_default();
@@ -81,15 +87,15 @@ impl PythonClient {
         &self,
         python: &OsString,
         path: &Path,
-        samples: &Samples,
+        question: &impl Serialize,
     ) -> Result<Output, ClientError> {
         let io = |error: std::io::Error| {
-            ClientError::Unavailable(format!("no temporary folder for samples: {error}"))
+            ClientError::Unavailable(format!("no temporary folder for the question: {error}"))
         };
         let folder = tempfile::tempdir().map_err(io)?;
         let script = folder.path().join(self.name);
-        let input = folder.path().join("samples.json");
-        let json = serde_json::to_vec(samples).expect("samples are finite numbers");
+        let input = folder.path().join("question.json");
+        let json = serde_json::to_vec(question).expect("questions are finite numbers");
         std::fs::write(&script, self.script).map_err(io)?;
         std::fs::write(&input, json).map_err(io)?;
         let arguments = [script.as_path(), path, input.as_path()];

@@ -84,7 +84,7 @@ pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
 }
 
 /// The windows of one log: one every half horizon, from the first row at which the state can be estimated.
-pub(super) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
+pub(crate) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
     let slack = 1e-6 * horizon_s;
     let half_width = half_width_s(log.median_step());
     let row_at = |time: f64| log.time.partition_point(|t| *t < time - slack);
