@@ -133,7 +133,7 @@ fn each_log_is_left_out_in_turn_and_the_errors_are_pooled() {
     for row in rows {
         assert_eq!(row["named"]["coulomb_friction@1"], row["folds"], "{row}");
         let (after, plain) = (error(row, "after"), error(row, "plain structure"));
-        assert!((after / plain - 1.0).abs() < 0.05, "{after} {plain}");
+        assert!(after < 1.02 * plain, "{after} {plain}");
         for frictionless in ["declared, fitted", "published 1.0"] {
             assert!(after < 0.2 * error(row, frictionless), "{row}");
         }
