@@ -101,6 +101,8 @@ settings! {
         beam: usize = 4,
         /// Sets that are fitted after all have been compared by predicted loss.
         fitted: usize = 8,
+        /// The first of them are fitted to the end; the others only while they may still do better than these.
+        first: usize = 2,
         /// Rounds of prediction and fits.
         rounds: usize = 8,
         /// A round must lower the loss on left-out stretches by this share for another one to follow.

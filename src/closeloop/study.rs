@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
 use crate::data::{Audit, JointAudit, Log, audit};
-use crate::identify::{FitError, Identifiability, Shooting, cut, fit};
+use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
 use crate::model::{Dynamics, FittedEffect, Model};
 
 /// A declared model and the logs to learn from, with what follows from both.
@@ -192,6 +192,22 @@ impl<'a> Study<'a> {
     ) -> Result<Fitted, FitError> {
         let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
         self.refit(&fitted.model.with_effects(effects), locals, Some(scale))
+    }
+
+    /// As [`Study::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
+    /// not come down to it.
+    pub(super) fn with_better_effects(
+        &self,
+        fitted: &Fitted,
+        effects: Vec<FittedEffect>,
+        below: f64,
+    ) -> Option<Fitted> {
+        let model = self.smoothed(&fitted.model.with_effects(effects));
+        let dynamics = model.dynamics();
+        let (active, locals) = (self.active(&dynamics), fitted.fit.locals.clone());
+        let aim = (fitted.fit.scale, below);
+        let found = fit_below(&self.shooting, &dynamics, &active, locals, aim).ok()??;
+        Some(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
     /// The same without the k-th effect of a model.

@@ -38,6 +38,25 @@ pub fn fit(
     Ok(search.finish(termination))
 }
 
+/// As [`fit`] at a given scale, where only a cost below `below` is of use; `None` if the cost does not come down to it.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_below(
+    shooting: &Shooting<'_>,
+    dynamics: &Dynamics,
+    active: &[usize],
+    locals: Vec<Vec<f64>>,
+    (scale, below): (f64, f64),
+) -> Result<Option<(Values, Fit)>, FitError> {
+    let tangent = Tangent::new(dynamics, active, Local::State);
+    let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale))?;
+    let mut search = search.only_below(below);
+    let termination = search.run(MOST_STEPS);
+    let found = (termination != Termination::GivenUp).then(|| search.finish(termination));
+    Ok(found)
+}
+
 /// Evaluate a model without changing a value: the normal equations of each window in the parameters `active`.
 ///
 /// # Errors

@@ -17,6 +17,11 @@ const ENOUGH_TO_COMPARE: f64 = 1e-4;
 const FIRST_DAMPING: f64 = 1e-3;
 const DAMPING_ON_SUCCESS: f64 = 0.1;
 const DAMPING_ON_FAILURE: f64 = 10.0;
+/// A fit that is of use only below some cost is given up where that cost is farther than so many times the decrease that
+/// the quadratic model predicts,
+const OUT_OF_REACH: f64 = 3.0;
+/// after so many steps: the first ones say little about where a search will end.
+const FIRST_STEPS: usize = 3;
 /// Less damping than this is none, and with more the step is shorter than rounding.
 const DAMPING_RANGE: [f64; 2] = [1e-12, 1e12];
 
@@ -32,6 +37,8 @@ pub(super) struct Search<'a> {
     cost: f64,
     /// The share of the cost by which a step must lower it for another one to follow.
     enough: f64,
+    /// A minimum that is not below this cost is of no use.
+    below: f64,
     damping: f64,
     steps: usize,
 }
@@ -67,6 +74,7 @@ impl<'a> Search<'a> {
             scale: scale.unwrap_or(1.0),
             cost: f64::INFINITY,
             enough: scale.map_or(ENOUGH, |_| ENOUGH_TO_COMPARE),
+            below: f64::INFINITY,
             damping: FIRST_DAMPING,
             steps: 0,
         };
@@ -84,6 +92,12 @@ impl<'a> Search<'a> {
             search.cost = costs.iter().sum();
         }
         Ok(search)
+    }
+
+    /// Give up where the cost will not come below this.
+    pub fn only_below(mut self, cost: f64) -> Self {
+        self.below = cost;
+        self
     }
 
     /// Estimate the scale from the residuals at hand.
@@ -117,6 +131,9 @@ impl<'a> Search<'a> {
     fn step(&mut self) -> Option<Termination> {
         self.steps += 1;
         let terms = self.linearised();
+        if self.steps > FIRST_STEPS && self.is_out_of_reach(&terms) {
+            return Some(Termination::GivenUp);
+        }
         let mut is_solvable = false;
         while self.damping < DAMPING_RANGE[1] {
             if let Some(Step { values, locals }) = self.propose(&terms) {
@@ -146,6 +163,18 @@ impl<'a> Search<'a> {
         self.damping = FIRST_DAMPING;
         let predicted = self.predicted_decrease(terms);
         predicted.is_none_or(|decrease| decrease > self.enough * self.cost.max(1.0))
+    }
+
+    /// Whether the quadratic model of the cost, hardly damped, does not lead anywhere near a cost of use.
+    fn is_out_of_reach(&mut self, terms: &[WindowTerms]) -> bool {
+        if self.cost <= self.below {
+            return false;
+        }
+        let damping = self.damping;
+        self.damping = damping.min(FIRST_DAMPING);
+        let predicted = self.predicted_decrease(terms);
+        self.damping = damping;
+        predicted.is_some_and(|decrease| self.cost - OUT_OF_REACH * decrease > self.below)
     }
 
     /// Predicted decrease of the cost by the next step; `None` where there is none.

@@ -17,7 +17,7 @@ mod sums;
 mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
-pub use fit::{as_it_stands, fit, predicted_cost};
+pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
 pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};

@@ -81,6 +81,8 @@ pub enum Termination {
     Singular,
     /// Not converged: the cost was still falling after the largest number of steps.
     StepLimit,
+    /// Not converged: the cost was not coming down to where the fit would have been of use.
+    GivenUp,
     /// No value was free to change but the windows' own, or none at all: the model was evaluated as it was given.
     AsGiven,
 }
@@ -90,7 +92,7 @@ impl Termination {
     pub fn has_converged(self) -> bool {
         match self {
             Self::SmallDecrease | Self::SmallPredictedDecrease | Self::AsGiven => true,
-            Self::NoDescent | Self::Singular | Self::StepLimit => false,
+            Self::NoDescent | Self::Singular | Self::StepLimit | Self::GivenUp => false,
         }
     }
 }
@@ -105,6 +107,7 @@ impl fmt::Display for Termination {
             }
             Self::Singular => "not converged: the normal equations cannot be solved",
             Self::StepLimit => "not converged: the loss was still falling at the last step allowed",
+            Self::GivenUp => "not converged: given up, the loss was not coming down far enough",
             Self::AsGiven => "evaluated as given",
         })
     }

@@ -73,7 +73,9 @@ fn instead_of(
     let rival = |(_, effect): &(f64, &FittedEffect)| {
         let mut effects = chosen.fitted.model.effects.clone();
         effects[declared + k] = (*effect).clone();
-        let trial = Trial::of(study, study.with_effects(&chosen.fitted, effects).ok()?);
+        let below = settings.as_little * chosen.loss();
+        let fitted = study.with_better_effects(&chosen.fitted, effects, below)?;
+        let trial = Trial::of(study, fitted);
         let as_good = trial.is_valid(study) && is_as_good(&trial, chosen, less, settings);
         as_good.then(|| Rival {
             effect: trial.fitted.model.effects[declared + k].clone(),

@@ -111,7 +111,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let study = self.study;
         let blocks = blocks(study, self.library);
         self.say("fitting what most machines have");
-        let fitted = self.fitted(&declared, blocks);
+        let fitted = self.fitted_for_the_best(&declared, blocks);
         let settings = &study.settings.select;
         let fitted = self.noted(&declared, fitted, 0);
         let is_better = |best: &&Trial| best.loss() < declared.loss() * (1.0 - settings.step);
@@ -146,13 +146,25 @@ impl<'a, 'p> Search<'a, 'p> {
                 }),
         );
         self.say(&format!("fitting {} sets of effects", sets.len()));
-        let fitted = self.fitted(from, sets);
+        let fitted = self.fitted_for_the_best(from, sets);
         self.noted(from, fitted, all.len())
     }
 
+    /// The declared model with each set of effects in place of those of a trial, the most promising first, fitted at its
+    /// scale, to find the best one: those that cannot be better than the trial or the first few are left out.
+    fn fitted_for_the_best(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
+        let first = self.study.settings.select.first.min(sets.len());
+        let rest = sets.split_off(first);
+        let mut trials = self.fitted(from, sets, from.loss());
+        let below = trials.iter().map(Trial::loss).fold(from.loss(), f64::min);
+        trials.extend(self.fitted(from, rest, below));
+        trials
+    }
+
     /// The declared model with each set of effects in place of those of a trial, fitted at its scale; those that cannot
-    /// be fitted are left out.
-    fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
+    /// be fitted, or leave more than a loss of `below`, are left out. No loss on stretches left out is smaller than that
+    /// of the fit itself.
+    fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>, below: f64) -> Vec<Trial> {
         let study = self.study;
         sets.iter_mut().for_each(without_contained);
         sets.retain(|set| set.len() <= study.settings.select.most_effects);
@@ -167,7 +179,7 @@ impl<'a, 'p> Search<'a, 'p> {
         });
         let trial = |set: Vec<FittedEffect>| {
             let effects = [study.declared.effects.as_slice(), &set].concat();
-            let fitted = study.with_effects(&from.fitted, effects).ok()?;
+            let fitted = study.with_better_effects(&from.fitted, effects, below)?;
             Some(Trial::of(study, fitted)).filter(|trial| trial.is_valid(study))
         };
         sets.into_par_iter().filter_map(trial).collect()
@@ -178,7 +190,7 @@ impl<'a, 'p> Search<'a, 'p> {
         self.say("exchanging effects");
         let sets = exchanges(self.study, self.library, &from.fitted);
         let count = sets.len();
-        let fitted = self.fitted(from, sets);
+        let fitted = self.fitted_for_the_best(from, sets);
         self.noted(from, fitted, count)
     }
 
@@ -209,7 +221,7 @@ impl<'a, 'p> Search<'a, 'p> {
                 .map(|set| set[declared..].to_vec())
                 .collect();
             sets.extend(exchanges(study, self.library, &current.fitted));
-            let mut good = self.as_good_as(best, self.fitted(&current, sets));
+            let mut good = self.as_good_as(best, &current, sets);
             good.retain(|trial| trial.values() < current.values());
             match good
                 .into_iter()
@@ -236,15 +248,18 @@ impl<'a, 'p> Search<'a, 'p> {
         };
         let sets: Vec<_> = descent(&outlook).into_iter().take_while(within).collect();
         let sets = sets.iter().map(|set| outlook.effects(set)).collect();
-        let good = self.as_good_as(best, self.fitted(trial, sets));
+        let good = self.as_good_as(best, trial, sets);
         let size = |trial: &Trial| trial.fitted.model.effects.len();
         good.into_iter()
             .min_by_key(size)
             .unwrap_or_else(|| trial.clone())
     }
 
-    fn as_good_as(&self, best: &Trial, mut trials: Vec<Trial>) -> Vec<Trial> {
-        trials.retain(|trial| trial.is_as_good_as(best, &self.study.settings.select));
+    /// The sets that explain the logs as well as the best one, fitted from a trial.
+    fn as_good_as(&self, best: &Trial, from: &Trial, sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
+        let settings = &self.study.settings.select;
+        let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler));
+        trials.retain(|trial| trial.is_as_good_as(best, settings));
         trials
     }
 }
