@@ -9,6 +9,7 @@ use residyn::bench::rigs::{
     summarise,
 };
 use residyn::bench::{Cell, Source, read as grid};
+use residyn::closeloop::Settings;
 use residyn::formats::ClientError;
 use residyn::model::Library;
 use serde_json::Value;
@@ -193,9 +194,13 @@ fn mujoco_predicts_as_the_program_does_and_its_toolbox_finds_the_friction() {
         predicted => rms(&predicted.unwrap()),
     };
     let expected = rms(&errors_on(&model.dynamics(), &fold.test));
-    for (predicted, expected) in predicted.iter().zip(&expected) {
+    // MuJoCo's integrator is of first order: over a time t its steps h err by a h t / 2, here by gravity's largest
+    // acceleration in steps of 2 ms.
+    let horizons_s = Settings::default().score.horizons_s;
+    for ((predicted, expected), horizon_s) in predicted.iter().zip(&expected).zip(horizons_s) {
+        let stepping = 0.5 * 19.62 * 2e-3 * horizon_s;
         assert!(
-            (predicted / expected - 1.0).abs() < 0.02,
+            (predicted - expected).abs() < 0.02 * expected + stepping.min(0.1 * expected),
             "{predicted} {expected}"
         );
     }
