@@ -40,8 +40,14 @@ impl LocalCubic {
     ///
     /// The slope is that of the Legendre polynomials 1 and 3 at 0, whose least-squares coefficients
     /// have variances 3/n and 7/n: (3 * 1^2 + 7 * (3/2)^2) / n = 18.75 / n.
-    pub(super) fn slope_noise_gain(half_width_s: f64, rows: f64) -> f64 {
+    pub(crate) fn slope_noise_gain(half_width_s: f64, rows: f64) -> f64 {
         (18.75 / rows).sqrt() / half_width_s
+    }
+
+    /// Standard deviation of the value per standard deviation of white noise on the values, likewise: the Legendre
+    /// polynomials 0 and 2 at 0 have coefficients of variance 1/n and 5/n, which gives (1 + 5 / 4) / n.
+    pub(crate) fn value_noise_gain(rows: f64) -> f64 {
+        (2.25 / rows).sqrt()
     }
 }
 
@@ -172,15 +178,22 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_carries_the_noise_that_is_said() {
+    fn value_and_slope_carry_the_noise_that_is_said() {
         // The response to a unit at each row in turn gives the weights; their norm is the gain.
         let time: Vec<f64> = (0..201).map(|i| i as f64 * 0.001).collect();
-        let weight = |at: usize| {
+        let weights = (0..201).map(|at| {
             let unit: Vec<f64> = (0..201).map(|i| f64::from(u8::from(i == at))).collect();
-            local_cubic(&time, &unit, 100, 0.05).unwrap().slope
-        };
-        let norm = (0..201).map(|at| weight(at).powi(2)).sum::<f64>().sqrt();
-        let said = LocalCubic::slope_noise_gain(0.05, 101.0);
-        assert!((norm / said - 1.0).abs() < 0.05, "{norm} {said}");
+            local_cubic(&time, &unit, 100, 0.05).unwrap()
+        });
+        let [value, slope] = weights.fold([0.0, 0.0], |[value, slope], of| {
+            [value + of.value.powi(2), slope + of.slope.powi(2)]
+        });
+        let said = [
+            LocalCubic::value_noise_gain(101.0),
+            LocalCubic::slope_noise_gain(0.05, 101.0),
+        ];
+        for (norm, said) in [value, slope].map(f64::sqrt).into_iter().zip(said) {
+            assert!((norm / said - 1.0).abs() < 0.05, "{norm} {said}");
+        }
     }
 }

@@ -13,6 +13,7 @@ mod outcome;
 mod pack;
 mod sensitivity;
 mod shooting;
+mod start;
 mod sums;
 mod values;
 

@@ -2,7 +2,8 @@
 
 use super::normal_equations::WindowTerms;
 use super::sensitivity::{LANES, Lane, Tangent, TangentStepper};
-use super::sums::Sums;
+use super::start::Start;
+use super::sums::{Sums, loss};
 use super::values::Values;
 use crate::data::Log;
 use crate::lanes::Row;
@@ -25,6 +26,9 @@ pub(super) struct Pack {
     pub q: Vec<Vec<Lane>>,
     /// `[row][joint]`: 1 / noise, or 0 where the lane has no such row or its log masks it.
     pub weight: Vec<Vec<Lane>>,
+    /// `[angles, velocities]`: what the logs tell of the start states, and 1 / standard deviation.
+    start: Vec<Lane>,
+    start_weight: Vec<Lane>,
 }
 
 impl Pack {
@@ -46,7 +50,17 @@ impl Pack {
             tau: zeros(),
             q: zeros(),
             weight: zeros(),
+            start: vec![Row::splat(0.0); 2 * n],
+            start_weight: vec![Row::splat(0.0); 2 * n],
         };
+        for (lane, &member) in members.iter().enumerate() {
+            let window = windows[member];
+            let start = Start::of(&logs[window.log], window.first, noise);
+            for k in 0..2 * n {
+                pack.start[k][lane] = start.state[k];
+                pack.start_weight[k][lane] = start.weight[k];
+            }
+        }
         for lane in 0..LANES {
             // Empty lanes repeat the last window, without weight.
             let window = windows[members[lane.min(members.len() - 1)]];
@@ -147,6 +161,37 @@ impl Pack {
         }
     }
 
+    /// The Huber loss of each window at residual scale `scale`, and that of its start state; not finite where the model
+    /// diverges.
+    pub fn costs(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        commands: &[Commands<'_>],
+        locals: &[Vec<f64>],
+        scale: f64,
+    ) -> Vec<(usize, f64)> {
+        let n = dynamics.joints;
+        let mut costs: Vec<(usize, f64)> = self.windows.iter().map(|&w| (w, 0.0)).collect();
+        self.roll(dynamics, values, commands, locals, |row, angles| {
+            for (lane, (window, cost)) in costs.iter_mut().enumerate() {
+                let velocities = &locals[*window][n..];
+                for j in 0..n {
+                    let weight = self.weight[row][j][lane] / scale;
+                    *cost += loss((angles[j][lane] - self.q[row][j][lane]) * weight).0;
+                    if row == 0 {
+                        let from_start = |k: usize, value: f64| {
+                            loss((value - self.start[k][lane]) * self.start_weight[k][lane]).0
+                        };
+                        *cost += from_start(j, angles[j][lane]);
+                        *cost += from_start(n + j, velocities[j]);
+                    }
+                }
+            }
+        });
+        costs
+    }
+
     pub fn linearise(
         &self,
         tangent: &Tangent,
@@ -173,6 +218,9 @@ impl Pack {
                 }));
                 sums.add(&residual, &slopes[j * columns..][..columns], &weight);
             }
+            if row == 0 {
+                self.add_starts(&mut sums, tangent, (angles, slopes), &states);
+            }
             stepper.advance(&self.hold(commands, row, &states[2 * n..]));
         }
         self.windows
@@ -180,5 +228,30 @@ impl Pack {
             .enumerate()
             .map(|(lane, &window)| (window, sums.lane(lane)))
             .collect()
+    }
+
+    /// Add the distance of the start states from what the logs tell of them. It has the sensor's scale, not that of the
+    /// residuals: the worse a model is, the less it may move its start states.
+    fn add_starts(
+        &self,
+        sums: &mut Sums,
+        tangent: &Tangent,
+        (angles, slopes): (&[Lane], &[Lane]),
+        states: &[Lane],
+    ) {
+        let (n, columns) = (tangent.joints, tangent.columns());
+        let mut own = vec![Row::splat(0.0); columns];
+        for j in 0..n {
+            let mut add = |k: usize, value: &Lane, slopes: &[Lane]| {
+                let (told, weight) = (self.start[k], self.start_weight[k]);
+                let residual = Row(std::array::from_fn(|l| (value[l] - told[l]) * weight[l]));
+                sums.add(&residual, slopes, &weight);
+            };
+            add(j, &angles[j], &slopes[j * columns..][..columns]);
+            let velocity = tangent.active.len() + n + j;
+            own[velocity] = Row::splat(1.0);
+            add(n + j, &states[n + j], &own);
+            own[velocity] = Row::splat(0.0);
+        }
     }
 }

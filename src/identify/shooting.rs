@@ -3,14 +3,14 @@ use rayon::prelude::*;
 use super::normal_equations::WindowTerms;
 use super::pack::Pack;
 use super::sensitivity::{LANES, Tangent};
-use super::sums::loss;
 use super::values::Values;
 use crate::data::{Log, half_width_s};
 use crate::model::Dynamics;
 use crate::sim::{Commands, Point, Window, initial_state};
 
 /// Multiple shooting: least squares over windows of logs. In each window the model is integrated from a free start
-/// state and compared with the logged positions at every row.
+/// state and compared with the logged positions at every row; the start state is compared with what the rows around it
+/// tell.
 pub struct Shooting<'l> {
     pub logs: &'l [Log],
     pub windows: Vec<Window>,
@@ -98,7 +98,7 @@ impl<'l> Shooting<'l> {
         out
     }
 
-    /// The Huber loss of each window at residual scale `scale`; infinite where the model diverges.
+    /// The Huber loss of each window at residual scale `scale`, and of its start state; infinite where the model diverges.
     pub fn costs(
         &self,
         dynamics: &Dynamics,
@@ -106,17 +106,18 @@ impl<'l> Shooting<'l> {
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<f64> {
-        self.residuals(dynamics, values, locals)
-            .iter()
-            .map(|residuals| residuals.iter().map(|r| loss(r / scale).0).sum::<f64>())
-            .map(|cost| {
-                if cost.is_finite() {
-                    cost
-                } else {
-                    f64::INFINITY
-                }
-            })
-            .collect()
+        let commands = self.commands(dynamics, values);
+        let per_pack: Vec<Vec<(usize, f64)>> = self
+            .packs
+            .par_iter()
+            .map(|pack| pack.costs(dynamics, values, &commands, locals, scale))
+            .collect();
+        let mut out = vec![f64::INFINITY; self.windows.len()];
+        let finite = |(_, cost): &(usize, f64)| cost.is_finite();
+        for (window, cost) in per_pack.into_iter().flatten().filter(finite) {
+            out[window] = cost;
+        }
+        out
     }
 
     /// The torques of each log as filtered by the model's delays and lags.
