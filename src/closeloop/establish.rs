@@ -2,13 +2,15 @@
 
 use rayon::prelude::*;
 
+use super::fitted::Fitted;
 use super::select::{Folds, Trial, gain, losses_by, p_of_gains, p_value};
 use super::settings::EstablishSettings;
 use super::study::Study;
+use crate::identify::FitError;
 use crate::model::{FittedEffect, Status};
 
 /// How sure an effect of the model is.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Standing {
     pub effect: FittedEffect,
     pub status: Status,
@@ -18,6 +20,8 @@ pub struct Standing {
     pub p_value: f64,
     /// Why it is not established, in a sentence.
     pub reason: Option<String>,
+    /// The model refitted without it.
+    pub without: Result<Fitted, FitError>,
 }
 
 /// Judge each effect that a model has beyond the declared ones by the model refitted without it, `without`; where that
@@ -25,23 +29,27 @@ pub struct Standing {
 pub(super) fn establish(
     study: &Study<'_>,
     chosen: &Trial,
-    without: &[Option<Trial>],
+    without: &[Result<Trial, FitError>],
     trials: usize,
 ) -> Vec<Standing> {
     let halves = Folds::of(study).in_halves();
     let crossed = |trial: &Trial| losses_by(&halves, &trial.fitted.fit);
     let with = crossed(chosen);
     let added = study.added(&chosen.fitted.model);
-    let standing = |(k, less): (usize, &Option<Trial>)| {
+    let standing = |(k, less): (usize, &Result<Trial, FitError>)| {
         let effect = chosen.fitted.model.effects[k].clone();
-        let Some(less) = less else {
-            return Standing {
-                effect,
-                status: Status::Established,
-                gain: 1.0,
-                p_value: 0.0,
-                reason: None,
-            };
+        let less = match less {
+            Ok(less) => less,
+            Err(failure) => {
+                return Standing {
+                    effect,
+                    status: Status::Established,
+                    gain: 1.0,
+                    p_value: 0.0,
+                    reason: None,
+                    without: Err(failure.clone()),
+                };
+            }
         };
         let crossed_less = crossed(less);
         let evidence = Evidence {
@@ -61,18 +69,17 @@ pub(super) fn establish(
             gain: evidence.gain,
             p_value: evidence.p_of_values.unwrap_or(evidence.p_of_falls),
             reason,
+            without: Ok(less.fitted.clone()),
         }
     };
     added.into_par_iter().zip(without).map(standing).collect()
 }
 
-/// The models refitted without each of the added effects; `None` where that failed.
-pub(super) fn without_each(study: &Study<'_>, chosen: &Trial) -> Vec<Option<Trial>> {
+/// The models refitted without each of the added effects.
+pub(super) fn without_each(study: &Study<'_>, chosen: &Trial) -> Vec<Result<Trial, FitError>> {
     let less = |k: usize| {
-        Some(Trial::of(
-            study,
-            study.without_effect(&chosen.fitted, k).ok()?,
-        ))
+        let fitted = study.without_effect(&chosen.fitted, k)?;
+        Ok(Trial::of(study, fitted))
     };
     study
         .added(&chosen.fitted.model)

@@ -107,6 +107,11 @@ settings! {
         rounds: usize = 8,
         /// A round must lower the loss on left-out stretches by this share for another one to follow.
         step: f64 = 0.02,
+        /// A set is not chosen, however much it lowers the loss, that raises the open-loop error on left-out stretches by
+        /// more than so many standard errors
+        worse_by: f64 = 1.0,
+        /// and by more than this share of its square.
+        worse: f64 = 0.02,
         /// A simpler set takes the place of a richer one where the loss on left-out stretches rises by less than this
         /// share,
         negligible: f64 = 0.01,

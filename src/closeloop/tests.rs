@@ -159,6 +159,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
         gain: 1.0,
         p_value: 0.0,
         reason: None,
+        without: study.without_effect(&chosen, 0),
     };
     let chosen = Chosen {
         after: chosen,

@@ -11,7 +11,7 @@ use crate::model::Dynamics;
 /// A fit that estimates ends when a step lowers the cost by less than this share.
 const ENOUGH: f64 = 1e-6;
 /// A fit at a given scale is for comparing models, which differ by more than this share of the cost or not at all.
-const ENOUGH_TO_COMPARE: f64 = 1e-4;
+const ENOUGH_TO_COMPARE: f64 = 1e-3;
 /// Damping of the first step, as a share of the diagonal of the normal equations, and the factors by which it changes
 /// with each step that lowers the cost and with each that does not.
 const FIRST_DAMPING: f64 = 1e-3;

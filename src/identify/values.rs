@@ -69,7 +69,7 @@ impl Values {
         own.map_or(self.common[column.parameter], |own| own.value)
     }
 
-    pub(super) fn set(&mut self, column: Column, value: f64) {
+    pub(crate) fn set(&mut self, column: Column, value: f64) {
         let Some(log) = column.log else {
             self.common[column.parameter] = value;
             return;

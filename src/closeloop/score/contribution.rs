@@ -64,7 +64,7 @@ pub(in crate::closeloop) fn findings(
     let added = study.added(&refined.after.model);
     let finding = |(k, standing): (usize, &Standing)| {
         // Both as effects were selected, in coarse steps.
-        let less = study.without_effect(chosen, k);
+        let less = &standing.without;
         let reduction =
             |less: &Fitted| 1.0 - with / scorer.fitted(less).position_rms().max(f64::MIN_POSITIVE);
         let (expression, parameters) = described(study.declared, &refined.after.model, k);

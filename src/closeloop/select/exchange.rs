@@ -3,13 +3,16 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::model::{Effect, FittedEffect};
 
+/// A set of effects in which one of a model's is replaced by another.
+pub(super) struct Exchange {
+    pub set: Vec<FittedEffect>,
+    /// Of the effect that is replaced, and of the one in its place.
+    pub labels: [String; 2],
+}
+
 /// Sets of effects in which one of a model's is replaced by another that it is easily confused with, on the same joint.
 /// Seen from the model itself, such a pair promises little: each does most of what the other does.
-pub(super) fn exchanges(
-    study: &Study<'_>,
-    library: &[Effect],
-    fitted: &Fitted,
-) -> Vec<Vec<FittedEffect>> {
+pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) -> Vec<Exchange> {
     let declared = study.declared.effects.len();
     let mut sets = Vec::new();
     for k in study.added(&fitted.model) {
@@ -28,8 +31,9 @@ pub(super) fn exchanges(
                 && let Some((start, _)) = best_start(study, &rest, &new)
             {
                 let mut set = present[declared..].to_vec();
+                let labels = [old.label(), start.label()];
                 set.push(start);
-                sets.push(set);
+                sets.push(Exchange { set, labels });
             }
         }
     }

@@ -73,20 +73,25 @@ pub fn left_out_losses(study: &Study<'_>, fit: &Fit) -> Vec<f64> {
 
 /// The same with given folds.
 pub fn losses_by(folds: &Folds, fit: &Fit) -> Vec<f64> {
-    let (stretches, groups) = folds.equations(fit);
-    let all = fit.equations();
-    let steps: Vec<DVector<f64>> = (groups.iter())
-        .map(|part| {
-            // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
-            let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
-            step_without(&all.hessian, &part.hessian, &own)
-        })
-        .collect();
+    let steps = steps_without(folds, fit);
+    let stretches = fit.equations_by(&folds.stretches);
     let loss = |(part, &group): (&WindowTerms, &usize)| {
         let step = &steps[group];
         part.cost + part.gradient.dot(step) + 0.5 * step.dot(&(&part.hessian * step))
     };
     stretches.iter().zip(&folds.groups).map(loss).collect()
+}
+
+/// For each group, the step of a fit's values when it is left out.
+pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
+    let (_, groups) = folds.equations(fit);
+    let all = fit.equations();
+    let step = |part: &WindowTerms| {
+        // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
+        let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
+        step_without(&all.hessian, &part.hessian, &own)
+    };
+    groups.iter().map(step).collect()
 }
 
 /// The part of the information that one group holds.

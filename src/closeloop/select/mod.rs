@@ -1,5 +1,6 @@
 //! Stage 4: choose the set of effects that explains the logs best.
 
+mod ahead;
 mod blocks;
 mod candidate;
 mod evidence;

@@ -8,6 +8,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
 use crate::data::statistics::{mean, standard_error};
+use crate::identify::FitError;
 use crate::model::FittedEffect;
 
 /// A set of effects that explains the logs as well as the chosen one: it has `effect` in place of `instead_of`.
@@ -31,15 +32,20 @@ impl Rival {
 impl Search<'_, '_> {
     /// Effects that explain the logs as well as one of the chosen ones does, beside the others; `without` gives the model
     /// refitted without each of them, `of` which of them are asked for.
-    pub fn rivals(&self, chosen: &Trial, without: &[Option<Trial>], of: &[bool]) -> Vec<Rival> {
+    pub fn rivals(
+        &self,
+        chosen: &Trial,
+        without: &[Result<Trial, FitError>],
+        of: &[bool],
+    ) -> Vec<Rival> {
         let study = self.study;
         let added = study.added(&chosen.fitted.model);
         let all = candidates(study, self.library, &chosen.fitted.model.effects);
         let Some(outlook) = Outlook::of(study, &chosen.fitted, &all) else {
             return Vec::new();
         };
-        let of_effect = |(k, less): (usize, &Option<Trial>)| {
-            let less = less.as_ref().filter(|_| of[k])?;
+        let of_effect = |(k, less): (usize, &Result<Trial, FitError>)| {
+            let less = less.as_ref().ok().filter(|_| of[k])?;
             Some(instead_of(study, chosen, less, &outlook, k))
         };
         let places = (0..added.len()).into_par_iter();

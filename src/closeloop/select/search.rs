@@ -1,8 +1,11 @@
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 
+use super::ahead::Ahead;
 use super::blocks::blocks;
 use super::candidate::{beside, best_start, candidates, has_switch};
-use super::exchange::exchanges;
+use super::exchange::{Exchange, exchanges};
 use super::outlook::Outlook;
 use super::sets::{descent, promising};
 use super::simpler::simpler;
@@ -36,6 +39,8 @@ pub struct Search<'a, 'p> {
     pub study: &'a Study<'a>,
     pub library: &'a [Effect],
     pub rounds: Vec<Round>,
+    /// Exchanges that made a set worse, by the labels of the old and the new effect.
+    vain: HashSet<[String; 2]>,
     progress: &'p mut dyn FnMut(Progress<'_>),
 }
 
@@ -50,6 +55,7 @@ impl<'a, 'p> Search<'a, 'p> {
             study,
             library,
             rounds: Vec::new(),
+            vain: HashSet::new(),
             progress,
         }
     }
@@ -86,15 +92,26 @@ impl<'a, 'p> Search<'a, 'p> {
         Ok(if is_declared { declared } else { simplest })
     }
 
-    /// The best of a round, if it is better than what the round began with by this share of the loss.
+    /// The best of a round that is better than what the round began with by this share of the loss, and not worse in its
+    /// open-loop error.
     fn better(
         &mut self,
         from: &Trial,
         share: f64,
         round: impl FnOnce(&mut Self, &Trial) -> Vec<Trial>,
     ) -> Option<Trial> {
-        let best = round(self, from).into_iter().next()?;
-        (best.loss() < from.loss() * (1.0 - share)).then_some(best)
+        let enough = from.loss() * (1.0 - share);
+        let trials = round(self, from);
+        let mut better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
+        let ahead = Ahead::of(self.study, from);
+        let (rank, best) = better.find(|(_, trial)| {
+            let settings = &self.study.settings.select;
+            !Ahead::of(self.study, trial).is_worse_than(&ahead, settings)
+        })?;
+        if let Some(round) = self.rounds.last_mut() {
+            round.tried[rank].chosen = true;
+        }
+        Some(best)
     }
 
     /// Report progress.
@@ -109,13 +126,13 @@ impl<'a, 'p> Search<'a, 'p> {
     /// The declared model or, where it helps, the model with what most machines have.
     fn first(&mut self, declared: Trial) -> Trial {
         let study = self.study;
-        let blocks = blocks(study, self.library);
-        self.say("fitting what most machines have");
-        let fitted = self.fitted_for_the_best(&declared, blocks);
-        let settings = &study.settings.select;
-        let fitted = self.noted(&declared, fitted, 0);
-        let is_better = |best: &&Trial| best.loss() < declared.loss() * (1.0 - settings.step);
-        let best = fitted.first().filter(is_better);
+        let step = study.settings.select.step;
+        let best = self.better(&declared, step, |search, declared| {
+            search.say("fitting what most machines have");
+            let blocks = blocks(study, search.library);
+            let fitted = search.fitted_for_the_best(declared, blocks);
+            search.noted(declared, fitted, 0)
+        });
         match best.map(|best| study.estimate(&best.fitted)) {
             Some(Ok(fitted)) => Trial::of(study, fitted),
             _ => declared,
@@ -185,25 +202,34 @@ impl<'a, 'p> Search<'a, 'p> {
         sets.into_par_iter().filter_map(trial).collect()
     }
 
-    /// Fit the sets in which one effect is exchanged for another like it, the best first.
+    /// Fit the sets in which one effect is exchanged for another like it, the best first. What was in vain once is not
+    /// tried again.
     fn exchanged(&mut self, from: &Trial) -> Vec<Trial> {
         self.say("exchanging effects");
-        let sets = exchanges(self.study, self.library, &from.fitted);
-        let count = sets.len();
-        let fitted = self.fitted_for_the_best(from, sets);
-        self.noted(from, fitted, count)
+        let study = self.study;
+        let mut exchanges = exchanges(study, self.library, &from.fitted);
+        exchanges.retain(|exchange| !self.vain.contains(&exchange.labels));
+        let sets = exchanges.iter().map(|exchange| exchange.set.clone());
+        let fitted = self.fitted(from, sets.collect(), from.loss());
+        let better = fitted.iter().filter(|trial| trial.loss() < from.loss());
+        let better: Vec<Vec<String>> = better.map(|trial| trial.added_key(study)).collect();
+        let is_vain = |exchange: &Exchange| !better.contains(&key(&exchange.set));
+        let vain = exchanges.iter().filter(|exchange| is_vain(exchange));
+        self.vain
+            .extend(vain.map(|exchange| exchange.labels.clone()));
+        self.noted(from, fitted, exchanges.len())
     }
 
     /// Note a round, and return its trials, the best first.
     fn noted(&mut self, from: &Trial, mut trials: Vec<Trial>, candidates: usize) -> Vec<Trial> {
         trials.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
         let gain = |trial: &Trial| 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE);
-        let tried = |(rank, trial): (usize, &Trial)| Tried {
+        let tried = |trial: &Trial| Tried {
             effects: trial.fitted.model.effects[self.study.added(&trial.fitted.model)].to_vec(),
             gain: gain(trial),
-            chosen: rank == 0 && gain(trial) >= self.study.settings.select.step,
+            chosen: false,
         };
-        let tried = trials.iter().enumerate().map(tried).collect();
+        let tried = trials.iter().map(tried).collect();
         self.rounds.push(Round { candidates, tried });
         trials
     }
@@ -220,7 +246,8 @@ impl<'a, 'p> Search<'a, 'p> {
                 .into_iter()
                 .map(|set| set[declared..].to_vec())
                 .collect();
-            sets.extend(exchanges(study, self.library, &current.fitted));
+            let exchanges = exchanges(study, self.library, &current.fitted);
+            sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
             let mut good = self.as_good_as(best, &current, sets);
             good.retain(|trial| trial.values() < current.values());
             match good
@@ -259,7 +286,9 @@ impl<'a, 'p> Search<'a, 'p> {
     fn as_good_as(&self, best: &Trial, from: &Trial, sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
         let settings = &self.study.settings.select;
         let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler));
-        trials.retain(|trial| trial.is_as_good_as(best, settings));
+        let ahead = Ahead::of(self.study, best);
+        let is_worse = |trial: &Trial| Ahead::of(self.study, trial).is_worse_than(&ahead, settings);
+        trials.retain(|trial| trial.is_as_good_as(best, settings) && !is_worse(trial));
         trials
     }
 }

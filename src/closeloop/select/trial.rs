@@ -52,6 +52,12 @@ impl Trial {
         key(&self.fitted.model.effects)
     }
 
+    /// The same of the effects beyond the declared ones.
+    pub fn added_key(&self, study: &Study<'_>) -> Vec<String> {
+        let model = &self.fitted.model;
+        key(&model.effects[study.added(model)])
+    }
+
     /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and
     /// not significantly so.
     pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {

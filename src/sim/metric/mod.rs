@@ -7,7 +7,7 @@ mod summary;
 mod trace;
 
 pub use assessment::{Assessment, OpenLoop, WindowError};
-pub(crate) use open_loop::windows;
 pub use open_loop::{assess, window_count};
+pub(crate) use open_loop::{errors_in, windows};
 pub use summary::{Summary, summarise};
 pub use trace::{Trace, traces};

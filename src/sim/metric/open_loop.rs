@@ -53,26 +53,43 @@ fn run(
     let replays: Vec<Replay<'_>> = (models.iter().zip(logs))
         .map(|(model, log)| Replay::new(Point::from(&**model), log))
         .collect();
-    let one = |&horizon_s: &f64| {
-        let windows: Vec<Window> = logs
-            .iter()
-            .enumerate()
-            .flat_map(|(index, log)| windows(index, log, horizon_s))
-            .collect();
-        let packs: Vec<&[Window]> = windows
-            .chunk_by(|a, b| a.log == b.log)
-            .flat_map(|of_one_log| of_one_log.chunks(LANES))
-            .collect();
-        let errors: Vec<Vec<WindowError>> = packs
-            .par_iter()
-            .map(|pack| replays[pack[0].log].errors(pack, step_s))
-            .collect();
-        OpenLoop {
-            horizon_s,
-            windows: errors.into_iter().flatten().collect(),
-        }
+    let all = |horizon_s: f64| -> Vec<Window> {
+        let of_log = |(index, log)| windows(index, log, horizon_s);
+        logs.iter().enumerate().flat_map(of_log).collect()
+    };
+    let one = |&horizon_s: &f64| OpenLoop {
+        horizon_s,
+        windows: errors(&replays, &all(horizon_s), step_s),
     };
     horizons_s.iter().map(one).collect()
+}
+
+/// The errors of a model in some windows of the logs, which are in the order of the logs, in substeps of at most
+/// `step_s`.
+pub(crate) fn errors_in(
+    dynamics: &Dynamics,
+    logs: &[Log],
+    windows: &[Window],
+    step_s: f64,
+) -> Vec<WindowError> {
+    let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
+    let replays: Vec<Replay<'_>> = (models.iter().zip(logs))
+        .map(|(model, log)| Replay::new(Point::from(&**model), log))
+        .collect();
+    errors(&replays, windows, step_s)
+}
+
+/// `replays` has one entry a log.
+fn errors(replays: &[Replay<'_>], windows: &[Window], step_s: f64) -> Vec<WindowError> {
+    let packs: Vec<&[Window]> = windows
+        .chunk_by(|a, b| a.log == b.log)
+        .flat_map(|of_one_log| of_one_log.chunks(LANES))
+        .collect();
+    let errors: Vec<Vec<WindowError>> = packs
+        .par_iter()
+        .map(|pack| replays[pack[0].log].errors(pack, step_s))
+        .collect();
+    errors.into_iter().flatten().collect()
 }
 
 /// Number of windows of `horizon_s` seconds in the logs.
