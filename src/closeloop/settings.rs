@@ -115,10 +115,11 @@ settings! {
         /// A simpler set takes the place of a richer one where the loss on left-out stretches rises by less than this
         /// share,
         negligible: f64 = 0.01,
-        /// or by less than so many standard errors (the rule of one standard error: Breiman et al. 1984)
-        simplest: f64 = 1.0,
+        /// or by less than so many standard errors: stretches of a log are alike, so that twice as many are asked for as by
+        /// the rule of one standard error (Breiman et al. 1984),
+        simplest: f64 = 2.0,
         /// and this share: what acts in a few fast stretches only has a large standard error.
-        simpler: f64 = 0.05,
+        simpler: f64 = 0.1,
         /// A whole log is left out at a time; fewer logs than this are left out in parts, at least so many altogether.
         fewest_groups: usize = 8,
         /// Predicted losses may be wrong by this factor: what they exclude by more is not fitted.
