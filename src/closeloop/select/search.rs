@@ -286,9 +286,7 @@ impl<'a, 'p> Search<'a, 'p> {
     fn as_good_as(&self, best: &Trial, from: &Trial, sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
         let settings = &self.study.settings.select;
         let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler));
-        let ahead = Ahead::of(self.study, best);
-        let is_worse = |trial: &Trial| Ahead::of(self.study, trial).is_worse_than(&ahead, settings);
-        trials.retain(|trial| trial.is_as_good_as(best, settings) && !is_worse(trial));
+        trials.retain(|trial| trial.is_as_good_as(best, settings));
         trials
     }
 }
