@@ -118,8 +118,9 @@ settings! {
         /// or by less than so many standard errors: stretches of a log are alike, so that twice as many are asked for as by
         /// the rule of one standard error (Breiman et al. 1984),
         simplest: f64 = 2.0,
-        /// and this share: what acts in a few fast stretches only has a large standard error.
-        simpler: f64 = 0.1,
+        /// and this share: what acts in a few fast stretches only has a large standard error. Effects that save less than
+        /// this and are no more certain than this raised the error on logs of other motion more often than not.
+        simpler: f64 = 0.2,
         /// A whole log is left out at a time; fewer logs than this are left out in parts, at least so many altogether.
         fewest_groups: usize = 8,
         /// Predicted losses may be wrong by this factor: what they exclude by more is not fitted.

@@ -250,10 +250,11 @@ impl<'a, 'p> Search<'a, 'p> {
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
             let mut good = self.as_good_as(best, &current, sets);
             good.retain(|trial| trial.values() < current.values());
-            match good
-                .into_iter()
-                .min_by(|a, b| a.loss().total_cmp(&b.loss()))
-            {
+            let order = |a: &Trial, b: &Trial| {
+                let by_loss = a.loss().total_cmp(&b.loss());
+                a.shifts().cmp(&b.shifts()).then(by_loss)
+            };
+            match good.into_iter().min_by(order) {
                 Some(simpler) => current = self.least(&simpler, best),
                 None => return Ok(Trial::of(study, study.estimate(&current.fitted)?)),
             }
@@ -276,7 +277,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let sets: Vec<_> = descent(&outlook).into_iter().take_while(within).collect();
         let sets = sets.iter().map(|set| outlook.effects(set)).collect();
         let good = self.as_good_as(best, trial, sets);
-        let size = |trial: &Trial| trial.fitted.model.effects.len();
+        let size = |trial: &Trial| (trial.fitted.model.effects.len(), trial.shifts());
         good.into_iter()
             .min_by_key(size)
             .unwrap_or_else(|| trial.clone())

@@ -32,6 +32,13 @@ impl Trial {
         (self.fitted.fit.columns.len(), contained.sum())
     }
 
+    /// Number of parameters that are not where the file holds them: of sets that are as good, the one that contradicts the
+    /// file least is chosen.
+    pub fn shifts(&self) -> usize {
+        let effects = self.fitted.model.effects.iter();
+        effects.filter(|effect| effect.shifted().is_some()).count()
+    }
+
     /// Whether every added effect has values that are consistent with each other, and a shape that the logs determine: a
     /// value that gives an effect its shape and stands at a bound was not found there.
     pub fn is_valid(&self, study: &Study<'_>) -> bool {
