@@ -274,7 +274,12 @@ impl<'a, 'p> Search<'a, 'p> {
             let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
             sum <= best.loss() * (1.0 + settings.slack * settings.simpler)
         };
-        let sets: Vec<_> = descent(&outlook).into_iter().take_while(within).collect();
+        let all = outlook.present();
+        let mut unshifted = all.clone();
+        unshifted.retain(|&item| outlook.items[item].shifted().is_none());
+        let mut sets: Vec<_> = [descent(&outlook, all), vec![unshifted.clone()]].concat();
+        sets.extend(descent(&outlook, unshifted));
+        sets.retain(within);
         let sets = sets.iter().map(|set| outlook.effects(set)).collect();
         let good = self.as_good_as(best, trial, sets);
         let size = |trial: &Trial| (trial.fitted.model.effects.len(), trial.shifts());

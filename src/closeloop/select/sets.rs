@@ -63,11 +63,11 @@ fn neighbours(outlook: &Outlook, set: &Set, most: usize) -> Vec<Set> {
     all.filter(|set| set.len() <= most).collect()
 }
 
-/// Sets with ever fewer of the items of the model, each the best by predicted loss on left-out stretches with one item
-/// less than the one before.
-pub fn descent(outlook: &Outlook) -> Vec<Set> {
+/// Sets with ever fewer of some items, each the best by predicted loss on left-out stretches with one item less than the
+/// one before.
+pub fn descent(outlook: &Outlook, from: Set) -> Vec<Set> {
     let mut sets = Vec::new();
-    let mut current = outlook.present();
+    let mut current = from;
     while !current.is_empty() {
         let without = |k: usize| {
             let mut less = current.clone();
