@@ -107,6 +107,8 @@ settings! {
         rounds: usize = 8,
         /// A round must lower the loss on left-out stretches by this share for another one to follow.
         step: f64 = 0.02,
+        /// An exchange of one effect for another must lower it by this share: more than fits that end early err.
+        exchange: f64 = 0.003,
         /// A set is not chosen, however much it lowers the loss, that raises the open-loop error on left-out stretches by
         /// more than so many standard errors
         worse_by: f64 = 1.0,

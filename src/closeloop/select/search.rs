@@ -73,11 +73,14 @@ impl<'a, 'p> Search<'a, 'p> {
             let step = study.settings.select.step;
             let next = match self.better(&best, step, |search, best| search.round(best)) {
                 Some(next) => next,
-                // An exchange adds nothing: any gain will do.
-                None => match self.better(&best, 0.0, |search, best| search.exchanged(best)) {
-                    Some(next) => next,
-                    None => break,
-                },
+                // An exchange adds nothing: a smaller gain will do.
+                None => {
+                    let step = study.settings.select.exchange;
+                    match self.better(&best, step, |search, best| search.exchanged(best)) {
+                        Some(next) => next,
+                        None => break,
+                    }
+                }
             };
             // The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
             best = Trial::of(study, study.estimate(&next.fitted)?);
@@ -241,13 +244,18 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut current = self.least(best, best);
         loop {
             let added = study.added(&current.fitted.model);
-            let sets = simpler(self.library, &current.fitted.model.effects, added);
+            let sets = simpler(self.library, &current.fitted.model.effects, added.clone());
             let mut sets: Vec<_> = sets
                 .into_iter()
                 .map(|set| set[declared..].to_vec())
                 .collect();
             let exchanges = exchanges(study, self.library, &current.fitted);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
+            sets.extend(added.clone().map(|k| {
+                let mut less = current.fitted.model.effects[declared..].to_vec();
+                less.remove(k - declared);
+                less
+            }));
             let mut good = self.as_good_as(best, &current, sets);
             good.retain(|trial| trial.values() < current.values());
             let order = |a: &Trial, b: &Trial| {
