@@ -1,5 +1,6 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -47,6 +48,9 @@ pub(super) struct Arguments {
     /// where there is none, and how small an effect would it name? Takes about as long as so many runs
     #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS")]
     calibrate: Option<NonZeroUsize>,
+    /// Time after which the search for effects stops where it stands, and the report says so: 90s, 10min, 2h
+    #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
+    budget: Duration,
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
@@ -75,6 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut request = Request::new(&declared, &library, split);
     request.against = against;
     request.learner = Some(&learner);
+    request.budget = Some(arguments.budget);
     let mut outcome = close_loop(request, &mut rng, &mut |now| {
         bar.set_position(now.stage.number() as u64);
         bar.set_message(now.text.to_owned());
@@ -190,6 +195,7 @@ fn origin(arguments: &Arguments, declared: &Model) -> Origin {
             "leave_out": spans.collect::<Vec<_>>(),
             "effects": paths(&arguments.effects.folders),
             "calibrate": arguments.calibrate,
+            "budget": humantime::format_duration(arguments.budget).to_string(),
             "device": arguments.common.device.name(),
         }),
         seed: arguments.common.seed,

@@ -25,6 +25,8 @@ pub struct Chosen {
     /// One for each added effect, in the order of the model.
     pub standings: Vec<Standing>,
     pub rounds: Vec<Round>,
+    /// Whether the search was stopped because its time was spent.
+    pub stopped: bool,
     /// Effects that explain the logs as well as one that was chosen.
     pub rivals: Vec<Rival>,
     /// Why there are no effects, if the chosen model could not be fitted.
@@ -101,12 +103,14 @@ fn choose(
             return Chosen {
                 after: before.clone(),
                 standings: Vec::new(),
+                stopped: !study.has_time(),
                 rounds: search.rounds,
                 rivals: Vec::new(),
                 failure: Some(failure),
             };
         }
     };
+    let stopped = !study.has_time();
     search.tell(Stage::Establish.into());
     let without = without_each(study, &chosen);
     let all = candidates(study, library.effects(), &study.declared.effects);
@@ -118,6 +122,7 @@ fn choose(
     Chosen {
         rivals: search.rivals(&chosen, &without, &established),
         standings,
+        stopped,
         rounds: search.rounds,
         after: chosen.fitted,
         failure: None,

@@ -7,6 +7,7 @@ use super::score::{Contradicted, Errors, Finding};
 use super::select::Round;
 use super::settings::Settings;
 use super::split::SplitMethod;
+use super::stage::Stage;
 use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
@@ -28,6 +29,8 @@ pub struct Outcome {
     pub learned: Option<Learned>,
     /// What the training logs could show, where that was asked for: see [`calibrate`](super::calibrate()).
     pub calibration: Option<Calibration>,
+    /// How long each stage took in s.
+    pub seconds: Vec<(Stage, f64)>,
 }
 
 /// What was studied.
@@ -70,6 +73,8 @@ pub struct Effects {
     pub alternatives: Vec<Alternative>,
     /// What was tried.
     pub rounds: Vec<Round>,
+    /// Whether the search was stopped because its time was spent.
+    pub stopped: bool,
 }
 
 /// What the effects leave unexplained.

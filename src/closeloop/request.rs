@@ -1,3 +1,5 @@
+use std::time::Duration;
+
 use super::error::StudyError;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
@@ -18,6 +20,8 @@ pub struct Request<'a> {
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
     pub settings: Settings,
+    /// Time after which the search for effects stops where it stands; without one it goes on to its end.
+    pub budget: Option<Duration>,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
 }
@@ -40,6 +44,7 @@ impl<'a> Request<'a> {
             split,
             against: Vec::new(),
             settings: Settings::default(),
+            budget: None,
             learner: None,
         }
     }

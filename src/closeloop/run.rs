@@ -1,3 +1,5 @@
+use std::time::Instant;
+
 use rand::Rng;
 
 use super::discriminate::discriminate;
@@ -10,7 +12,7 @@ use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
-use super::stage::{Progress, Stage};
+use super::stage::{Clock, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
 use crate::data::{Audit, Log, audit};
@@ -32,8 +34,15 @@ pub fn close_loop(
         split,
         against,
         settings,
+        budget,
         learner,
     } = request.scorable()?;
+    let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
+    let mut clock = Clock::start();
+    let progress: &mut dyn FnMut(Progress<'_>) = &mut |now: Progress<'_>| {
+        clock.note(now.stage);
+        progress(now);
+    };
     progress(Stage::Audit.into());
     let audits = |logs: &[Log]| -> Vec<Audit> {
         logs.iter().map(|log| audit(log, &model.columns)).collect()
@@ -46,6 +55,7 @@ pub fn close_loop(
     let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
     let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
     let mut study = Study::audited(model, &studied, of_train.clone(), &settings);
+    study.deadline = deadline;
     // Where nothing moves, anything could be found.
     let nothing = Library::empty();
     let library = if study.moves() { library } else { &nothing };
@@ -85,11 +95,13 @@ pub fn close_loop(
             supported,
             alternatives,
             rounds: found.chosen.rounds,
+            stopped: found.chosen.stopped,
         },
         remainder,
         errors,
         learned,
         calibration: None,
+        seconds: clock.stop(),
         given: Given {
             train: split.train,
             test: split.test,

@@ -1,5 +1,10 @@
+use std::time::Instant;
+
+use serde::Serialize;
+
 /// A stage of closing the loop, in the order of `docs/method.md`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Stage {
     Audit,
@@ -66,6 +71,40 @@ impl<'t> Progress<'t> {
 impl From<Stage> for Progress<'_> {
     fn from(stage: Stage) -> Self {
         Self::within(stage, stage.text())
+    }
+}
+
+/// Takes the time of each stage.
+pub(super) struct Clock {
+    now: (Stage, Instant),
+    past: Vec<(Stage, f64)>,
+}
+
+impl Clock {
+    /// Starts with the first stage.
+    pub fn start() -> Self {
+        Self {
+            now: (Stage::ALL[0], Instant::now()),
+            past: Vec::new(),
+        }
+    }
+
+    /// A stage goes on or begins.
+    pub fn note(&mut self, stage: Stage) {
+        if stage != self.now.0 {
+            self.past.push(self.ended());
+            self.now = (stage, Instant::now());
+        }
+    }
+
+    /// Time in s of each stage, in their order.
+    pub fn stop(mut self) -> Vec<(Stage, f64)> {
+        self.past.push(self.ended());
+        self.past
+    }
+
+    fn ended(&self) -> (Stage, f64) {
+        (self.now.0, self.now.1.elapsed().as_secs_f64())
     }
 }
 

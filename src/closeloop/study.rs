@@ -1,5 +1,6 @@
 use std::ops::Range;
 use std::sync::OnceLock;
+use std::time::Instant;
 
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
@@ -23,6 +24,8 @@ pub struct Study<'a> {
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
+    /// When the search has to stop.
+    pub deadline: Option<Instant>,
     /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
     pub identifiability: Identifiability,
 }
@@ -109,8 +112,15 @@ impl<'a> Study<'a> {
             shooting,
             top_speed,
             top_torque,
+            deadline: None,
             identifiability: Identifiability::default(),
         }
+    }
+
+    /// Whether the search may go on.
+    pub(super) fn has_time(&self) -> bool {
+        self.deadline
+            .is_none_or(|deadline| Instant::now() < deadline)
     }
 
     /// The same model on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
@@ -130,6 +140,7 @@ impl<'a> Study<'a> {
             top_torque: self.top_torque.clone(),
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
+            deadline: self.deadline,
             identifiability: Identifiability::default(),
         }
     }

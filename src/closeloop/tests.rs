@@ -165,6 +165,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
         after: chosen,
         standings: vec![standing],
         rounds: Vec::new(),
+        stopped: false,
         rivals: Vec::new(),
         failure: None,
     };

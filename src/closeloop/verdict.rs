@@ -35,9 +35,15 @@ pub(super) fn verdict(
         .or_else(|| inconclusive(study, added, errors))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
+        None if found.chosen.stopped => {
+            let (verdict, reason) = conclusion(established, &found.unexplained);
+            (verdict, format!("{reason}; {STOPPED}"))
+        }
         None => conclusion(established, &found.unexplained),
     }
 }
+
+const STOPPED: &str = "the search was stopped when its time was spent, and more time may find a better set of effects";
 
 /// Whether there is nothing to conclude from.
 fn at_rest(study: &Study<'_>) -> Option<String> {

@@ -41,6 +41,7 @@ pub(super) struct Search<'a> {
     below: f64,
     damping: f64,
     steps: usize,
+    trace: Vec<f64>,
 }
 
 /// A step of all values at once.
@@ -77,6 +78,7 @@ impl<'a> Search<'a> {
             below: f64::INFINITY,
             damping: FIRST_DAMPING,
             steps: 0,
+            trace: Vec::new(),
         };
         let costs = shooting.costs(dynamics, &search.values, &search.locals, search.scale);
         let diverged = costs.iter().filter(|cost| !cost.is_finite()).count();
@@ -120,7 +122,9 @@ impl<'a> Search<'a> {
     /// Take steps until none is worth taking, or until there have been `most`.
     pub fn run(&mut self, most: usize) -> Termination {
         while self.steps < most {
-            if let Some(termination) = self.step() {
+            let termination = self.step();
+            self.trace.push(self.cost * self.scale * self.scale);
+            if let Some(termination) = termination {
                 return termination;
             }
         }
@@ -279,6 +283,7 @@ impl<'a> Search<'a> {
             cost: self.cost,
             reduced,
             steps: self.steps,
+            trace: self.trace,
             termination,
         };
         (self.values, fit)

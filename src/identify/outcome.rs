@@ -3,7 +3,7 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::normal_equations::{Reduced, WindowTerms};
+use super::normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 use super::values::Column;
 
 /// Why parameters could not be fitted.
@@ -36,6 +36,8 @@ pub struct Fit {
     pub reduced: Vec<Reduced>,
     /// Steps that were taken.
     pub steps: usize,
+    /// The cost after each, in units of the sensors' noise: times the square of the scale that it had then.
+    pub trace: Vec<f64>,
     /// Why there were no more.
     pub termination: Termination,
 }
@@ -53,6 +55,23 @@ impl Fit {
             window.add_to(&mut all);
         }
         all
+    }
+
+    /// Largest over smallest eigenvalue of the normal equations' matrix in the free values, as they are and in units in
+    /// which each of them alone has the same information; infinite where the matrix is singular.
+    pub fn condition(&self) -> [f64; 2] {
+        let matrix = self.equations().hessian;
+        let (scaled, _) = with_unit_diagonal(&matrix);
+        [matrix, scaled].map(|matrix| {
+            let values = matrix.symmetric_eigenvalues();
+            let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = values.iter().copied().fold(0.0, f64::max);
+            if smallest > 0.0 {
+                largest / smallest
+            } else {
+                f64::INFINITY
+            }
+        })
     }
 
     /// Normal equations of each group of windows; `groups` gives the group of each window, counted from 0.

@@ -125,7 +125,11 @@ pub(super) fn parameters(outcome: &Outcome) -> String {
         (WITH_EFFECTS, &outcome.models.after),
     ] {
         let (steps, termination) = (model.fit.steps, model.fit.termination);
-        let _ = writeln!(out, "- Fit ({name}): {termination} ({steps} steps).");
+        let [as_is, scaled] = model.fit.condition();
+        let _ = writeln!(
+            out,
+            "- Fit ({name}): {termination} ({steps} steps; condition number {as_is:.1e}, {scaled:.1e} after scaling)."
+        );
     }
     for &k in &verdict.hold {
         let name = &outcome.models.before.model.parameters[k].name;

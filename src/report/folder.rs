@@ -6,7 +6,7 @@ use super::json::{CHECKPOINT, MODEL, PLOTS, TEXT};
 use super::plot::PlotError;
 use super::schema::Report;
 use super::{model_file, picture, text};
-use crate::closeloop::{LearnError, Outcome};
+use crate::closeloop::{LearnError, Outcome, Stage};
 use crate::files::{OutputError, folder_of, move_contents, write_whole};
 use crate::model::Origin;
 
@@ -53,6 +53,7 @@ fn put_all(
     let json =
         serde_json::to_string_pretty(report).expect("a report has only finite numbers and texts");
     put("report.json", &(json + "\n"))?;
+    put(TIMINGS, &timings(outcome))?;
     put(MODEL, &model_file(outcome))?;
     put(TEXT, &text(outcome, origin.seed))?;
     let pictures = [
@@ -71,4 +72,14 @@ fn put_all(
         learned.network.save(&folder.join(CHECKPOINT), &origin)?;
     }
     Ok(())
+}
+
+/// Apart from the report, which is the same each time.
+const TIMINGS: &str = "timings.json";
+
+/// How long each stage took.
+fn timings(outcome: &Outcome) -> String {
+    let entry = |(stage, seconds): &(Stage, f64)| serde_json::json!({ "stage": stage, "about": stage.text(), "seconds": seconds });
+    let all: Vec<_> = outcome.seconds.iter().map(entry).collect();
+    serde_json::to_string_pretty(&all).expect("times are finite") + "\n"
 }

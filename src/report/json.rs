@@ -69,6 +69,7 @@ impl Report {
                 })
                 .collect(),
             tried: tried(outcome),
+            stopped: outcome.effects.stopped,
             network: outcome
                 .learned
                 .as_ref()
@@ -167,6 +168,10 @@ fn ended(fit: &Fit) -> FitEntry {
         converged: fit.termination.has_converged(),
         termination: fit.termination.to_string(),
         steps: fit.steps,
+        trace: fit.trace.clone(),
+        condition: fit
+            .condition()
+            .map(|number| number.is_finite().then_some(number)),
     }
 }
 

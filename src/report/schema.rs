@@ -67,6 +67,8 @@ pub struct Report {
     pub(super) audit: Vec<AuditEntry>,
     /// sets of effects that were fitted, one list a round of the search
     pub(super) tried: Vec<Vec<TriedEntry>>,
+    /// whether the search was stopped because its time was spent (--budget)
+    pub(super) stopped: bool,
     /// errors by which the residual network is used or not; null where none is trained
     pub(super) network: Option<NetworkCheck>,
     /// what the training logs could show (--calibrate); null where it was not asked for
@@ -164,6 +166,11 @@ pub(super) struct FitEntry {
     pub termination: String,
     /// steps that were taken
     pub steps: usize,
+    /// loss after each step, in units of the sensors' noise
+    pub trace: Vec<f64>,
+    /// condition number of the normal equations, as they are and in units in which each value alone has the same
+    /// information; null where they are singular
+    pub condition: [Option<f64>; 2],
 }
 
 /// what the logs determine of the declared parameters

@@ -64,6 +64,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         let _ = writeln!(out, "  {name}, no fit: {}", errors(outcome, model));
     }
     out += &outcome.calibration.as_ref().map_or_else(String::new, line);
+    let _ = writeln!(out, "  {}", took(outcome));
     let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
     out
 }
@@ -91,4 +92,14 @@ fn errors(outcome: &Outcome, model: &Assessment) -> String {
         "{} at {seconds} s",
         list(&mut Joint::all(joints).map(of_joint))
     )
+}
+
+/// `took 48 s: selecting effects 31 s, scoring on the test logs 5 s`, the stages that took a tenth or more
+fn took(outcome: &Outcome) -> String {
+    let all: f64 = outcome.seconds.iter().map(|(_, seconds)| seconds).sum();
+    let long = outcome.seconds.iter().filter(|(_, s)| *s >= 0.1 * all);
+    let stages: Vec<String> = long
+        .map(|(stage, seconds)| format!("{} {seconds:.1} s", stage.text()))
+        .collect();
+    format!("took {all:.1} s: {}", stages.join(", "))
 }

@@ -39,6 +39,9 @@ impl Search<'_, '_> {
         of: &[bool],
     ) -> Vec<Rival> {
         let study = self.study;
+        if !study.has_time() {
+            return Vec::new();
+        }
         let added = study.added(&chosen.fitted.model);
         let all = candidates(study, self.library, &chosen.fitted.model.effects);
         let Some(outlook) = Outlook::of(study, &chosen.fitted, &all) else {

@@ -70,6 +70,9 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut best = self.first(declared.clone());
         let mut passed = vec![best.key()];
         for _ in 0..study.settings.select.rounds {
+            if !study.has_time() {
+                break;
+            }
             let step = study.settings.select.step;
             let next = match self.better(&best, step, |search, best| search.round(best)) {
                 Some(next) => next,
@@ -198,6 +201,9 @@ impl<'a, 'p> Search<'a, 'p> {
             is_new
         });
         let trial = |set: Vec<FittedEffect>| {
+            if !study.has_time() {
+                return None;
+            }
             let effects = [study.declared.effects.as_slice(), &set].concat();
             let fitted = study.with_better_effects(&from.fitted, effects, below)?;
             Some(Trial::of(study, fitted)).filter(|trial| trial.is_valid(study))
