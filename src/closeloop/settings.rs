@@ -300,6 +300,9 @@ settings! {
         /// Horizons of the reported errors in s; models are compared in one number at the middle one. Those that are
         /// longer than any test log are left out.
         horizons_s: Vec<f64> = vec![0.1, 0.5, 1.0],
+        /// Where zeros of the sensors differ from log to log, those of each test log are estimated on its first seconds, as
+        /// many as this: what a user gets who zeroes the rig before a run.
+        zeroed_on_s: f64 = 1.0,
         /// With this many test logs whole ones are resampled; with fewer, stretches of two seconds.
         whole_logs: usize = 5,
         /// Fewer logs or stretches than this give no interval.

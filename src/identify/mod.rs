@@ -22,7 +22,7 @@ pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
 pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
-pub use offsets::{CalibrateError, Offsets, calibrate};
+pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Termination};
 pub use sensitivity::Local;
 pub use shooting::Shooting;

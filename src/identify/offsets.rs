@@ -45,12 +45,32 @@ pub fn calibrate(
     if !(fraction > 0.0 && fraction < 1.0) {
         return Err(CalibrateError::Fraction(fraction));
     }
+    calibrate_on(dynamics, logs, |log| fraction * log.duration())
+}
+
+/// The same on the first `seconds` of each log.
+///
+/// # Errors
+/// A beginning that is too short.
+pub fn calibrate_first(
+    dynamics: &Dynamics,
+    logs: &mut [Log],
+    seconds: f64,
+) -> Result<Offsets, CalibrateError> {
+    calibrate_on(dynamics, logs, |_| seconds)
+}
+
+fn calibrate_on(
+    dynamics: &Dynamics,
+    logs: &mut [Log],
+    seconds_of: impl Fn(&Log) -> f64,
+) -> Result<Offsets, CalibrateError> {
     let mut found = Offsets {
         dynamics: with_offsets(dynamics),
         offsets: Vec::new(),
     };
     for log in logs {
-        let seconds = fraction * log.duration();
+        let seconds = seconds_of(log);
         let start_s = log.time[0];
         let rest = Interval {
             start_s: start_s + seconds,

@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, amount, small, value};
+use super::wording::{
+    AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, small, value,
+};
 use crate::closeloop::Outcome;
 use crate::data::Joint;
 use crate::sim::metric::{Summary, summarise};
@@ -30,6 +32,7 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
         (FITTED, &errors.before),
         (WITH_EFFECTS, &errors.after),
     ];
+    models.extend(errors.zeroed.iter().map(|m| (ZEROED, m)));
     let hybrid = errors.hybrid.iter();
     models.extend(hybrid.map(|m| (WITH_NETWORK, m)));
     models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
@@ -40,6 +43,9 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
         .collect()
 }
 
+const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zeros of each test log's sensors are estimated on \
+                            its first second, and scored on the rest: what a rig gives that is zeroed before a run.";
+
 pub(super) fn errors(outcome: &Outcome) -> String {
     let models = scored(outcome);
     let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
@@ -49,11 +55,15 @@ pub(super) fn errors(outcome: &Outcome) -> String {
          the fair \"before\" of every comparison in this report.{}\n\n\
          | horizon | joint | windows | {} | with effects / fitted |\n|---|---|---|{}---|\n",
         position_unit(outcome),
-        if outcome.errors.against.is_empty() {
-            ""
-        } else {
-            " The last models are other files, scored as they are."
-        },
+        [
+            outcome.errors.zeroed.as_ref().map_or("", |_| ABOUT_ZEROED),
+            if outcome.errors.against.is_empty() {
+                ""
+            } else {
+                " The last models are other files, scored as they are."
+            },
+        ]
+        .concat(),
         names.join(" | "),
         "---|".repeat(names.len())
     );

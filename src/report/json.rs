@@ -200,6 +200,7 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
         declared: model(&errors.declared),
         before: model(&errors.before),
         after: model(&errors.after),
+        zeroed: errors.zeroed.as_ref().map(model),
         hybrid: errors.hybrid.as_ref().map(model),
         against: errors.against.iter().map(contender).collect(),
         reduction_ci95: errors.reduction_ci95,

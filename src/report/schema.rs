@@ -198,6 +198,9 @@ pub(super) struct ErrorEntry {
     pub before: ModelError,
     /// the same with the effects added, refitted
     pub after: ModelError,
+    /// the same with the zeros of each test log's sensors estimated on its first second, scored on the rest; null where
+    /// no zero differs from log to log
+    pub zeroed: Option<ModelError>,
     /// with a network trained on what is left; null where none was trained
     pub hybrid: Option<ModelError>,
     /// the models given with --against, as they are

@@ -9,6 +9,7 @@ use crate::model::{OwnValue, Parameter};
 pub(super) const AS_WRITTEN: &str = "declared model as written";
 pub(super) const FITTED: &str = "declared model, fitted";
 pub(super) const WITH_EFFECTS: &str = "with effects";
+pub(super) const ZEROED: &str = "with effects, zeroed";
 pub(super) const WITH_NETWORK: &str = "with effects and network";
 
 /// `a`, `a and b`, `a, b and c`

@@ -5,6 +5,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
+use crate::identify::calibrate_first;
 use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Assessment, assess};
 
@@ -16,6 +17,9 @@ pub struct Errors {
     pub before: Assessment,
     /// With the effects that were found, fitted.
     pub after: Assessment,
+    /// The same with the zeros of each test log's sensors estimated on its beginning, scored on the rest; where a zero
+    /// per log is part of the model, and the logs are long enough.
+    pub zeroed: Option<Assessment>,
     /// With the residual network.
     pub hybrid: Option<Assessment>,
     /// Other models as they are, by name.
@@ -41,15 +45,28 @@ impl Scorer<'_> {
         rng: &mut impl Rng,
     ) -> Errors {
         let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
+        let zeroed = self.zeroed(after);
         let (before, after) = rayon::join(|| self.fitted(before), || self.fitted(after));
         Errors {
             declared: self.as_it_is(declared),
             hybrid: hybrid.map(|model| self.dynamics(model)),
             against: against.iter().map(scored).collect(),
             reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
+            zeroed,
             before,
             after,
         }
+    }
+
+    fn zeroed(&self, after: &Fitted) -> Option<Assessment> {
+        let differs = after.model.all_parameters().iter().any(|p| p.per_log);
+        let mut logs = self.test.to_vec();
+        let seconds = self.settings.zeroed_on_s;
+        let dynamics = after.model.dynamics();
+        let zeroed = differs.then(|| calibrate_first(&dynamics, &mut logs, seconds).ok())??;
+        let scored = assess(&zeroed.dynamics, &logs, &self.settings.horizons_s);
+        let has_windows = scored.horizons.iter().all(|h| !h.windows.is_empty());
+        has_windows.then_some(scored)
     }
 
     /// The error of a fitted model.
