@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{refuses, succeeds, text};
+use crate::support::{refuses, residyn, succeeds, text};
 
 fn demo(seed: &str) -> (Value, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
@@ -50,6 +50,43 @@ fn the_true_value_lies_inside_its_interval() {
 fn the_same_seed_gives_the_same_report() {
     let ((first, _a), (second, _b)) = (demo("3"), demo("3"));
     assert_eq!(first, second);
+}
+
+#[test]
+fn a_search_whose_time_is_spent_stops_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let closed = |budget: &str| -> Value {
+        let out = folder.path().join(budget);
+        let json = residyn(&[
+            "closeloop",
+            "--json",
+            "--budget",
+            budget,
+            "--out",
+            text(&out),
+        ]);
+        serde_json::from_slice(&json.stdout).unwrap()
+    };
+    let report = closed("1us");
+    assert_eq!(
+        (&report["stopped"], &report["verdict"]),
+        (&true.into(), &"inconclusive".into())
+    );
+    assert_eq!(report["effects"], serde_json::json!([]));
+    assert_eq!(report["configuration"]["budget"], "1us");
+    let report = closed("5min");
+    assert_eq!(
+        (&report["stopped"], &report["verdict"]),
+        (&false.into(), &"explained".into())
+    );
+    let timings = std::fs::read(folder.path().join("5min/timings.json")).unwrap();
+    let timings: Value = serde_json::from_slice(&timings).unwrap();
+    let stages: Vec<&Value> = (timings.as_array().unwrap().iter())
+        .map(|t| &t["stage"])
+        .collect();
+    assert!(stages.len() >= 7 && stages[0] == "audit", "{timings}");
+    let error = refuses(&["closeloop", "--budget", "soon"]);
+    assert!(error.contains("--budget <TIME>"), "{error}");
 }
 
 #[test]

@@ -95,6 +95,9 @@ fn zeros_that_differ_between_logs_are_a_sensor_offset() {
         let value: Value = serde_json::from_str(&json).unwrap();
         value["position_rmse"][2][0].as_f64().unwrap()
     };
+    // What the test log's zero costs is gone where its first second tells it.
+    let rmse = |model: &str| report["error"][model]["position_rmse"][2][0].as_f64();
+    assert!(rmse("zeroed").unwrap() < rmse("after").unwrap());
     // The file keeps what is known of single logs, and says nothing of others.
     let found = std::fs::read_to_string(&model).unwrap();
     assert!(found.contains("q_z = { value = 0.0, logs = { \"run0.csv\" = { value = 0.0"));
@@ -113,6 +116,7 @@ fn a_zero_that_all_logs_share_is_a_tilt() {
     let logs = record(folder.path(), |_| "gravity_tilt=0.03".to_owned());
     let report = close(folder.path(), &logs);
     assert_eq!(names(&report), ["gravity_tilt"]);
+    assert_eq!(report["error"]["zeroed"], Value::Null);
     let other = &report["alternatives"][0]["effects"][0]["name"];
     assert_eq!(other, "sensor_offset");
 }

@@ -35,6 +35,9 @@ pub(super) fn verdict(
         .or_else(|| inconclusive(study, added, errors))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
+        None if found.chosen.stopped && established == 0 => {
+            (Verdict::Inconclusive, format!("{STOPPED} than none"))
+        }
         None if found.chosen.stopped => {
             let (verdict, reason) = conclusion(established, &found.unexplained);
             (verdict, format!("{reason}; {STOPPED}"))
