@@ -24,6 +24,8 @@ pub struct LocalCubic {
     pub slope: f64,
     /// Second derivative, in the channel's unit per s^2.
     pub curvature: f64,
+    /// Root mean square of what the cubic leaves of the values, by their number less that of its coefficients.
+    pub rms: f64,
 }
 
 impl LocalCubic {
@@ -43,6 +45,11 @@ impl LocalCubic {
     pub(crate) fn slope_noise_gain(half_width_s: f64, rows: f64) -> f64 {
         (18.75 / rows).sqrt() / half_width_s
     }
+
+    /// Error of the value and, per half width, of the slope where the values go on beyond a cubic, per unit of `rms`: of
+    /// s^4 = (8 P4 + 20 P2 + 7 P0) / 35 and s^5 = (8 P5 + 28 P3 + 27 P1) / 63 in Legendre polynomials the cubic leaves
+    /// the first term.
+    pub(crate) const TRUNCATION: [f64; 2] = [1.1, 6.2];
 
     /// Standard deviation of the value per standard deviation of white noise on the values, likewise: the Legendre
     /// polynomials 0 and 2 at 0 have coefficients of variance 1/n and 5/n, which gives (1 + 5 / 4) / n.
@@ -76,11 +83,15 @@ pub fn local_cubic(
     }
     // Scaled to -1..1, and seen from the row's own value, the sums keep their digits.
     let points = (first..end).map(|i| ((time[i] - centre) / half_width_s, values[i] - values[row]));
-    let [c0, c1, c2, _] = cubic_coefficients(points)?;
+    let [c0, c1, c2, c3] = cubic_coefficients(points.clone())?;
+    let left = points.map(|(s, y)| (y - (c0 + s * (c1 + s * (c2 + s * c3)))).powi(2));
+    #[allow(clippy::cast_precision_loss)] // few rows
+    let freedom = (end - first - 4) as f64;
     Some(LocalCubic {
         value: values[row] + c0,
         slope: c1 / half_width_s,
         curvature: 2.0 * c2 / (half_width_s * half_width_s),
+        rms: (left.sum::<f64>() / freedom).sqrt(),
     })
 }
 

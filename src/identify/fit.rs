@@ -8,6 +8,9 @@ use crate::model::Dynamics;
 /// Most steps of one fit; Gauss-Newton on such problems needs 3 to 30.
 const MOST_STEPS: usize = 100;
 
+/// Most estimates of the scale after the first fit; two or three are the rule.
+const MOST_SCALES: usize = 8;
+
 /// Fit the parameters `active` of `dynamics` to the windows, starting from its values and `locals`, with every window's
 /// start state (and forces) free. `scale` fixes the scale of the residuals; without it, it is estimated by their median
 /// absolute deviation as the fit proceeds. Returns the values found and how the fit ended.
@@ -30,9 +33,11 @@ pub fn fit(
     let tangent = Tangent::new(dynamics, active, local);
     let mut search = Search::new(shooting, dynamics, &tangent, locals, scale)?;
     let mut termination = search.run(MOST_STEPS);
-    // The scale is to be that of the final residuals.
-    if scale.is_none() {
-        search.rescale();
+    // The scale is to be that of the final residuals; the smaller it is, the less they owe to the start states' estimates.
+    for _ in 0..MOST_SCALES {
+        if scale.is_some() || search.rescale() {
+            break;
+        }
         termination = search.run(MOST_STEPS);
     }
     Ok(search.finish(termination))

@@ -11,12 +11,16 @@ use crate::model::Dynamics;
 /// A fit that estimates ends when a step lowers the cost by less than this share.
 const ENOUGH: f64 = 1e-6;
 /// A fit at a given scale is for comparing models, which differ by more than this share of the cost or not at all.
-const ENOUGH_TO_COMPARE: f64 = 1e-3;
+const ENOUGH_TO_COMPARE: f64 = 1e-4;
+/// One that is of use only below some cost is for choosing among sets of effects, which differ by more than this.
+const ENOUGH_TO_CHOOSE: f64 = 1e-3;
 /// Damping of the first step, as a share of the diagonal of the normal equations, and the factors by which it changes
 /// with each step that lowers the cost and with each that does not.
 const FIRST_DAMPING: f64 = 1e-3;
 const DAMPING_ON_SUCCESS: f64 = 0.1;
 const DAMPING_ON_FAILURE: f64 = 10.0;
+/// A scale has settled that changes by less than this share.
+const SETTLED: f64 = 0.01;
 /// A fit that is of use only below some cost is given up where that cost is farther than so many times the decrease that
 /// the quadratic model predicts,
 const OUT_OF_REACH: f64 = 3.0;
@@ -99,17 +103,20 @@ impl<'a> Search<'a> {
     /// Give up where the cost will not come below this.
     pub fn only_below(mut self, cost: f64) -> Self {
         self.below = cost;
+        self.enough = ENOUGH_TO_CHOOSE;
         self
     }
 
-    /// Estimate the scale from the residuals at hand.
-    pub fn rescale(&mut self) {
+    /// Estimate the scale from the residuals at hand; says whether it hardly changes.
+    pub fn rescale(&mut self) -> bool {
+        let before = self.scale;
         let residuals = self
             .shooting
             .residuals(self.dynamics, &self.values, &self.locals);
         self.scale = robust_scale(residuals.into_iter().flatten());
         self.cost = self.total(&self.values, &self.locals);
         self.damping = FIRST_DAMPING;
+        (self.scale / before - 1.0).abs() < SETTLED
     }
 
     fn total(&self, values: &Values, locals: &[Vec<f64>]) -> f64 {

@@ -58,11 +58,14 @@ impl Fit {
     }
 
     /// Largest over smallest eigenvalue of the normal equations' matrix in the free values, as they are and in units in
-    /// which each of them alone has the same information; infinite where the matrix is singular.
+    /// which each of them alone has the same information; infinite where the matrix is singular, 1 without free values.
     pub fn condition(&self) -> [f64; 2] {
         let matrix = self.equations().hessian;
         let (scaled, _) = with_unit_diagonal(&matrix);
         [matrix, scaled].map(|matrix| {
+            if matrix.is_empty() {
+                return 1.0;
+            }
             let values = matrix.symmetric_eigenvalues();
             let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = values.iter().copied().fold(0.0, f64::max);

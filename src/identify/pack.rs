@@ -87,6 +87,11 @@ impl Pack {
         pack
     }
 
+    /// Forget what the logs tell of the start states.
+    pub fn free_starts(&mut self) {
+        self.start_weight.fill(Row::splat(0.0));
+    }
+
     /// Cut the steps between rows into substeps of at most `longest_s`.
     pub fn cut(&mut self, longest_s: f64) {
         self.substeps = self.dt.iter().map(|dt| substeps(dt, longest_s)).collect();

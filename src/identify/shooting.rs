@@ -38,6 +38,13 @@ impl<'l> Shooting<'l> {
         }
     }
 
+    /// The same windows, of whose start states nothing is known.
+    #[must_use]
+    pub fn with_free_starts(mut self) -> Self {
+        self.packs.iter_mut().for_each(Pack::free_starts);
+        self
+    }
+
     /// The same windows, integrated in substeps of at most `longest_s`.
     #[must_use]
     pub fn in_steps_of(mut self, longest_s: f64) -> Self {

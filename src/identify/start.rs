@@ -35,11 +35,16 @@ impl Start {
         let of_joint = |(q, noise): (&Vec<f64>, &f64)| {
             let found = local_cubic(&log.time, q, row, half_width).filter(|_| is_between);
             found.map_or([(0.0, 0.0); 2], |found| {
-                let weight = |gain: f64| 1.0 / (CAUTION * gain * noise);
-                [
-                    (found.value, weight(gains[0])),
-                    (found.slope, weight(gains[1])),
-                ]
+                // What noise does not explain of the cubic's residuals is motion that a cubic does not follow.
+                let beyond = (found.rms.powi(2) - (CAUTION * noise).powi(2))
+                    .max(0.0)
+                    .sqrt();
+                let weight = |k: usize| {
+                    let unit = [1.0, 1.0 / half_width][k];
+                    let truncation = LocalCubic::TRUNCATION[k] * unit * beyond;
+                    1.0 / (CAUTION * gains[k] * noise + truncation)
+                };
+                [(found.value, weight(0)), (found.slope, weight(1))]
             })
         };
         let joints: Vec<[(f64, f64); 2]> = log.q.iter().zip(noise).map(of_joint).collect();

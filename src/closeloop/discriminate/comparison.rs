@@ -118,7 +118,8 @@ impl<'a> Comparison<'a> {
             .map(|w| window_of(study, fitted, w))
             .collect();
         let present = truth.simulate(study, &motions)?;
-        let shooting = Shooting::new(&present.logs, present.windows.clone(), &noise);
+        let shooting =
+            Shooting::new(&present.logs, present.windows.clone(), &noise).with_free_starts();
         let (values, found) = other.refit(&shooting, present.starts(0..))?;
         let loss = loss_of(&found);
         let windows = study.shooting.windows.iter();
@@ -188,7 +189,8 @@ impl<'a> Comparison<'a> {
             .simulate(self.study, &experiment.motions)
             .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
-        let shooting = Shooting::new(&both.logs, both.windows.clone(), &self.noise);
+        let shooting =
+            Shooting::new(&both.logs, both.windows.clone(), &self.noise).with_free_starts();
         let present = self.locals.len();
         let locals = [self.locals.clone(), both.starts(present..)].concat();
         let (values, found) = other.refit(&shooting, locals)?;
