@@ -71,6 +71,13 @@ impl Desk {
         path
     }
 
+    /// What comes of closing the loop on the log.
+    fn closed<T>(&self, run: impl Fn(&[&str]) -> T) -> T {
+        let (log, out) = (self.path("run.csv"), self.path("out"));
+        let rig = ["--model", "pendulum", "--train", &log, "--out", &out];
+        run(&[["closeloop", "--json"].as_slice(), &rig].concat())
+    }
+
     /// The findings of this severity of `residyn audit`, whose exit status must say whether some are serious.
     fn findings(&self, severity: &str, model: Option<&str>) -> Vec<Value> {
         let log = self.path("run.csv");
@@ -208,16 +215,7 @@ fn pasted_lines_give_back_the_log() {
 #[test]
 fn a_clock_in_nanoseconds_is_refused_at_once_with_its_line() {
     let desk = Desk::with(|log| each(&mut log.time, |t| 1e9 * t));
-    let (log, out) = (desk.path("run.csv"), desk.path("out"));
-    let message = refuses(&[
-        "closeloop",
-        "--model",
-        "pendulum",
-        "--train",
-        &log,
-        "--out",
-        &out,
-    ]);
+    let message = desk.closed(refuses);
     let line = r#"[columns] time = { column = "time", unit = "ns" }"#;
     assert!(message.contains(line), "{message}");
 }
@@ -386,17 +384,7 @@ fn a_rig_at_rest_is_inconclusive() {
             log.qd[0].fill(0.0);
             log.tau[0].fill(0.1);
         });
-        let (log, out) = (desk.path("run.csv"), desk.path("out"));
-        let output = residyn(&[
-            "closeloop",
-            "--json",
-            "--model",
-            "pendulum",
-            "--train",
-            &log,
-            "--out",
-            &out,
-        ]);
+        let output = desk.closed(residyn);
         let errors = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{errors}");
         assert!(errors.contains("joint 1 moves by"), "{errors}");
@@ -442,16 +430,7 @@ fn one_short_log_is_split_so_that_it_can_be_judged() {
 #[test]
 fn a_log_too_short_for_any_test_says_what_to_give() {
     let desk = Desk::with(|log| *log = thinned(log, |row| row > 60));
-    let (log, out) = (desk.path("run.csv"), desk.path("out"));
-    let message = refuses(&[
-        "closeloop",
-        "--model",
-        "pendulum",
-        "--train",
-        &log,
-        "--out",
-        &out,
-    ]);
+    let message = desk.closed(refuses);
     assert!(message.contains("--test"), "{message}");
 }
 

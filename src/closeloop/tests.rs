@@ -32,15 +32,21 @@ recording = { logs = 3, duration_s = 8, start = [0, 0] }
 effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
 "#;
 
-fn logs() -> Vec<Log> {
-    let plant = Plant::from_text(Path::new("rig.toml"), RIG, &Library::built_in()).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
+/// The logs of a rig of this file.
+pub(super) fn recorded(rig: &str, seed: u64) -> Vec<Log> {
+    let plant = Plant::from_text(Path::new("rig.toml"), rig, &Library::built_in()).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     (0..plant.recording.logs)
         .map(|_| plant.record(&mut rng).unwrap())
         .collect()
 }
 
-fn pendulum() -> Model {
+/// Of a pendulum with dry friction.
+pub(super) fn logs() -> Vec<Log> {
+    recorded(RIG, 0)
+}
+
+pub(super) fn pendulum() -> Model {
     Library::built_in().model(Path::new("pendulum")).unwrap()
 }
 
@@ -216,9 +222,7 @@ effect = [
 ]
 "#;
     let library = Library::built_in();
-    let plant = Plant::from_text(Path::new("rig.toml"), RIG, &library).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let logs: Vec<Log> = (0..4).map(|_| plant.record(&mut rng).unwrap()).collect();
+    let logs = recorded(RIG, 0);
     let (declared, settings) = (
         library.model(Path::new("acrobot")).unwrap(),
         Settings::default(),

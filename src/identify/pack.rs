@@ -32,7 +32,13 @@ pub(super) struct Pack {
 }
 
 impl Pack {
-    pub fn new(logs: &[Log], windows: &[Window], members: &[usize], noise: &[f64]) -> Self {
+    pub fn new(
+        logs: &[Log],
+        windows: &[Window],
+        members: &[usize],
+        noise: &[f64],
+        half_widths: &[f64],
+    ) -> Self {
         let n = noise.len();
         let rows = members
             .iter()
@@ -55,7 +61,8 @@ impl Pack {
         };
         for (lane, &member) in members.iter().enumerate() {
             let window = windows[member];
-            let start = Start::of(&logs[window.log], window.first, noise);
+            let (log, half_width) = (&logs[window.log], half_widths[window.log]);
+            let start = Start::of(log, window.first, half_width, noise);
             for k in 0..2 * n {
                 pack.start[k][lane] = start.state[k];
                 pack.start_weight[k][lane] = start.weight[k];

@@ -26,9 +26,10 @@ impl<'l> Shooting<'l> {
         let mut order: Vec<usize> = (0..windows.len()).collect();
         // Windows of similar length share a pack, which keeps the padding small.
         order.sort_by_key(|&w| windows[w].rows());
+        let half_widths = half_widths(logs);
         let packs = order
             .chunks(LANES)
-            .map(|chunk| Pack::new(logs, &windows, chunk, noise))
+            .map(|chunk| Pack::new(logs, &windows, chunk, noise, &half_widths))
             .collect();
         Self {
             logs,
@@ -56,11 +57,7 @@ impl<'l> Shooting<'l> {
 
     /// Initial guess of each window's start state, followed by `extra` zeros.
     pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
-        let half_widths: Vec<f64> = self
-            .logs
-            .iter()
-            .map(|log| half_width_s(log.median_step()))
-            .collect();
+        let half_widths = half_widths(self.logs);
         let guess = |window: &Window| {
             let log = &self.logs[window.log];
             let mut state = initial_state(log, half_widths[window.log], window.first)
@@ -155,6 +152,12 @@ impl<'l> Shooting<'l> {
         all.sort_by_key(|(window, _)| *window);
         all.into_iter().map(|(_, terms)| terms).collect()
     }
+}
+
+/// Half width of the cubics that tell start states, in s, one a log.
+fn half_widths(logs: &[Log]) -> Vec<f64> {
+    let of_log = |log: &Log| half_width_s(log.median_step());
+    logs.iter().map(of_log).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-use crate::data::{LocalCubic, Log, half_width_s, local_cubic};
+use crate::data::{LocalCubic, Log, local_cubic};
 
 /// What a log tells of the state at one of its rows: angles, then velocities.
 pub(super) struct Start {
@@ -14,11 +14,10 @@ const CAUTION: f64 = 2.0;
 const FEWEST_ROWS: usize = 2;
 
 impl Start {
-    /// The state at a row, by the cubics that open-loop errors start from; `noise` is the standard deviation of each
+    /// The state at a row, by the cubics over `half_width` s on either side that open-loop errors start from; `noise` is the standard deviation of each
     /// joint's position. A window's free start state is held to it, so that a model that is wrong cannot make up for it
     /// by a start state that the rig never had.
-    pub fn of(log: &Log, row: usize, noise: &[f64]) -> Self {
-        let half_width = half_width_s(log.median_step());
+    pub fn of(log: &Log, row: usize, half_width: f64, noise: &[f64]) -> Self {
         let first = log
             .time
             .partition_point(|t| *t < log.time[row] - half_width);
@@ -67,12 +66,12 @@ mod tests {
         log.qd = vec![vec![2.0; 100]];
         log.tau = vec![vec![0.0; 100]];
         log.time = time;
-        let start = Start::of(&log, 50, &[1e-3]);
+        let start = Start::of(&log, 50, 0.016, &[1e-3]);
         assert!((start.state[0] - 0.5).abs() < 1e-9 && (start.state[1] - 2.0).abs() < 1e-9);
         // 17 rows: twice 1 mrad * sqrt(2.25 / 17), and twice that of a slope.
         assert!((1.0 / start.weight[0] - 0.73e-3).abs() < 0.01e-3);
         assert!((1.0 / start.weight[1] - 0.131).abs() < 0.001);
         log.time.iter_mut().skip(50).for_each(|t| *t += 1.0);
-        assert_eq!(Start::of(&log, 50, &[1e-3]).weight, [0.0, 0.0]);
+        assert_eq!(Start::of(&log, 50, 0.016, &[1e-3]).weight, [0.0, 0.0]);
     }
 }

@@ -2,11 +2,10 @@
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use std::path::Path;
 
 use super::*;
 use crate::closeloop::settings::Settings;
-use crate::plant::Plant;
+use crate::closeloop::tests::{pendulum, recorded};
 
 const RIG: &str = r#"
 model = "pendulum"
@@ -37,16 +36,7 @@ fn coulomb(level: f64) -> String {
 
 /// Logs of the rig, with what is added to its file.
 fn logs(more: &str, seed: u64) -> Vec<Log> {
-    let text = format!("{RIG}\n{more}");
-    let plant = Plant::from_text(Path::new("rig.toml"), &text, &Library::built_in()).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..plant.recording.logs)
-        .map(|_| plant.record(&mut rng).unwrap())
-        .collect()
-}
-
-fn pendulum() -> Model {
-    Library::built_in().model(Path::new("pendulum")).unwrap()
+    recorded(&format!("{RIG}\n{more}"), seed)
 }
 
 #[test]

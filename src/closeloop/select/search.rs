@@ -108,7 +108,9 @@ impl<'a, 'p> Search<'a, 'p> {
     ) -> Option<Trial> {
         let enough = from.loss() * (1.0 - share);
         let trials = round(self, from);
-        let mut better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
+        let better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
+        let mut better = better.peekable();
+        better.peek()?;
         let ahead = Ahead::of(self.study, from);
         let (rank, best) = better.find(|(_, trial)| {
             let settings = &self.study.settings.select;
@@ -191,9 +193,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let study = self.study;
         sets.iter_mut().for_each(without_contained);
         sets.retain(|set| set.len() <= study.settings.select.most_effects);
-        let mut keys = vec![key(
-            &from.fitted.model.effects[study.added(&from.fitted.model)]
-        )];
+        let mut keys = vec![from.added_key(study)];
         sets.retain(|set| {
             let key = key(set);
             let is_new = !keys.contains(&key);

@@ -1,39 +1,12 @@
 //! Sets are compared before they are fitted, on a simulated pendulum with dry friction.
 
-use std::path::Path;
-
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-
 use super::candidate::candidates;
 use super::folds::{Folds, left_out_losses};
 use super::outlook::Outlook;
 use crate::closeloop::settings::Settings;
 use crate::closeloop::study::Study;
-use crate::data::Log;
-use crate::model::{FittedEffect, Library, Model};
-use crate::plant::Plant;
-
-const RIG: &str = r#"
-model = "pendulum"
-parameters = { C_g = -17.4, C_i = 4.6 }
-sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
-excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
-recording = { logs = 3, duration_s = 8, start = [0, 0] }
-effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.2 }]
-"#;
-
-fn logs() -> Vec<Log> {
-    let plant = Plant::from_text(Path::new("rig.toml"), RIG, &Library::built_in()).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(0);
-    (0..plant.recording.logs)
-        .map(|_| plant.record(&mut rng).unwrap())
-        .collect()
-}
-
-fn pendulum() -> Model {
-    Library::built_in().model(Path::new("pendulum")).unwrap()
-}
+use crate::closeloop::tests::{logs, pendulum};
+use crate::model::{FittedEffect, Library};
 
 #[test]
 fn what_is_left_out_together_is_a_connected_part_of_one_log() {

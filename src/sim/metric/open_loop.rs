@@ -50,9 +50,7 @@ fn run(
     horizons_s: &[f64],
     step_s: f64,
 ) -> Vec<OpenLoop> {
-    let replays: Vec<Replay<'_>> = (models.iter().zip(logs))
-        .map(|(model, log)| Replay::new(Point::from(&**model), log))
-        .collect();
+    let replays = replays(models, logs);
     let all = |horizon_s: f64| -> Vec<Window> {
         let of_log = |(index, log)| windows(index, log, horizon_s);
         logs.iter().enumerate().flat_map(of_log).collect()
@@ -73,10 +71,15 @@ pub(crate) fn errors_in(
     step_s: f64,
 ) -> Vec<WindowError> {
     let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
-    let replays: Vec<Replay<'_>> = (models.iter().zip(logs))
-        .map(|(model, log)| Replay::new(Point::from(&**model), log))
-        .collect();
+    let replays = replays(&models, logs);
     errors(&replays, windows, step_s)
+}
+
+/// `models` gives the model in each log.
+fn replays<'l>(models: &'l [Cow<'l, Dynamics>], logs: &'l [Log]) -> Vec<Replay<'l>> {
+    (models.iter().zip(logs))
+        .map(|(model, log)| Replay::new(Point::from(&**model), log))
+        .collect()
 }
 
 /// `replays` has one entry a log.

@@ -107,6 +107,22 @@ fn with_remedies(found: &[Misread], columns: &Columns, joints: usize) -> Vec<Fin
     found.iter().map(finding).collect()
 }
 
+impl Misread {
+    /// What is wrong with one column of a joint.
+    fn of_joint(joint: Joint, text: String, quantity: Quantity, to: To) -> Self {
+        let joint = Some(joint);
+        Self {
+            joint,
+            text,
+            changes: vec![Change {
+                quantity,
+                joint,
+                to,
+            }],
+        }
+    }
+}
+
 impl Change {
     /// In the log.
     fn apply(&self, log: &mut Log) {

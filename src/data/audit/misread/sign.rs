@@ -1,6 +1,6 @@
 //! Velocities and torques of opposite sign.
 
-use super::{Change, Misread, Reading, To};
+use super::{Misread, Reading, To};
 use crate::data::audit::JointAudit;
 use crate::data::audit::compare::MIN_CORRELATION;
 use crate::data::audit::table::short;
@@ -49,13 +49,6 @@ fn of_joint(audit: &JointAudit) -> Option<Misread> {
             ),
         ),
     };
-    Some(Misread {
-        joint: Some(audit.joint),
-        text,
-        changes: vec![Change {
-            quantity,
-            joint: Some(audit.joint),
-            to: To::Opposite,
-        }],
-    })
+    let joint = audit.joint;
+    Some(Misread::of_joint(joint, text, quantity, To::Opposite))
 }

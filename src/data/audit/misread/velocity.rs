@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Change, Misread, Reading, To};
+use super::{Misread, Reading, To};
 use crate::data::audit::JointAudit;
 use crate::data::audit::compare::MIN_CORRELATION;
 use crate::data::audit::table::short;
@@ -32,15 +32,7 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
 
 fn of_joint(audit: &JointAudit) -> Option<Misread> {
     let (text, quantity, to) = wrong(audit)?;
-    Some(Misread {
-        joint: Some(audit.joint),
-        text,
-        changes: vec![Change {
-            quantity,
-            joint: Some(audit.joint),
-            to,
-        }],
-    })
+    Some(Misread::of_joint(audit.joint, text, quantity, to))
 }
 
 /// What is wrong, and the change that mends it. A velocity of opposite sign is for another place.
