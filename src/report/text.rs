@@ -144,11 +144,17 @@ fn tried(outcome: &Outcome) -> String {
         "## What was tried\n\nGain: relative fall of the loss on stretches held out of the fit.\n\n",
     );
     for (number, round) in outcome.effects.rounds.iter().enumerate() {
+        let (number, candidates) = (number + 1, round.candidates);
+        if round.tried.is_empty() {
+            let _ = writeln!(
+                out,
+                "Round {number} ({candidates} candidates): no set came near the loss that the round began with.\n"
+            );
+            continue;
+        }
         let _ = writeln!(
             out,
-            "Round {} ({} candidates; the sets that promised most were fitted):\n\n| effects | gain | |\n|---|---|---|",
-            number + 1,
-            round.candidates
+            "Round {number} ({candidates} candidates; the sets that promised most were fitted):\n\n| effects | gain | |\n|---|---|---|"
         );
         for tried in &round.tried {
             let effects: Vec<String> = tried.effects.iter().map(FittedEffect::label).collect();
