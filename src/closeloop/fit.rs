@@ -3,9 +3,21 @@
 use super::error::StudyError;
 use super::fitted::Fitted;
 use super::select::usual_friction;
+use super::start::around;
 use super::study::Study;
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, identifiability};
 use crate::model::{Effect, FittedEffect, Model};
+
+/// The declared model, fitted, and what the logs determine of it.
+type Declared = (Fitted, Identifiability);
+
+/// So many fits that begin at values around the declared ones are compared: one alone may end in a local minimum.
+const FITTED_AROUND: usize = 3;
+
+/// Costs of fits are in units of each one's own scale.
+fn cost((fitted, _): &Declared) -> f64 {
+    fitted.fit.cost * fitted.fit.scale.powi(2)
+}
 
 impl Study<'_> {
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
@@ -13,40 +25,59 @@ impl Study<'_> {
     /// the friction that most machines have on every joint until the last fit, since without friction the first optimum
     /// of a rig that has it may lie anywhere. The better of the two counts. Parameters that the logs do not determine are
     /// found on the way and held from then on at the values reached: only those are sure to be compatible with the
-    /// bounds of the others.
+    /// bounds of the others. A model that diverges with its declared values is fitted from others around them.
     ///
     /// # Errors
-    /// No window, or a model that diverges even over short windows.
+    /// No window, or a model that diverges even over short windows, from all starting values.
     pub fn fit_declared(&mut self, library: &[Effect]) -> Result<Fitted, StudyError> {
         let friction = usual_friction(self, library);
-        let mut found = self.declared_beside(&[]);
-        if !friction.is_empty() {
-            let other = self.declared_beside(&friction);
-            // Costs are in units of each fit's own scale.
-            let cost = |(fitted, _): &(Fitted, _)| fitted.fit.cost * fitted.fit.scale.powi(2);
-            found = match (found, other) {
-                (Ok(alone), Ok(beside)) if cost(&alone) <= cost(&beside) => Ok(alone),
-                (Ok(_), Ok(other)) | (Err(_), Ok(other)) => Ok(other),
-                (found, Err(_)) => found,
-            };
-        }
-        let (fitted, identifiability) = found?;
+        let found = match self.fitted_from(self.declared, &friction) {
+            Err(FitError::Diverged { diverged, windows }) => {
+                let (start, found) = self
+                    .fitted_around(&friction)
+                    .ok_or(FitError::Diverged { diverged, windows })?;
+                self.moved_to = start.parameters;
+                found
+            }
+            found => found?,
+        };
+        let (fitted, identifiability) = found;
         self.identifiability = identifiability;
         Ok(fitted)
     }
 
-    /// The declared model, fitted beside some effects and then alone, and what the logs determine of it.
+    /// The best of a few fits that begin at values around the declared ones, and where it began.
+    fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, Declared)> {
+        let fit = |start: Model| Some((self.fitted_from(&start, friction).ok()?, start));
+        let found = around(self).filter_map(fit).take(FITTED_AROUND);
+        let (found, start) = found.min_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)))?;
+        Some((start, found))
+    }
+
+    /// The declared model, fitted from these values alone and beside friction.
+    fn fitted_from(&self, start: &Model, friction: &[FittedEffect]) -> Result<Declared, FitError> {
+        let found = self.declared_beside(start, &[]);
+        if friction.is_empty() {
+            return found;
+        }
+        match (found, self.declared_beside(start, friction)) {
+            (Ok(alone), Ok(beside)) if cost(&alone) <= cost(&beside) => Ok(alone),
+            (_, Ok(beside)) => Ok(beside),
+            (found, Err(_)) => found,
+        }
+    }
+
+    /// The declared model, fitted from these values beside some effects and then alone.
     fn declared_beside(
         &self,
+        start: &Model,
         effects: &[FittedEffect],
-    ) -> Result<(Fitted, Identifiability), FitError> {
+    ) -> Result<Declared, FitError> {
         let mut study = self.again();
         let windows = cut(self.logs, self.settings.fit.short_window_s);
         let short = Shooting::new(self.logs, windows, &self.shooting.noise);
         let own = &self.declared.effects;
-        let model = self
-            .declared
-            .with_effects([own.as_slice(), effects].concat());
+        let model = start.with_effects([own.as_slice(), effects].concat());
         let (first, held) = study.fit_and_hold(&short, &model)?;
         study.hold(held);
         let (mut last, held) = study.fit_and_hold(&self.shooting, &first.model)?;

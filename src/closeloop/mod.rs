@@ -23,6 +23,7 @@ mod select;
 mod settings;
 mod split;
 mod stage;
+mod start;
 mod study;
 #[cfg(test)]
 mod tests;

@@ -12,7 +12,7 @@ use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
 use crate::identify::{FitError, Identifiability};
-use crate::model::Model;
+use crate::model::{Model, Parameter};
 
 /// Everything that closing the loop found out.
 #[non_exhaustive]
@@ -55,6 +55,9 @@ pub struct Models {
     pub before: Fitted,
     /// With the effects that were found, and with 95 % intervals.
     pub after: Fitted,
+    /// The declared parameters at the values that their fit began with, where the model diverges with those in its file;
+    /// else empty.
+    pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
     /// Values in the model file that the fit of `after` contradicts.

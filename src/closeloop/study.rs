@@ -6,7 +6,7 @@ use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
-use crate::model::{Dynamics, FittedEffect, Model};
+use crate::model::{Dynamics, FittedEffect, Model, Parameter};
 
 /// A declared model and the logs to learn from, with what follows from both.
 pub struct Study<'a> {
@@ -26,6 +26,9 @@ pub struct Study<'a> {
     pub sample: Sample<'a>,
     /// When the search has to stop.
     pub deadline: Option<Instant>,
+    /// The declared parameters at the values that their fit began with, where the model diverges with those in its file;
+    /// else empty.
+    pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
     pub identifiability: Identifiability,
 }
@@ -38,7 +41,7 @@ pub struct Sample<'a> {
 }
 
 impl<'a> Sample<'a> {
-    fn of(shooting: &Shooting<'a>, size: usize) -> Self {
+    pub(super) fn of(shooting: &Shooting<'a>, size: usize) -> Self {
         let every = shooting.windows.len().div_ceil(size).max(1);
         let members: Vec<usize> = (0..shooting.windows.len()).step_by(every).collect();
         let windows = members.iter().map(|&w| shooting.windows[w]).collect();
@@ -113,6 +116,7 @@ impl<'a> Study<'a> {
             top_speed,
             top_torque,
             deadline: None,
+            moved_to: Vec::new(),
             identifiability: Identifiability::default(),
         }
     }
@@ -141,6 +145,7 @@ impl<'a> Study<'a> {
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
             deadline: self.deadline,
+            moved_to: Vec::new(),
             identifiability: Identifiability::default(),
         }
     }

@@ -271,6 +271,37 @@ fn a_changed_setting_changes_the_search() {
     assert_eq!(named(&settings), 0);
 }
 
+/// An inertia a fifth of the rig's and a moment five times as large make the mass matrix indefinite.
+#[test]
+fn starting_values_with_which_the_model_diverges_are_moved() {
+    const RIG: &str = r#"
+model = "acrobot"
+parameters = { m1 = 0.6, m2 = 0.6, l1 = 0.2, lc1 = 0.2, lc2 = 0.2, I1 = 0.02, I2 = 0.01 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.0, 0.5], band_hz = [0.2, 2.0], tones = 8 }
+recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
+"#;
+    let text = include_str!("../../docs/rigs/dfki_double_pendulum.toml");
+    let read = |text: &str| Model::from_text(Path::new("two_links.toml"), text, &[]).unwrap();
+    let far = text
+        .replace("{ value = 0.03,", "{ value = 0.006,")
+        .replace("{ value = 0.15,", "{ value = 0.75,");
+    let (near, far) = (read(text), read(&far));
+    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    let fitted = |model: &Model| {
+        let mut study = Study::new(model, &logs, &settings);
+        let fitted = study.fit_declared(&[]).unwrap();
+        (fitted.model.values(), study.moved_to)
+    };
+    let (wanted, unmoved) = fitted(&near);
+    let (found, moved_to) = fitted(&far);
+    assert!(unmoved.is_empty());
+    assert!(moved_to.iter().any(|p| p.name == "s2" && p.value < 0.7));
+    for (found, wanted) in found.iter().zip(&wanted) {
+        assert!((found / wanted - 1.0).abs() < 1e-3, "{found} {wanted}");
+    }
+}
+
 #[test]
 fn a_result_predicts_a_log() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());

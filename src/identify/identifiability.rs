@@ -1,5 +1,6 @@
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::DMatrix;
 
+use super::eigen::eigen;
 use super::outcome::Fit;
 use super::values::Values;
 use crate::model::Dynamics;
@@ -87,13 +88,15 @@ fn relative_information(dynamics: &Dynamics, found: &Values, fit: &Fit) -> DMatr
 }
 
 fn loose_directions(information: &DMatrix<f64>) -> Vec<Vec<f64>> {
-    if information.is_empty() {
-        return Vec::new();
-    }
-    let eigen = SymmetricEigen::new(information.clone());
+    let size = information.nrows();
+    let Some(eigen) = eigen(information.clone()) else {
+        // What is not finite tells nothing.
+        let axis = |i: usize| (0..size).map(|k| f64::from(u8::from(k == i))).collect();
+        return (0..size).map(axis).collect();
+    };
     let best = eigen.eigenvalues.max();
     let is_loose = |value: f64| value <= ROUNDING * best || value < 1.0 / (LOOSE * LOOSE);
-    (0..information.nrows())
+    (0..size)
         .filter(|&i| is_loose(eigen.eigenvalues[i]))
         .map(|i| eigen.eigenvectors.column(i).iter().copied().collect())
         .collect()

@@ -1,6 +1,7 @@
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::eigen::eigen;
 use super::normal_equations::with_unit_diagonal;
 use super::outcome::Fit;
 use super::shooting::Shooting;
@@ -84,6 +85,9 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     for i in alone {
         spread[(i, i)] += model[(i, i)];
     }
+    if spread.iter().any(|value| !value.is_finite()) {
+        spread = DMatrix::from_diagonal_element(size, size, f64::INFINITY);
+    }
     Uncertainty {
         covariance: spread,
         blocks: count,
@@ -110,12 +114,13 @@ const FLAT: f64 = 1e-9;
 /// The inverse of an information matrix, and its part along flat directions. The jackknife, a product of two roundings
 /// there, would understate the variance along them.
 fn inverse(hessian: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
-    if hessian.is_empty() {
-        return (hessian.clone(), hessian.clone());
-    }
     // "Flat" does not depend on units where the diagonal is one.
     let (scaled, scale) = with_unit_diagonal(hessian);
-    let eigen = SymmetricEigen::new(scaled);
+    let Some(eigen) = eigen(scaled) else {
+        // Nothing is known where the equations are not finite.
+        let unknown = DMatrix::from_diagonal_element(scale.len(), scale.len(), f64::INFINITY);
+        return (unknown.clone(), unknown);
+    };
     let best = eigen
         .eigenvalues
         .iter()

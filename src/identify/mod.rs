@@ -3,6 +3,7 @@
 //! Measured data are never differentiated. Windows of a log are integrated open loop from free start states and compared
 //! with the logged positions. Logged velocities are not used, since most rigs filter or delay them.
 
+mod eigen;
 mod fit;
 mod identifiability;
 mod intervals;
@@ -18,6 +19,7 @@ mod sums;
 mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
+pub use eigen::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
 pub use identifiability::{Identifiability, identifiability};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};

@@ -3,6 +3,7 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::eigen::eigen;
 use super::normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 use super::values::Column;
 
@@ -66,7 +67,10 @@ impl Fit {
             if matrix.is_empty() {
                 return 1.0;
             }
-            let values = matrix.symmetric_eigenvalues();
+            let Some(eigen) = eigen(matrix) else {
+                return f64::INFINITY;
+            };
+            let values = eigen.eigenvalues;
             let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
             let largest = values.iter().copied().fold(0.0, f64::max);
             if smallest > 0.0 {

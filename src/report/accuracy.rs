@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::wording::{
-    AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, small, value,
+    AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
 use crate::closeloop::Outcome;
 use crate::data::Joint;
@@ -139,6 +139,17 @@ pub(super) fn parameters(outcome: &Outcome) -> String {
         let _ = writeln!(
             out,
             "- Fit ({name}): {termination} ({steps} steps; condition number {as_is:.1e}, {scaled:.1e} after scaling)."
+        );
+    }
+    if !outcome.models.moved_to.is_empty() {
+        let all = outcome.models.moved_to.iter().filter(|p| !p.fixed);
+        let all: Vec<String> = all
+            .map(|p| format!("`{}` = {:.3}", p.name, p.value))
+            .collect();
+        let _ = writeln!(
+            out,
+            "- With the values in its file the model diverges in these logs: the fit began at {}.",
+            listed(&all)
         );
     }
     for &k in &verdict.hold {

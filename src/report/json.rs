@@ -50,6 +50,9 @@ impl Report {
                 .collect(),
             identifiability: identifiability(outcome),
             fits: FitsEntry {
+                moved_to: (outcome.models.moved_to.iter())
+                    .map(|parameter| (parameter.name.clone(), parameter.value))
+                    .collect(),
                 before: ended(&outcome.models.before.fit),
                 after: ended(&outcome.models.after.fit),
             },

@@ -155,6 +155,9 @@ pub(super) struct UnexplainedEntry {
 /// the fit of the declared model, and the final one with the effects
 #[derive(Debug, Serialize, JsonSchema)]
 pub(super) struct FitsEntry {
+    /// values that the fit of the declared parameters began with, as pairs of parameter and value, where the model
+    /// diverges with those in its file; else empty
+    pub moved_to: Vec<(String, f64)>,
     pub before: FitEntry,
     pub after: FitEntry,
 }

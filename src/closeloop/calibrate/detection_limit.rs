@@ -4,7 +4,9 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::{candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::study::Study;
-use crate::identify::{Fit, FitError, as_it_stands, fit, uncertainty, with_unit_diagonal};
+use crate::identify::{
+    Fit, FitError, as_it_stands, fit, squared_distance, uncertainty, with_unit_diagonal,
+};
 use crate::model::{Effect, FittedEffect};
 
 /// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
@@ -192,8 +194,8 @@ fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     // Rounding does not depend on units where the diagonal is one.
     let (scaled, _) = with_unit_diagonal(&all);
     let others = scaled.view((0, 0), (last, last)).into_owned();
-    let cross = scaled.view((0, last), (last, 1)).into_owned();
-    let explained = cross.dot(&(others.pseudo_inverse(1e-12).ok()? * &cross));
+    let cross = scaled.column(last).rows(0, last).into_owned();
+    let explained = squared_distance(&others, &cross);
     let own = 1.0 - explained;
     (own > least && all[(last, last)] > 0.0).then(|| own * all[(last, last)])
 }

@@ -1,9 +1,10 @@
+use nalgebra::DVector;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::trial::differences;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
-use crate::identify::uncertainty;
+use crate::identify::{squared_distance, uncertainty};
 
 /// Fall of the loss as a share of what it was.
 pub fn gain(before: &[f64], after: &[f64]) -> f64 {
@@ -30,15 +31,14 @@ pub fn p_value(study: &Study<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
         .covariance
         .select_rows(&switches)
         .select_columns(&switches);
-    let values = nalgebra::DVector::from_iterator(
+    let values = DVector::from_iterator(
         switches.len(),
         switches.iter().map(|&i| {
             let log = columns[i].log.map(|log| &study.logs[log]);
             fitted.model.value_of(columns[i].parameter, log)
         }),
     );
-    let inverse = covariance.pseudo_inverse(1e-300).ok()?;
-    let statistic = values.dot(&(inverse * &values));
+    let statistic = squared_distance(&covariance, &values);
     Some(f_test(statistic, switches.len(), uncertainty.blocks))
 }
 

@@ -1,0 +1,91 @@
+//! Starting values for a model that diverges with those in its file.
+
+use super::study::{Sample, Study};
+use crate::identify::{Shooting, Values, cut};
+use crate::model::{Model, Parameter};
+
+/// Models tried before it is said that none works.
+const TRIED: u32 = 512;
+/// The last of them has values off by this factor, up or down.
+const FARTHEST: f64 = 10.0;
+/// In each, free parameters are spread by another base of the van der Corput sequence.
+const BASES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
+
+/// The declared model at values around those in its file with which it does not diverge over short windows, the nearest
+/// first.
+pub(super) fn around(study: &Study<'_>) -> impl Iterator<Item = Model> {
+    let windows = cut(study.logs, study.settings.fit.short_window_s);
+    let short = Shooting::new(study.logs, windows, &study.shooting.noise);
+    let sample = Sample::of(&short, study.settings.fit.sample_windows).shooting;
+    spread(study.declared).filter(move |model| {
+        let dynamics = study.smoothed(model).dynamics();
+        let values = Values::of(&dynamics, study.logs);
+        let costs = sample.costs(&dynamics, &values, &sample.initial_locals(0), 1.0);
+        costs.iter().all(|cost| cost.is_finite())
+    })
+}
+
+/// A model with its free parameters at other values, ever farther from its own: spread evenly in the logarithm (Halton
+/// 1960), each with the sign that it has.
+fn spread(declared: &Model) -> impl Iterator<Item = Model> {
+    (1..=TRIED).map(|k| {
+        let mut model = declared.clone();
+        let free = model.parameters.iter_mut().filter(|p| !p.fixed);
+        for (parameter, base) in free.zip(BASES.into_iter().cycle()) {
+            let reach = FARTHEST.ln() * f64::from(k) / f64::from(TRIED);
+            move_by(parameter, reach * (2.0 * radical_inverse(k, base) - 1.0));
+        }
+        model
+    })
+}
+
+/// Move a value by a factor, `by` its logarithm; one at zero moves on its scale.
+fn move_by(parameter: &mut Parameter, by: f64) {
+    let moved = match parameter.value {
+        0.0 => by * parameter.scale,
+        value => value * by.exp(),
+    };
+    let [low, high] = parameter.bounds;
+    parameter.value = moved.clamp(low, high);
+}
+
+/// The digits of a number mirrored at the point: evenly spread over 0 to 1 however many numbers are taken.
+fn radical_inverse(mut number: u32, base: u32) -> f64 {
+    let (mut value, mut place) = (0.0, 1.0);
+    while number > 0 {
+        place /= f64::from(base);
+        value += place * f64::from(number % base);
+        number /= base;
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{radical_inverse, spread};
+    use crate::closeloop::tests::pendulum;
+    use crate::model::Model;
+
+    #[test]
+    fn starting_values_are_spread_ever_farther_around_the_declared_ones() {
+        assert_eq!(
+            [1, 2, 3, 4].map(|k| radical_inverse(k, 2)),
+            [0.5, 0.25, 0.75, 0.125]
+        );
+        let mut declared = pendulum();
+        declared.parameters[0].value = -15.0;
+        let factors = |k: usize| -> Vec<f64> {
+            let of = |model: Model| model.parameters[k].value;
+            spread(&declared)
+                .map(|model| of(model) / declared.parameters[k].value)
+                .collect()
+        };
+        for factors in [factors(0), factors(1)] {
+            let farthest = |of: &[f64]| of.iter().map(|f| f.ln().abs()).fold(0.0, f64::max);
+            assert!(farthest(&factors[..128]) < 10.0_f64.ln() / 4.0);
+            assert!((5.0_f64.ln()..10.0_f64.ln()).contains(&farthest(&factors)));
+            let up = factors.iter().filter(|f| **f > 1.0).count();
+            assert!((250..=262).contains(&up), "{up}");
+        }
+    }
+}
