@@ -103,9 +103,14 @@ impl Study<'_> {
         let active = self.active(&dynamics);
         let locals = shooting.initial_locals(0);
         let (values, free) = fit(shooting, &dynamics, &active, locals, None)?;
-        let mut verdict = identifiability(&dynamics, &values, &free);
-        // Only declared parameters are held: an effect that the file carries stays free.
-        verdict.hold.retain(|&k| k < model.parameters.len());
+        // An effect that the file carries stays free; one that is fitted beside it goes again.
+        let declared = model.parameters.len();
+        let carried = 0..self.declared.effects.len();
+        let carried = carried.fold(declared..declared, |all, k| {
+            all.start..model.place_of(k).end
+        });
+        let mut verdict = identifiability(&dynamics, &carried, &values, &free);
+        verdict.hold.retain(|&k| k < declared);
         if verdict.hold.is_empty() {
             let fitted = Fitted::new(&model, &dynamics, (values, free), self.logs);
             return Ok((fitted, verdict));

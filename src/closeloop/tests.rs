@@ -302,6 +302,32 @@ recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
     }
 }
 
+/// Without torque nothing tells inertia from friction: what is declared of the inertia is held, so that the friction of the
+/// file gets a value.
+#[test]
+fn what_an_effect_of_the_file_is_not_told_from_is_held() {
+    const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [0.0], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 2, duration_s = 8, start = [2.0, 0] }
+effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
+"#;
+    let (mut declared, library) = (pendulum(), Library::built_in());
+    declared.parameters[0].value = -15.0;
+    let friction = FittedEffect::absent(library.effect("viscous_friction").unwrap(), Joint::at(0));
+    let declared = declared.with_effects(vec![friction]);
+    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    let mut study = Study::new(&declared, &logs, &settings);
+    let fitted = study.fit_declared(&[]).unwrap();
+    assert_eq!(study.identifiability.hold, [1]);
+    let [_, c_i, b] = fitted.model.values()[..] else {
+        panic!()
+    };
+    assert!((c_i * b - 0.46).abs() < 0.01, "{c_i} {b}");
+}
+
 #[test]
 fn a_result_predicts_a_log() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());

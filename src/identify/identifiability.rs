@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 
 use super::eigen::eigen;
@@ -24,12 +26,19 @@ pub struct Identifiability {
 const LOOSE: f64 = 3.0;
 /// It is also undetermined if its eigenvalue is smaller than this share of the largest one, which is rounding.
 const ROUNDING: f64 = 1e-11;
+/// Holding a parameter with a smaller share of the undetermined directions would determine none of them.
+const NEGLIGIBLE: f64 = 1e-3;
 /// Parameters with a smaller weight in a combination are not reported.
 const NAMED: f64 = 0.1;
 
 /// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in relative
-/// units.
-pub fn identifiability(dynamics: &Dynamics, found: &Values, fit: &Fit) -> Identifiability {
+/// units. The parameters `free` are never held.
+pub fn identifiability(
+    dynamics: &Dynamics,
+    free: &Range<usize>,
+    found: &Values,
+    fit: &Fit,
+) -> Identifiability {
     let information = relative_information(dynamics, found, fit);
     let loose = loose_directions(&information);
     let name = |i: usize| dynamics.parameters[fit.columns[i].parameter].name.clone();
@@ -47,12 +56,13 @@ pub fn identifiability(dynamics: &Dynamics, found: &Values, fit: &Fit) -> Identi
         free: fit.columns.len(),
         determined: fit.columns.len() - loose.len(),
         undetermined,
-        hold: hold(&information, fit),
+        hold: hold(&information, fit, free),
     }
 }
 
-/// Hold the parameter with the largest weight in the undetermined directions, one after the other, until none is left.
-fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
+/// Hold the parameter with the largest weight in the undetermined directions, one after the other, until none is left that
+/// may be held.
+fn hold(information: &DMatrix<f64>, fit: &Fit, free: &Range<usize>) -> Vec<usize> {
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
     let mut hold = Vec::new();
     loop {
@@ -66,7 +76,7 @@ fn hold(information: &DMatrix<f64>, fit: &Fit) -> Vec<usize> {
         };
         // Of equal shares the later parameter is held: files name the leading ones first.
         let Some(most) = (0..left.len())
-            .filter(|_| !loose.is_empty())
+            .filter(|&i| !free.contains(&fit.columns[left[i]].parameter) && share(i) > NEGLIGIBLE)
             .max_by(|&a, &b| share(a).total_cmp(&share(b)))
         else {
             return hold;

@@ -81,8 +81,19 @@ pub fn best_start(
         starts = vec![best];
     }
     let start = starts.pop()?;
-    let cost = promised(study, &study.shooting, fitted, &start, &fitted.fit.locals)?;
+    let cost = promise(study, fitted, &start)?;
     Some((start, cost))
+}
+
+/// The predicted cost of all windows of a candidate at its values beside a model.
+pub fn promise(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<f64> {
+    promised(
+        study,
+        &study.shooting,
+        fitted,
+        candidate,
+        &fitted.fit.locals,
+    )
 }
 
 /// The cost of some windows that one Gauss-Newton step predicts for a candidate.

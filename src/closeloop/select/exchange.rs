@@ -1,4 +1,5 @@
-use super::candidate::{acting, best_start};
+use super::candidate::{acting, best_start, promise};
+use super::trial::identity;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::model::{Effect, FittedEffect};
@@ -11,7 +12,8 @@ pub(super) struct Exchange {
 }
 
 /// Sets of effects in which one of a model's is replaced by another that it is easily confused with, on the same joint.
-/// Seen from the model itself, such a pair promises little: each does most of what the other does.
+/// Seen from the model itself, such a pair promises little: each does most of what the other does. An effect with a whole
+/// number, found where the rest of the set was another, is also exchanged for itself with another number.
 pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) -> Vec<Exchange> {
     let declared = study.declared.effects.len();
     let mut sets = Vec::new();
@@ -20,7 +22,10 @@ pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) 
         let old = rest.model.effects.remove(k);
         let is_like = |new: &&Effect| {
             let names = |a: &Effect, b: &Effect| a.confused_with.contains(&b.name);
-            names(&old.effect, new) || names(new, &old.effect)
+            let is_counted = new.parameters.iter().any(|parameter| parameter.whole);
+            names(&old.effect, new)
+                || names(new, &old.effect)
+                || is_counted && new.name == old.effect.name
         };
         let like: Vec<Effect> = library.iter().filter(is_like).cloned().collect();
         for new in acting(study, &like) {
@@ -28,14 +33,40 @@ pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) 
             let is_free = !present.iter().any(|p| p.excludes(&new) || p.contains(&new));
             if new.joint == old.joint
                 && is_free
-                && let Some((start, _)) = best_start(study, &rest, &new)
+                && let Some(start) = in_place_of(study, &rest, &old, &new)
             {
                 let mut set = present[declared..].to_vec();
-                let labels = [old.label(), start.label()];
+                let labels = [identity(&old), identity(&start)];
                 set.push(start);
                 sets.push(Exchange { set, labels });
             }
         }
     }
     sets
+}
+
+/// The effect that takes the place of another: at the start that promises most or, where that promises more, at the value
+/// of the old one. What replaces a strong effect is far from absent.
+fn in_place_of(
+    study: &Study<'_>,
+    rest: &Fitted,
+    old: &FittedEffect,
+    new: &FittedEffect,
+) -> Option<FittedEffect> {
+    let (absent, promised) = best_start(study, rest, new)?;
+    let promises_more = |carried: &FittedEffect| {
+        promise(study, rest, carried).is_some_and(|carried| carried < promised)
+    };
+    let carried = carried_over(old, &absent).filter(promises_more);
+    Some(carried.unwrap_or(absent))
+}
+
+/// An effect at the value of another, where each has one, in the same unit.
+fn carried_over(old: &FittedEffect, new: &FittedEffect) -> Option<FittedEffect> {
+    let ([was], [is]) = (&old.effect.parameters[..], &new.effect.parameters[..]) else {
+        return None;
+    };
+    let mut carried = new.clone();
+    carried.values[0].0 = old.values[0].0.clamp(is.bounds[0], is.bounds[1]);
+    (was.unit == is.unit).then_some(carried)
 }

@@ -188,7 +188,8 @@ impl Outlook {
             }
         }
         let mut minimum = Minimum { free, held, moved };
-        if !self.is_determined(&minimum.free) {
+        let matrix = sub(&self.all.hessian, &minimum.free, &minimum.free);
+        if !tells_apart(&matrix, self.base.len()) {
             return None;
         }
         loop {
@@ -213,20 +214,6 @@ impl Outlook {
         }
     }
 
-    /// Whether the logs tell the values of the items from each other and from those of the model: the information of
-    /// each that is left when those before it are free.
-    fn is_determined(&self, free: &[usize]) -> bool {
-        let (mut scaled, _) = with_unit_diagonal(&sub(&self.all.hessian, free, free));
-        for i in 0..free.len() {
-            scaled[(i, i)] += RIDGE;
-        }
-        let Some(factor) = scaled.cholesky() else {
-            return false;
-        };
-        let own = factor.l_dirty().diagonal();
-        (self.base.len()..free.len()).all(|i| own[i].powi(2) > OWN_INFORMATION)
-    }
-
     /// The displacement of all values at the minimum of the loss.
     fn step(&self, minimum: &Minimum) -> Option<DVector<f64>> {
         let Minimum { free, held, moved } = minimum;
@@ -239,6 +226,22 @@ impl Outlook {
         }
         Some(step)
     }
+}
+
+/// Whether the logs tell the values after the first `base` ones from each other and from those: the information of each
+/// that is left when those before it are free.
+pub fn tells_apart(matrix: &DMatrix<f64>, base: usize) -> bool {
+    let (mut scaled, _) = with_unit_diagonal(matrix);
+    for i in 0..scaled.nrows() {
+        scaled[(i, i)] += RIDGE;
+    }
+    let Some(factor) = scaled.cholesky() else {
+        return false;
+    };
+    let own = factor.l_dirty().diagonal();
+    own.iter()
+        .skip(base)
+        .all(|own| own.powi(2) > OWN_INFORMATION)
 }
 
 fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {

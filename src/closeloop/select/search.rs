@@ -39,7 +39,7 @@ pub struct Search<'a, 'p> {
     pub study: &'a Study<'a>,
     pub library: &'a [Effect],
     pub rounds: Vec<Round>,
-    /// Exchanges that made a set worse, by the labels of the old and the new effect.
+    /// Exchanges that made the set worse since a round changed it, by the labels of the old and the new effect.
     vain: HashSet<[String; 2]>,
     progress: &'p mut dyn FnMut(Progress<'_>),
 }
@@ -75,7 +75,10 @@ impl<'a, 'p> Search<'a, 'p> {
             }
             let step = study.settings.select.step;
             let next = match self.better(&best, step, |search, best| search.round(best)) {
-                Some(next) => next,
+                Some(next) => {
+                    self.vain.clear();
+                    next
+                }
                 // An exchange adds nothing: a smaller gain will do.
                 None => {
                     let step = study.settings.select.exchange;

@@ -21,8 +21,7 @@ pub(super) fn simpler(
     all
 }
 
-/// The sets of effects contained in one that take fewer names and parameters together, fewest first: one effect
-/// with four parameters says less than three effects with one each.
+/// The sets of effects contained in one that take fewer parameters together, fewest first.
 fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
     let is_part = |effect: &&Effect| whole.contains.contains(&effect.name);
     let parts: Vec<&Effect> = library.iter().filter(is_part).collect();
@@ -33,11 +32,11 @@ fn parts_of<'l>(library: &'l [Effect], whole: &Effect) -> Vec<Vec<&'l Effect>> {
             .filter(|(bit, _)| set >> bit & 1 == 1);
         members.map(|(_, effect)| *effect).collect()
     };
-    let own = |effect: &Effect| 1 + effect.parameters.len();
-    let size = |set: &Vec<&Effect>| set.iter().map(|effect| own(effect)).sum::<usize>();
+    let parameters =
+        |set: &Vec<&Effect>| -> usize { set.iter().map(|effect| effect.parameters.len()).sum() };
     let mut sets: Vec<Vec<&Effect>> = (1..1_usize << parts.len()).map(chosen).collect();
-    sets.retain(|set| size(set) < own(whole));
-    sets.sort_by_key(size);
+    sets.retain(|set| parameters(set) < whole.parameters.len());
+    sets.sort_by_key(|set| (parameters(set), set.len()));
     sets
 }
 

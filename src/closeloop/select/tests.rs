@@ -1,11 +1,15 @@
 //! Sets are compared before they are fitted, on a simulated pendulum with dry friction.
 
 use super::candidate::candidates;
+use super::exchange::exchanges;
 use super::folds::{Folds, left_out_losses};
 use super::outlook::Outlook;
+use super::simpler::simpler;
+use super::trial::{Trial, key};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::study::Study;
-use crate::closeloop::tests::{logs, pendulum};
+use crate::closeloop::tests::{logs, pendulum, recorded};
+use crate::data::Joint;
 use crate::model::{FittedEffect, Library};
 
 #[test]
@@ -48,4 +52,68 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
         "{} {found} {known}",
         loss(&[coulomb])
     );
+}
+
+fn absent(name: &str) -> FittedEffect {
+    let library = Library::built_in();
+    FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0))
+}
+
+/// A gain of the torque beside a free inertia has any value.
+#[test]
+fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let mut study = Study::new(&declared, &logs, &settings);
+    let fitted = study.fit_declared(&[]).unwrap();
+    let is_valid = |names: &[&str]| {
+        let effects = names.iter().map(|name| absent(name)).collect();
+        let fitted = study.with_effects(&fitted, effects).unwrap();
+        Trial::of(&study, fitted).is_valid(&study)
+    };
+    assert!(is_valid(&["coulomb_friction"]));
+    assert!(!is_valid(&["coulomb_friction", "actuator_gain"]));
+}
+
+#[test]
+fn simpler_sets_have_fewer_parameters() {
+    let library = Library::built_in();
+    let sets = simpler(library.effects(), &[absent("asymmetric_friction")], 0..1);
+    let most = key(sets.last().unwrap());
+    let parts = ["constant_torque", "coulomb_friction", "viscous_friction"];
+    assert_eq!(most, parts.map(|name| format!("{name} on joint 1")));
+}
+
+/// The lag takes over the value of the delay, and the ripple is tried with the number of periods that the rig has.
+#[test]
+fn exchanges_start_near_what_they_replace() {
+    const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 200, position_noise = 2e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 3.0], tones = 10 }
+recording = { logs = 3, duration_s = 6, start = [0, 0] }
+effect = [
+    { name = "actuator_lag", joint = 1, T = 0.03 },
+    { name = "cogging_torque", joint = 1, A = 0.3, N = 7, phase = 0.4 },
+]
+"#;
+    let (declared, logs, settings) = (pendulum(), recorded(RIG, 0), Settings::default());
+    let library = Library::built_in();
+    let mut study = Study::new(&declared, &logs, &settings);
+    let fitted = study.fit_declared(&[]).unwrap();
+    let mut ripple = absent("cogging_torque");
+    ripple.values = vec![(0.1, None), (6.0, None), (0.4, None)];
+    let set = vec![absent("actuator_delay"), ripple];
+    let wrong = study.with_effects(&fitted, set).unwrap();
+    let delay = wrong.model.effects[0].values[0].0;
+    assert!(delay > 0.01);
+    let all = exchanges(&study, library.effects(), &wrong);
+    let labels: Vec<&str> = all.iter().map(|exchange| &*exchange.labels[1]).collect();
+    assert!(
+        labels.contains(&"cogging_torque on joint 1, N = 7"),
+        "{labels:?}"
+    );
+    let lag = all.iter().flat_map(|exchange| &exchange.set);
+    let lag = lag.filter(|effect| effect.effect.name == "actuator_lag");
+    assert_eq!(lag.map(|lag| lag.values[0].0).collect::<Vec<_>>(), [delay]);
 }

@@ -1,4 +1,5 @@
 use super::folds::left_out_losses;
+use super::outlook::tells_apart;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
@@ -39,9 +40,24 @@ impl Trial {
         effects.filter(|effect| effect.shifted().is_some()).count()
     }
 
-    /// Whether every added effect has values that are consistent with each other, and a shape that the logs determine: a
-    /// value that gives an effect its shape and stands at a bound was not found there.
+    /// Whether every added effect has values that are consistent with each other and that the logs tell from all others,
+    /// and a shape that they determine: a value that gives an effect its shape and stands at a bound was not found there.
     pub fn is_valid(&self, study: &Study<'_>) -> bool {
+        self.is_consistent(study) && self.is_determined(study)
+    }
+
+    fn is_determined(&self, study: &Study<'_>) -> bool {
+        let (model, fit) = (&self.fitted.model, &self.fitted.fit);
+        let added = study.added(model);
+        if added.is_empty() {
+            return true;
+        }
+        let first = model.place_of(added.start).start;
+        let base = fit.columns.iter().filter(|column| column.parameter < first);
+        tells_apart(&fit.equations().hessian, base.count())
+    }
+
+    fn is_consistent(&self, study: &Study<'_>) -> bool {
         let added = &self.fitted.model.effects[study.added(&self.fitted.model)];
         added.iter().all(|effect| {
             let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
@@ -77,9 +93,18 @@ impl Trial {
 
 /// The effects of a model, in no particular order.
 pub fn key(effects: &[FittedEffect]) -> Vec<String> {
-    let mut key: Vec<String> = effects.iter().map(FittedEffect::label).collect();
+    let mut key: Vec<String> = effects.iter().map(identity).collect();
     key.sort();
     key
+}
+
+/// The name of an effect, its joint and its whole numbers: a ripple of another number of periods is another effect.
+pub fn identity(effect: &FittedEffect) -> String {
+    let values = effect.effect.parameters.iter().zip(&effect.values);
+    let whole = values.filter(|(parameter, _)| parameter.whole);
+    whole.fold(effect.label(), |label, (parameter, (value, _))| {
+        format!("{label}, {} = {value}", parameter.name)
+    })
 }
 
 pub fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {
