@@ -111,6 +111,10 @@ impl Study<'_> {
         });
         let mut verdict = identifiability(&dynamics, &carried, &values, &free);
         verdict.hold.retain(|&k| k < declared);
+        let columns = free.columns.iter();
+        verdict.free = columns
+            .filter(|column| column.parameter < carried.end)
+            .count();
         if verdict.hold.is_empty() {
             let fitted = Fitted::new(&model, &dynamics, (values, free), self.logs);
             return Ok((fitted, verdict));
