@@ -5,7 +5,7 @@ use super::fitted::Fitted;
 use super::select::usual_friction;
 use super::start::around;
 use super::study::Study;
-use crate::identify::{FitError, Identifiability, Shooting, cut, fit, identifiability};
+use crate::identify::{FitError, Identifiability, Shooting, fit, identifiability};
 use crate::model::{Effect, FittedEffect, Model};
 
 /// The declared model, fitted, and what the logs determine of it.
@@ -37,6 +37,7 @@ impl Study<'_> {
                     .fitted_around(&friction)
                     .ok_or(FitError::Diverged { diverged, windows })?;
                 self.moved_to = start.parameters;
+                self.moved_to.retain(|parameter| !parameter.fixed);
                 found
             }
             found => found?,
@@ -74,8 +75,7 @@ impl Study<'_> {
         effects: &[FittedEffect],
     ) -> Result<Declared, FitError> {
         let mut study = self.again();
-        let windows = cut(self.logs, self.settings.fit.short_window_s);
-        let short = Shooting::new(self.logs, windows, &self.shooting.noise);
+        let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
         let model = start.with_effects([own.as_slice(), effects].concat());
         let (first, held) = study.fit_and_hold(&short, &model)?;

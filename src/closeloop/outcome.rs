@@ -55,7 +55,7 @@ pub struct Models {
     pub before: Fitted,
     /// With the effects that were found, and with 95 % intervals.
     pub after: Fitted,
-    /// The declared parameters at the values that their fit began with, where the model diverges with those in its file;
+    /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
     /// else empty.
     pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters.

@@ -1,7 +1,7 @@
 //! Starting values for a model that diverges with those in its file.
 
 use super::study::{Sample, Study};
-use crate::identify::{Shooting, Values, cut};
+use crate::identify::Values;
 use crate::model::{Model, Parameter};
 
 /// Models tried before it is said that none works.
@@ -14,8 +14,7 @@ const BASES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47
 /// The declared model at values around those in its file with which it does not diverge over short windows, the nearest
 /// first.
 pub(super) fn around(study: &Study<'_>) -> impl Iterator<Item = Model> {
-    let windows = cut(study.logs, study.settings.fit.short_window_s);
-    let short = Shooting::new(study.logs, windows, &study.shooting.noise);
+    let short = study.windows_of(study.settings.fit.short_window_s);
     let sample = Sample::of(&short, study.settings.fit.sample_windows).shooting;
     spread(study.declared).filter(move |model| {
         let dynamics = study.smoothed(model).dynamics();

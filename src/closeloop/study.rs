@@ -26,7 +26,7 @@ pub struct Study<'a> {
     pub sample: Sample<'a>,
     /// When the search has to stop.
     pub deadline: Option<Instant>,
-    /// The declared parameters at the values that their fit began with, where the model diverges with those in its file;
+    /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
     /// else empty.
     pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
@@ -148,6 +148,11 @@ impl<'a> Study<'a> {
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
         }
+    }
+
+    /// Its logs, cut into windows of this length in s.
+    pub(super) fn windows_of(&self, length_s: f64) -> Shooting<'a> {
+        Shooting::new(self.logs, cut(self.logs, length_s), &self.shooting.noise)
     }
 
     /// This study once more.

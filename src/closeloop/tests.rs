@@ -50,6 +50,12 @@ pub(super) fn pendulum() -> Model {
     Library::built_in().model(Path::new("pendulum")).unwrap()
 }
 
+/// An effect of the library on the first joint, at its values where it is absent.
+pub(super) fn absent(name: &str) -> FittedEffect {
+    let library = Library::built_in();
+    FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0))
+}
+
 /// A model that moves no window: its values are no numbers.
 fn diverging(mut fitted: Fitted) -> Fitted {
     for parameter in &mut fitted.model.parameters {
@@ -77,9 +83,7 @@ fn a_model_that_diverges_has_no_residual_force() {
 #[test]
 fn an_effect_that_saves_little_is_not_established() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let library = Library::built_in();
     let study = Study::new(&declared, &logs, &settings);
-    let absent = |name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0));
     let start = declared.with_effects(["coulomb_friction", "gravity_tilt"].map(absent).into());
     let fitted = study
         .refit(&start, study.shooting.initial_locals(0), None)
@@ -136,7 +140,6 @@ fn a_fit_that_fails_allows_no_verdict() {
 fn an_effect_stays_where_the_refit_without_it_fails() {
     let bounded = "sin(q1) * (1 + 1e-9*sqrt(3.6 - abs(q1)))";
     let text = pendulum().declaration.replace("sin(q1)", bounded);
-    let library = Library::built_in();
     let declared = Model::from_text(Path::new("rig.toml"), &text, &[]).unwrap();
     let (mut logs, settings) = (logs(), Settings::default());
     for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
@@ -146,7 +149,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     let study = Study::new(&declared, &split.train, &settings);
     let bias = |size: f64| FittedEffect {
         values: vec![(size, None)],
-        ..FittedEffect::absent(library.effect("constant_torque").unwrap(), Joint::at(0))
+        ..absent("constant_torque")
     };
     let mut start = declared.with_effects(vec![bias(-8.0)]);
     for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
@@ -316,8 +319,7 @@ effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
 "#;
     let (mut declared, library) = (pendulum(), Library::built_in());
     declared.parameters[0].value = -15.0;
-    let friction = FittedEffect::absent(library.effect("viscous_friction").unwrap(), Joint::at(0));
-    let declared = declared.with_effects(vec![friction]);
+    let declared = declared.with_effects(vec![absent("viscous_friction")]);
     let (logs, settings) = (recorded(RIG, 0), Settings::default());
     let mut study = Study::new(&declared, &logs, &settings);
     // Coulomb friction is fitted beside it at first, and counts for nothing.

@@ -142,7 +142,7 @@ pub(super) fn parameters(outcome: &Outcome) -> String {
         );
     }
     if !outcome.models.moved_to.is_empty() {
-        let all = outcome.models.moved_to.iter().filter(|p| !p.fixed);
+        let all = outcome.models.moved_to.iter();
         let all: Vec<String> = all
             .map(|p| format!("`{}` = {:.3}", p.name, p.value))
             .collect();

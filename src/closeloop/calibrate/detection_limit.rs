@@ -4,9 +4,7 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::{candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::study::Study;
-use crate::identify::{
-    Fit, FitError, as_it_stands, fit, squared_distance, uncertainty, with_unit_diagonal,
-};
+use crate::identify::{Fit, FitError, as_it_stands, fit, squared_distance, uncertainty};
 use crate::model::{Effect, FittedEffect};
 
 /// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
@@ -191,12 +189,9 @@ impl<'a> Baseline<'a> {
 fn own_information(fit: &Fit, least: f64) -> Option<f64> {
     let last = fit.columns.len() - 1;
     let all = fit.equations().hessian;
-    // Rounding does not depend on units where the diagonal is one.
-    let (scaled, _) = with_unit_diagonal(&all);
-    let others = scaled.view((0, 0), (last, last)).into_owned();
-    let cross = scaled.column(last).rows(0, last).into_owned();
-    let explained = squared_distance(&others, &cross);
-    let own = 1.0 - explained;
+    let others = all.view((0, 0), (last, last)).into_owned();
+    let cross = all.column(last).rows(0, last).into_owned();
+    let own = 1.0 - squared_distance(&others, &cross) / all[(last, last)];
     (own > least && all[(last, last)] > 0.0).then(|| own * all[(last, last)])
 }
 

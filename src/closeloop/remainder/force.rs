@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::data::Log;
-use crate::identify::{FitError, Shooting, Window, cut, fit};
+use crate::identify::{FitError, Window, fit};
 
 /// The residual force of a model over one short stretch of a log: the constant generalised force that, added to
 /// the torque, makes the model follow the logged positions best.
@@ -30,8 +30,7 @@ pub(in crate::closeloop) fn residual_force(
     fitted: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {
     let joints = study.declared.joints;
-    let windows = cut(study.logs, study.settings.remainder.stretch_s);
-    let shooting = Shooting::new(study.logs, windows, &study.shooting.noise);
+    let shooting = study.windows_of(study.settings.remainder.stretch_s);
     let locals = shooting.initial_locals(joints);
     let (_, found) = fit(&shooting, &fitted.model.dynamics(), &[], locals, None)?;
     let stretches = shooting.windows.iter().zip(&found.locals);

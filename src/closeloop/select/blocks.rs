@@ -2,7 +2,6 @@ use crate::closeloop::study::Study;
 use crate::model::{Effect, FittedEffect};
 
 use super::candidate::acting;
-use super::trial::key;
 
 /// What most machines have, each set on all joints together: where every joint has friction, none of it helps much
 /// alone.
@@ -37,6 +36,6 @@ pub fn blocks(study: &Study<'_>, library: &[Effect]) -> Vec<Vec<FittedEffect>> {
     };
     let mut blocks: Vec<_> = COMMON.iter().map(block).collect();
     blocks.retain(|block| !block.is_empty());
-    blocks.dedup_by_key(|block| key(block));
+    blocks.dedup_by_key(|block| block.len());
     blocks
 }

@@ -8,8 +8,7 @@ use super::simpler::simpler;
 use super::trial::{Trial, key};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::study::Study;
-use crate::closeloop::tests::{logs, pendulum, recorded};
-use crate::data::Joint;
+use crate::closeloop::tests::{absent, logs, pendulum, recorded};
 use crate::model::{FittedEffect, Library};
 
 #[test]
@@ -52,11 +51,6 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
         "{} {found} {known}",
         loss(&[coulomb])
     );
-}
-
-fn absent(name: &str) -> FittedEffect {
-    let library = Library::built_in();
-    FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0))
 }
 
 /// A gain of the torque beside a free inertia has any value.
