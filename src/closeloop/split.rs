@@ -97,8 +97,8 @@ pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
     let rows =
         log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
     let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();
-    let masked = |of_joint: &Vec<usize>| {
-        let kept = of_joint.iter().filter(|row| rows.contains(row));
+    let marked = |all: &Vec<usize>| {
+        let kept = all.iter().filter(|row| rows.contains(row));
         kept.map(|row| row - rows.start).collect()
     };
     Log {
@@ -107,7 +107,8 @@ pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
         q: cut(&log.q),
         qd: cut(&log.qd),
         tau: cut(&log.tau),
-        masked: log.masked.iter().map(masked).collect(),
+        masked: log.masked.iter().map(marked).collect(),
+        filled: marked(&log.filled),
         leave_out: log.leave_out.clone(),
         notes: log.notes.clone(),
     }

@@ -49,7 +49,7 @@ pub(super) fn dropped(log: &Log) -> Vec<Dropped> {
 }
 
 impl Log {
-    /// The log with rows in the place of those that the logger dropped, masked, so that the torque changes as smoothly
+    /// The log with rows in the place of those that the logger dropped, so that the torque changes as smoothly
     /// as it does around them. Where it does not pass a step smoothly, nobody knows when it changed: such steps
     /// are left out, unless windows of `window_s` around them make up more than half of the log.
     pub(super) fn completed(&self, window_s: f64) -> Log {
@@ -83,7 +83,7 @@ impl Log {
         })
     }
 
-    /// Puts masked rows into a step, at equal times.
+    /// Puts rows into a step, at equal times.
     fn insert(&mut self, dropped: &Dropped) {
         let Dropped { row, count } = *dropped;
         let around = [row.saturating_sub(1), row, row + 1, row + 2];
@@ -107,13 +107,13 @@ impl Log {
         }
         self.time.splice(row + 1..row + 1, times);
         for masked in &mut self.masked {
-            masked
-                .iter_mut()
-                .filter(|at| **at > row)
-                .for_each(|at| *at += count);
-            masked.extend(row + 1..=row + count);
-            masked.sort_unstable();
+            let later = masked.iter_mut().filter(|at| **at > row);
+            later.for_each(|at| *at += count);
         }
+        let later = self.filled.iter_mut().filter(|at| **at > row);
+        later.for_each(|at| *at += count);
+        self.filled.extend(row + 1..=row + count);
+        self.filled.sort_unstable();
     }
 }
 
@@ -140,7 +140,10 @@ mod tests {
     fn a_smooth_torque_is_continued_over_missing_rows() {
         let full = log(|t| (2.0 * t).cos()).completed(0.5);
         assert_eq!((full.rows(), full.leave_out.len()), (1000, 0));
-        assert_eq!(full.masked, [[10, 300, 301, 700, 803]]);
+        assert_eq!(
+            (full.masked, full.filled),
+            (vec![vec![10, 803]], vec![300, 301, 700])
+        );
         for row in [300, 301, 700] {
             let t = f64::from(u16::try_from(row).unwrap()) * 0.01;
             assert!((full.time[row] - t).abs() < 1e-9);

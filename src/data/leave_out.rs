@@ -165,6 +165,7 @@ mod tests {
             qd: vec![],
             tau: vec![],
             masked: vec![],
+            filled: vec![],
             leave_out: vec![],
             notes: vec![],
         }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io::{self, Write};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -53,9 +54,12 @@ pub struct Log {
     pub qd: Vec<Vec<f64>>,
     /// Joint torques \[N m\]; row i acts from `time[i]` to `time[i + 1]`.
     pub tau: Vec<Vec<f64>>,
-    /// Rows whose angles are not to be fitted, `[joint]`, in rising order: readings that jump, and rows put in where the
-    /// logger dropped some. Their angles are what the rows around them tell. May be empty: none in a log as it is read.
+    /// Rows whose angle jumps and is not to be fitted, `[joint]`, in rising order. The angle there is what the rows around
+    /// tell. May be empty: none in a log as it is read.
     pub masked: Vec<Vec<usize>>,
+    /// Rows put in where the logger dropped some, in rising order: all their channels are what the rows around tell. None
+    /// in a log as it is read.
+    pub filled: Vec<usize>,
     /// Intervals that are neither fitted nor scored, for instance because a person touched the rig.
     pub leave_out: Vec<Interval>,
     /// What a reader of the log should know about how it was read, one sentence each.
@@ -72,6 +76,7 @@ impl Log {
             qd: vec![Vec::new(); joints],
             tau: vec![Vec::new(); joints],
             masked: vec![Vec::new(); joints],
+            filled: Vec::new(),
             leave_out: Vec::new(),
             notes: Vec::new(),
         }
@@ -113,8 +118,15 @@ impl Log {
 
     /// Whether the angle of a joint, counted from 0, is not to be fitted at a row.
     pub fn is_masked(&self, joint: usize, row: usize) -> bool {
-        let rows = self.masked.get(joint);
-        rows.is_some_and(|rows| rows.binary_search(&row).is_ok())
+        let jumps = self.masked.get(joint);
+        jumps.is_some_and(|rows| rows.binary_search(&row).is_ok())
+            || self.filled.binary_search(&row).is_ok()
+    }
+
+    /// Whether the logger dropped none of these rows.
+    pub fn is_whole(&self, rows: RangeInclusive<usize>) -> bool {
+        let first = self.filled.partition_point(|row| row < rows.start());
+        self.filled.get(first).is_none_or(|row| row > rows.end())
     }
 
     /// The log as fits read it: readings that jump are masked, and rows that the logger dropped are put in, or left out
@@ -207,6 +219,7 @@ mod tests {
             qd: vec![vec![0.0; 3], vec![1e22, 0.0, -7.25]],
             tau: vec![vec![0.0; 3], vec![0.5; 3]],
             masked: vec![vec![]; 2],
+            filled: vec![],
             leave_out: vec![],
             notes: vec![],
         }

@@ -108,6 +108,7 @@ impl Table<'_> {
                 None => vec![vec![0.0; time.len()]; joints],
             },
             masked: vec![vec![]; joints],
+            filled: vec![],
             q,
             time,
             leave_out: vec![],

@@ -180,6 +180,7 @@ mod tests {
             qd: column(|t| 0.03 * (3.0 * t).cos()),
             tau: column(|t| (20.0 * t).sin() + (31.0 * t).cos()),
             masked: vec![Vec::new()],
+            filled: Vec::new(),
             leave_out: Vec::new(),
             notes: Vec::new(),
             time,

@@ -22,7 +22,16 @@ pub(super) fn remainder(outcome: &Outcome) -> String {
              exceeds white noise, and no probe lowers the loss by {:.0} %.",
             100.0 * settings.noteworthy
         ),
+        _ if left.omnibus.windows == 0 => "Whether the residuals are more than noise was not tested: the logger dropped rows in \
+             every window, and torques that nobody knows move the rig too. Record logs without gaps."
+            .to_owned(),
         _ => format!("The residuals cannot be told from sensor noise (p = {p})."),
+    };
+    let cut = if left.fraction < 1.0 {
+        let share = 100.0 * left.fraction;
+        format!("Of the residual variance above the sensor noise, {share:.1} % is left. ")
+    } else {
+        String::new()
     };
     let network = match &outcome.learned {
         Some(learned) if !learned.check.used => {
@@ -32,11 +41,10 @@ pub(super) fn remainder(outcome: &Outcome) -> String {
         _ => "",
     };
     format!(
-        "## What is left\n\nOf the residual variance above the sensor noise, {:.1} % is left. {structure}\n{network}\
+        "## What is left\n\n{cut}{structure}\n{network}\
          Residual generalised force: {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square over stretches of {} s in \
          N m or N.\n\n\
          ![residual](residual.svg)\n\n{}",
-        100.0 * left.fraction,
         force(&outcome.remainder.before),
         force(&outcome.remainder.after),
         settings.stretch_s,

@@ -91,6 +91,7 @@ fn apart(study: &Study<'_>) -> Vec<Log> {
             qd: vec![Vec::new(); log.joints()],
             tau: vec![Vec::new(); log.joints()],
             masked: vec![Vec::new(); log.joints()],
+            filled: Vec::new(),
             leave_out: Vec::new(),
             ..log.clone()
         };

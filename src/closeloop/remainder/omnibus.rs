@@ -18,9 +18,12 @@ use crate::identify::Values;
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Omnibus {
-    /// Probability of residuals so smooth in time if they were noise.
+    /// Probability of residuals so smooth in time if they were noise; 1 without a window to test.
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
+    /// Windows that were tested: those in which the logger dropped no row, since torques that nobody knows move the rig
+    /// too. Where there is none, shares are those of all windows.
+    pub windows: usize,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
     #[serde(rename = "share")]
     #[schemars(inner(range(min = 0, max = 1)))]
@@ -45,11 +48,13 @@ impl Omnibus {
 /// does not depend on how large the noise is, and one bad reading raises it no more than any noise does.
 pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
     let of_residuals = |windows: &[Window]| Energies::of(windows, |window| window.residual.clone());
-    let windows = windows(study, after);
+    let (tested, chosen) = chosen(study);
+    let windows = windows(study, after, &chosen);
+    let joints = study.declared.joints;
     let seeds: Vec<u64> = (0..study.settings.remainder.noise_draws)
         .map(|_| rng.random())
         .collect();
-    let declared = of_residuals(&self::windows(study, before));
+    let declared = of_residuals(&self::windows(study, before, &chosen));
     let found = of_residuals(&windows);
     let simulated: Vec<Energies> = seeds
         .into_par_iter()
@@ -58,7 +63,6 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
             Energies::of(&windows, |window| window.noise(&mut rng))
         })
         .collect();
-    let joints = study.declared.joints;
     let nulls: Vec<NoiseShare> = (0..joints).map(|j| NoiseShare::of(&simulated, j)).collect();
     let excess = |energies: &Energies| {
         let each = (0..joints).map(|j| nulls[j].excess(energies.shares[j]));
@@ -78,7 +82,12 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
             .sum()
     };
     Omnibus {
-        p_value: (1.0 + as_smooth) / (1.0 + trials),
+        p_value: if tested > 0 {
+            (1.0 + as_smooth) / (1.0 + trials)
+        } else {
+            1.0
+        },
+        windows: tested,
         shares: (0..joints)
             .map(|j| (1.0 - noise[j] / found.all[j].max(f64::MIN_POSITIVE)).max(0.0))
             .collect(),
@@ -101,7 +110,20 @@ struct Window {
     sensor: Vec<[f64; 2]>,
 }
 
-fn windows(study: &Study<'_>, fitted: &Fitted) -> Vec<Window> {
+/// How many windows have no row missing, and these or, where there is none, all.
+fn chosen(study: &Study<'_>) -> (usize, Vec<usize>) {
+    let windows = &study.shooting.windows;
+    let is_whole = |w: &usize| {
+        let window = windows[*w];
+        study.logs[window.log].is_whole(window.first..=window.last)
+    };
+    let all = 0..windows.len();
+    let whole: Vec<usize> = all.clone().filter(is_whole).collect();
+    let tested = whole.len();
+    (tested, if tested > 0 { whole } else { all.collect() })
+}
+
+fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> {
     let RemainderSettings {
         slow_waves,
         start_step,
@@ -121,11 +143,10 @@ fn windows(study: &Study<'_>, fitted: &Fitted) -> Vec<Window> {
             residuals(&locals)
         })
         .collect();
-    shooting
-        .windows
+    chosen
         .iter()
-        .enumerate()
-        .map(|(w, window)| {
+        .map(|&w| {
+            let window = shooting.windows[w];
             let rows = window.rows();
             let size = rows * joints;
             let unit = |i: usize| shooting.noise[i % joints];

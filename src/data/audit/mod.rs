@@ -100,6 +100,7 @@ mod tests {
             qd: vec![qd],
             tau: vec![tau],
             masked: vec![vec![]],
+            filled: vec![],
             leave_out: vec![],
             notes: vec![],
         }
