@@ -76,10 +76,25 @@ pub fn losses_by(folds: &Folds, fit: &Fit) -> Vec<f64> {
     let steps = steps_without(folds, fit);
     let stretches = fit.equations_by(&folds.stretches);
     let loss = |(part, &group): (&WindowTerms, &usize)| {
-        let step = &steps[group];
-        part.cost + part.gradient.dot(step) + 0.5 * step.dot(&(&part.hessian * step))
+        predicted(part.cost, &part.gradient, &part.hessian, &steps[group])
     };
     stretches.iter().zip(&folds.groups).map(loss).collect()
+}
+
+/// The loss after a step, taken as quadratic. Sums of squares are never negative: what falls far below zero is rounding, from
+/// a step along a value that nothing determines, and no loss is known there.
+pub fn predicted(
+    cost: f64,
+    gradient: &DVector<f64>,
+    hessian: &DMatrix<f64>,
+    step: &DVector<f64>,
+) -> f64 {
+    let loss = cost + gradient.dot(step) + 0.5 * step.dot(&(hessian * step));
+    if loss < -cost {
+        f64::INFINITY
+    } else {
+        loss.max(0.0)
+    }
 }
 
 /// For each group, the step of a fit's values when it is left out.

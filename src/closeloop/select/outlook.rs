@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::candidate::{beside, best_start, has_switch};
-use super::folds::{Folds, step_without};
+use super::folds::{Folds, predicted, step_without};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::identify::{Column, Fit, WindowTerms, as_it_stands, with_unit_diagonal};
@@ -160,8 +160,7 @@ impl Outlook {
             let step = &steps[group];
             let gradient = part.gradient.select_rows(&rows);
             let hessian = sub(&part.hessian, &rows, &rows);
-            // A quadratic may undershoot; no loss is negative.
-            (part.cost + gradient.dot(step) + 0.5 * step.dot(&(hessian * step))).max(0.0)
+            predicted(part.cost, &gradient, &hessian, step)
         };
         Some(
             self.stretches

@@ -1,8 +1,10 @@
 //! Sets are compared before they are fitted, on a simulated pendulum with dry friction.
 
+use nalgebra::{DMatrix, DVector};
+
 use super::candidate::candidates;
 use super::exchange::exchanges;
-use super::folds::{Folds, left_out_losses};
+use super::folds::{Folds, left_out_losses, predicted};
 use super::outlook::Outlook;
 use super::simpler::simpler;
 use super::trial::{Trial, key};
@@ -23,6 +25,17 @@ fn what_is_left_out_together_is_a_connected_part_of_one_log() {
         assert_eq!(*log, window.log);
     }
     assert!(logs_of.len() >= settings.select.fewest_groups);
+}
+
+#[test]
+fn a_loss_far_below_zero_is_rounding_and_no_loss() {
+    let one = |value: f64| DVector::from_element(1, value);
+    let curved = DMatrix::from_element(1, 1, 2.0);
+    assert_eq!(predicted(3.0, &one(2.0), &curved, &one(-1.0)), 2.0);
+    assert_eq!(predicted(1.0, &one(2.0), &curved, &one(-1.0)), 0.0);
+    let flat = DMatrix::zeros(1, 1);
+    let lost = predicted(3.0, &one(-1e-8), &flat, &one(1e12));
+    assert_eq!(lost, f64::INFINITY);
 }
 
 #[test]
