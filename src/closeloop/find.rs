@@ -4,10 +4,10 @@ use super::error::StudyError;
 use super::establish::{Standing, establish, without_each};
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
-use super::select::{Rival, Round, Search, candidates, left_out_losses, starts};
+use super::select::{Rival, Round, Search, Trial, candidates, left_out_losses, starts};
 use super::stage::{Progress, Stage};
 use super::study::Study;
-use crate::identify::FitError;
+use crate::identify::{FitError, Identifiability};
 use crate::model::{Library, Status};
 
 /// The result of searching the logs for what the declared model lacks.
@@ -56,10 +56,20 @@ pub fn find(
 ) -> Result<Found, StudyError> {
     progress(Stage::Fit.into());
     let before = study.fit_declared(library.effects())?;
-    let mut chosen = choose(study, library, &before, progress);
+    let mut chosen = choose(study, library, &before, progress, |search| {
+        search.select(before.clone())
+    });
     progress(Stage::Remainder.into());
-    let mut test = |after: &Fitted| unexplained(study, library.probes(), &before, after, rng);
-    let mut left = test(&chosen.after);
+    let mut left = unexplained(study, library.probes(), &before, &chosen.after, rng);
+    if (left.is_significant() || chosen.failure.is_some())
+        && study.has_time()
+        && let Some((identifiability, other)) = second_search(study, library, &before, progress)
+        && share_left(study, &before, &other.after) < share_left(study, &before, &chosen.after)
+    {
+        study.identifiability = identifiability;
+        chosen = other;
+        left = unexplained(study, library.probes(), &before, &chosen.after, rng);
+    }
     if left.is_significant()
         && share_left(study, &before, &chosen.after) > study.settings.establish.masking
     {
@@ -77,7 +87,7 @@ pub fn find(
     }
     if chosen.established() == 0 && !chosen.standings.is_empty() {
         // What is not established explains nothing.
-        left = test(&before);
+        left = unexplained(study, library.probes(), &before, &before, rng);
     }
     Ok(Found {
         before,
@@ -90,14 +100,34 @@ pub fn find(
 const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
 
+/// A search that begins over short windows and from the declared values: with most of the force missing, fits over longer
+/// ones end in minima from which no set of effects looks right, and where other parameters seem undetermined.
+fn second_search(
+    study: &Study<'_>,
+    library: &Library,
+    before: &Fitted,
+    progress: &mut dyn FnMut(Progress<'_>),
+) -> Option<(Identifiability, Chosen)> {
+    let mut study = study.again();
+    let declared = study.fit_over_short_windows().ok()?;
+    let short = study.over_short_windows();
+    let chosen = choose(&study, library, before, progress, |search| {
+        search.select_from(&short, declared)
+    });
+    let has_found = !chosen.standings.is_empty();
+    has_found.then(|| (study.identifiability.clone(), chosen))
+}
+
+/// `select` searches for a set of effects.
 fn choose(
     study: &Study<'_>,
     library: &Library,
     before: &Fitted,
     progress: &mut dyn FnMut(Progress<'_>),
+    select: impl FnOnce(&mut Search<'_, '_>) -> Result<Trial, FitError>,
 ) -> Chosen {
     let mut search = Search::new(study, library.effects(), progress);
-    let chosen = match search.select(before.clone()) {
+    let chosen = match select(&mut search) {
         Ok(chosen) => chosen,
         Err(failure) => {
             return Chosen {

@@ -155,9 +155,33 @@ impl<'a> Study<'a> {
         Shooting::new(self.logs, cut(self.logs, length_s), &self.shooting.noise)
     }
 
+    /// The same study over windows in which even a poor start does not diverge.
+    pub(super) fn over_short_windows(&self) -> Self {
+        let shooting = self.windows_of(self.settings.fit.short_window_s);
+        Self {
+            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
+            shooting,
+            ..self.again()
+        }
+    }
+
+    /// The declared model at the values that its fit began with.
+    pub(super) fn started_from(&self) -> Model {
+        let mut model = self.declared.clone();
+        for parameter in &mut model.parameters {
+            let moved = self
+                .moved_to
+                .iter()
+                .find(|moved| moved.name == parameter.name);
+            *parameter = moved.unwrap_or(parameter).clone();
+        }
+        model
+    }
+
     /// This study once more.
     pub(super) fn again(&self) -> Self {
         Self {
+            moved_to: self.moved_to.clone(),
             identifiability: self.identifiability.clone(),
             ..self.on(self.logs)
         }

@@ -13,9 +13,10 @@ use super::remainder::ResidualForce;
 use super::request::Request;
 use super::run::close_loop;
 use super::score::{Scorer, findings};
-use super::select::Trial;
+use super::select::{Search, Trial};
 use super::settings::Settings;
 use super::split::Split;
+use super::stage::Progress;
 use super::study::Study;
 use super::verdict::{Verdict, verdict};
 use crate::data::{Joint, Log};
@@ -272,6 +273,71 @@ fn a_changed_setting_changes_the_search() {
     assert_eq!(named(&settings), 1);
     settings.select.most_effects = 0;
     assert_eq!(named(&settings), 0);
+}
+
+#[test]
+fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let mut study = Study::new(&declared, &logs, &settings);
+    let library = Library::built_in();
+    let from_long = study.fit_declared(library.effects()).unwrap();
+    let from_short = study.fit_over_short_windows().unwrap();
+    let short = study.over_short_windows();
+    assert!(short.shooting.windows.len() > 2 * study.shooting.windows.len());
+    let labels = |trial: &Trial| -> Vec<String> {
+        let effects = trial.fitted.model.effects.iter();
+        effects.map(FittedEffect::label).collect()
+    };
+    let mut unheard = |_: Progress<'_>| {};
+    let mut search = Search::new(&study, library.effects(), &mut unheard);
+    let long = search.select(from_long).unwrap();
+    let both = search.select_from(&short, from_short).unwrap();
+    assert_eq!(labels(&long), ["coulomb_friction on joint 1"]);
+    assert_eq!(labels(&both), labels(&long));
+    assert!(
+        (both.loss() * both.fitted.fit.scale.powi(2)
+            / (long.loss() * long.fitted.fit.scale.powi(2))
+            - 1.0)
+            .abs()
+            < 1e-3
+    );
+}
+
+/// Torques that change from row to row, of which the logger dropped some: what the rig did then nobody knows.
+#[test]
+fn windows_with_dropped_rows_do_not_count_as_unexplained() {
+    const ROUGH: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 15.0], tones = 30 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
+"#;
+    let with_dropped = |mut log: Log| {
+        let kept = |row: &usize| *row > 500 || row % 20 != 7;
+        let of = |column: &[f64]| {
+            (0..column.len())
+                .filter(kept)
+                .map(|row| column[row])
+                .collect()
+        };
+        log.q = log.q.iter().map(|column| of(column)).collect();
+        log.qd = log.qd.iter().map(|column| of(column)).collect();
+        log.tau = log.tau.iter().map(|column| of(column)).collect();
+        log.time = of(&log.time);
+        log.for_fits(0.5)
+    };
+    let (declared, settings) = (pendulum(), Settings::default());
+    let mut logs: Vec<Log> = recorded(ROUGH, 0).into_iter().map(with_dropped).collect();
+    let found = |logs: &[Log]| search(&mut Study::new(&declared, logs, &settings)).unexplained;
+    let left = found(&logs);
+    assert!(!left.is_significant(), "{left:?}");
+    assert!((1..30).contains(&left.omnibus.windows), "{left:?}");
+    for log in &mut logs {
+        assert_eq!(log.filled.len(), 25);
+        log.masked = vec![std::mem::take(&mut log.filled)];
+    }
+    assert!(found(&logs).is_significant(), "were they counted");
 }
 
 /// An inertia a fifth of the rig's and a moment five times as large make the mass matrix indefinite.

@@ -67,7 +67,32 @@ impl<'a, 'p> Search<'a, 'p> {
     pub fn select(&mut self, declared: Fitted) -> Result<Trial, FitError> {
         let study = self.study;
         let declared = Trial::of(study, declared);
-        let mut best = self.first(declared.clone());
+        let first = self.first(declared.clone());
+        let best = self.rounds_from(first)?;
+        let simplest = self.simplest(&best)?;
+        let is_declared = study.added(&simplest.fitted.model).is_empty();
+        Ok(if is_declared { declared } else { simplest })
+    }
+
+    /// As [`Search::select`], where the search begins over short windows, with a fit of the declared model there.
+    ///
+    /// # Errors
+    /// A model found there that cannot be fitted over longer windows, or a selected one that cannot be fitted again.
+    pub fn select_from(&mut self, short: &Study<'_>, declared: Fitted) -> Result<Trial, FitError> {
+        let study = self.study;
+        let mut search = Search::new(short, self.library, self.progress);
+        let first = search.first(Trial::of(short, declared));
+        let best = search.rounds_from(first)?;
+        self.rounds = search.rounds;
+        let locals = study.shooting.initial_locals(0);
+        let fitted = study.refit(&best.fitted.model, locals, None)?;
+        let best = self.rounds_from(Trial::of(study, fitted))?;
+        self.simplest(&best)
+    }
+
+    /// Add effects and exchange them, round by round, as long as each is better than the last.
+    fn rounds_from(&mut self, mut best: Trial) -> Result<Trial, FitError> {
+        let study = self.study;
         let mut passed = vec![best.key()];
         for _ in 0..study.settings.select.rounds {
             if !study.has_time() {
@@ -95,10 +120,7 @@ impl<'a, 'p> Search<'a, 'p> {
             }
             passed.push(best.key());
         }
-        self.say("simplifying");
-        let simplest = self.simplest(&best)?;
-        let is_declared = study.added(&simplest.fitted.model).is_empty();
-        Ok(if is_declared { declared } else { simplest })
+        Ok(best)
     }
 
     /// The best of a round that is better than what the round began with by this share of the loss, and not worse in its
@@ -247,7 +269,8 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Drop effects, or put simpler ones in their place, as long as the set explains the logs as well as the best one.
-    fn simplest(&self, best: &Trial) -> Result<Trial, FitError> {
+    fn simplest(&mut self, best: &Trial) -> Result<Trial, FitError> {
+        self.say("simplifying");
         let study = self.study;
         let declared = study.declared.effects.len();
         let mut current = self.least(best, best);
