@@ -22,9 +22,6 @@ pub(super) fn remainder(outcome: &Outcome) -> String {
              exceeds white noise, and no probe lowers the loss by {:.0} %.",
             100.0 * settings.noteworthy
         ),
-        _ if left.omnibus.windows == 0 => "Whether the residuals are more than noise was not tested: the logger dropped rows in \
-             every window, and torques that nobody knows move the rig too. Record logs without gaps."
-            .to_owned(),
         _ => format!("The residuals cannot be told from sensor noise (p = {p})."),
     };
     let cut = if left.fraction < 1.0 {

@@ -18,11 +18,11 @@ use crate::identify::Values;
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Omnibus {
-    /// Probability of residuals so smooth in time if they were noise; 1 without a window to test.
+    /// Probability of residuals so smooth in time if they were noise.
     #[schemars(range(min = 0, max = 1))]
     pub p_value: f64,
     /// Windows that were tested: those in which the logger dropped no row, since torques that nobody knows move the rig
-    /// too. Where there is none, shares are those of all windows.
+    /// too; where there is none, all.
     pub windows: usize,
     /// Share of the residuals' variance that white noise does not explain, one a joint.
     #[serde(rename = "share")]
@@ -48,7 +48,7 @@ impl Omnibus {
 /// does not depend on how large the noise is, and one bad reading raises it no more than any noise does.
 pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
     let of_residuals = |windows: &[Window]| Energies::of(windows, |window| window.residual.clone());
-    let (tested, chosen) = chosen(study);
+    let chosen = chosen(study);
     let windows = windows(study, after, &chosen);
     let joints = study.declared.joints;
     let seeds: Vec<u64> = (0..study.settings.remainder.noise_draws)
@@ -82,12 +82,8 @@ pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut imp
             .sum()
     };
     Omnibus {
-        p_value: if tested > 0 {
-            (1.0 + as_smooth) / (1.0 + trials)
-        } else {
-            1.0
-        },
-        windows: tested,
+        p_value: (1.0 + as_smooth) / (1.0 + trials),
+        windows: chosen.len(),
         shares: (0..joints)
             .map(|j| (1.0 - noise[j] / found.all[j].max(f64::MIN_POSITIVE)).max(0.0))
             .collect(),
@@ -110,8 +106,8 @@ struct Window {
     sensor: Vec<[f64; 2]>,
 }
 
-/// How many windows have no row missing, and these or, where there is none, all.
-fn chosen(study: &Study<'_>) -> (usize, Vec<usize>) {
+/// The windows in which no row is missing or, where there is none, all.
+fn chosen(study: &Study<'_>) -> Vec<usize> {
     let windows = &study.shooting.windows;
     let is_whole = |w: &usize| {
         let window = windows[*w];
@@ -119,8 +115,11 @@ fn chosen(study: &Study<'_>) -> (usize, Vec<usize>) {
     };
     let all = 0..windows.len();
     let whole: Vec<usize> = all.clone().filter(is_whole).collect();
-    let tested = whole.len();
-    (tested, if tested > 0 { whole } else { all.collect() })
+    if whole.is_empty() {
+        all.collect()
+    } else {
+        whole
+    }
 }
 
 fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> {
