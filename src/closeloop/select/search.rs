@@ -113,14 +113,20 @@ impl<'a, 'p> Search<'a, 'p> {
                     }
                 }
             };
-            // The scale of the residuals has fallen: it is estimated anew, so that smaller effects show.
-            best = Trial::of(study, study.estimate(&next.fitted)?);
+            best = self.estimated(next)?;
             if passed.contains(&best.key()) {
                 break;
             }
             passed.push(best.key());
         }
         Ok(best)
+    }
+
+    /// A trial at a scale of its own: the residuals have fallen, and smaller effects show. It stays at the one it has where no
+    /// loss is known at the new one.
+    fn estimated(&self, trial: Trial) -> Result<Trial, FitError> {
+        let anew = Trial::of(self.study, self.study.estimate(&trial.fitted)?);
+        Ok(if anew.loss().is_finite() { anew } else { trial })
     }
 
     /// The best of a round that is better than what the round began with by this share of the loss, and not worse in its
@@ -166,8 +172,8 @@ impl<'a, 'p> Search<'a, 'p> {
             let fitted = search.fitted_for_the_best(declared, blocks);
             search.noted(declared, fitted, 0)
         });
-        match best.map(|best| study.estimate(&best.fitted)) {
-            Some(Ok(fitted)) => Trial::of(study, fitted),
+        match best.map(|best| self.estimated(best)) {
+            Some(Ok(best)) => best,
             _ => declared,
         }
     }
@@ -296,7 +302,7 @@ impl<'a, 'p> Search<'a, 'p> {
             };
             match good.into_iter().min_by(order) {
                 Some(simpler) => current = self.least(&simpler, best),
-                None => return Ok(Trial::of(study, study.estimate(&current.fitted)?)),
+                None => return self.estimated(current),
             }
         }
     }
