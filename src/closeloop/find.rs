@@ -108,14 +108,15 @@ fn second_search(
     before: &Fitted,
     progress: &mut dyn FnMut(Progress<'_>),
 ) -> Option<(Identifiability, Chosen)> {
+    let mut short = study.over_short_windows();
+    let declared = short.fit_started().ok()?;
     let mut study = study.again();
-    let declared = study.fit_over_short_windows().ok()?;
-    let short = study.over_short_windows();
+    study.identifiability = short.identifiability.clone();
     let chosen = choose(&study, library, before, progress, |search| {
         search.select_from(&short, declared)
     });
     let has_found = !chosen.standings.is_empty();
-    has_found.then(|| (study.identifiability.clone(), chosen))
+    has_found.then_some((study.identifiability, chosen))
 }
 
 /// `select` searches for a set of effects.

@@ -93,15 +93,14 @@ impl Study<'_> {
         Ok((last, study.identifiability))
     }
 
-    /// The declared model, fitted over short windows from the values that its fit began with. What they do not determine
-    /// is held.
+    /// The declared model, fitted over the study's windows alone from the values that its fit began with. What they do not
+    /// determine is held.
     ///
     /// # Errors
     /// As [`Study::fit_declared`].
-    pub(super) fn fit_over_short_windows(&mut self) -> Result<Fitted, FitError> {
+    pub(super) fn fit_started(&mut self) -> Result<Fitted, FitError> {
         self.identifiability = Identifiability::default();
-        let short = self.windows_of(self.settings.fit.short_window_s);
-        let (fitted, held) = self.fit_and_hold(&short, &self.started_from())?;
+        let (fitted, held) = self.fit_and_hold(&self.shooting, &self.started_from())?;
         self.hold(held);
         Ok(fitted)
     }

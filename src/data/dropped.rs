@@ -106,12 +106,10 @@ impl Log {
             channel.splice(row + 1..row + 1, new);
         }
         self.time.splice(row + 1..row + 1, times);
-        for masked in &mut self.masked {
-            let later = masked.iter_mut().filter(|at| **at > row);
+        for marked in self.masked.iter_mut().chain([&mut self.filled]) {
+            let later = marked.iter_mut().filter(|at| **at > row);
             later.for_each(|at| *at += count);
         }
-        let later = self.filled.iter_mut().filter(|at| **at > row);
-        later.for_each(|at| *at += count);
         self.filled.extend(row + 1..=row + count);
         self.filled.sort_unstable();
     }
