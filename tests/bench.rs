@@ -49,10 +49,11 @@ fn known(library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
 }
 
 /// Memory and sensors are no part of the equations of motion.
-const NOT_IN_THE_EQUATIONS: [&str; 5] = [
+const NOT_IN_THE_EQUATIONS: [&str; 6] = [
     "actuator_delay",
     "actuator_lag",
     "backlash",
+    "encoder_eccentricity",
     "sensor_offset",
     "parameter_shift",
 ];

@@ -282,10 +282,11 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 #[test]
 fn every_effect_file_is_tested_here() {
     let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
-    // Those with memory are tested in memory.rs.
+    // Those with memory and those of the sensor are tested in memory.rs, a tilt, a rotor and an offset above.
     tested.extend([
         "gravity_tilt",
         "rotor_inertia",
+        "encoder_eccentricity",
         "sensor_offset",
         "actuator_delay",
         "actuator_lag",

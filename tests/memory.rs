@@ -1,4 +1,7 @@
-//! Effects with memory: what they make of a torque, how sensitive motion is to them, and that they are found.
+//! Effects with memory and those of the sensor: what they make of a torque or an angle, how sensitive motion is to them,
+//! and that they are found.
+
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use residyn::data::Log;
 use residyn::expr::SignForm;
@@ -211,11 +214,12 @@ fn recorded(effect: &str) -> (tempfile::TempDir, Vec<String>) {
 }
 
 #[test]
-fn closing_the_loop_names_the_effect_with_memory() {
+fn closing_the_loop_names_the_effect_with_memory_or_of_the_sensor() {
     for (setting, name, truth) in [
         ("actuator_delay=0.01", "actuator_delay", 0.01),
         ("actuator_lag=0.02", "actuator_lag", 0.02),
         ("backlash=0.01", "backlash", 0.01),
+        ("encoder_eccentricity=0.01", "encoder_eccentricity", 0.01),
     ] {
         let (folder, logs) = recorded(setting);
         let [a, b, c, test] = [0, 1, 2, 3].map(|k| logs[k].as_str());
@@ -350,6 +354,19 @@ fn play_separates_the_measured_angle_from_the_links() {
             1e-12,
             "link",
         );
+    }
+}
+
+#[test]
+fn a_disc_off_its_axis_reads_ahead_and_behind() {
+    let library = Library::built_in();
+    let disc = library.effect("encoder_eccentricity").unwrap();
+    let model = pendulum(&[fitted(disc, 0, &[0.02, -0.01])]);
+    let mut sensors = Sensors::<1>::new(&model);
+    for (angle, ahead) in [(0.0, -0.01), (FRAC_PI_2, 0.02), (PI, 0.01)] {
+        let state = [Row([angle]), Row([0.0])];
+        let shown = sensors.show(&state, || vec![Row([0.0])], Row([0.0]))[0][0];
+        assert_near(shown, angle + ahead, 1e-12, "angle shown");
     }
 }
 

@@ -173,6 +173,7 @@ impl Machine {
                 let (stiffness, inertia) = (n("k")?, n("J")?);
                 self.transmissions[j] = Some(Transmission::compliance(stiffness, inertia));
             }
+            "encoder_eccentricity" => self.eccentricity[j] = [n("e_s")?, n("e_c")?],
             // Of the sensor, not of the machine: each log draws its own.
             "sensor_offset" => drop(n("q_z")?),
             name => return Err(format!("`{name}` is no effect of joint {}", hidden.joint)),
@@ -191,6 +192,8 @@ impl Machine {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
     use super::Hidden;
     use crate::bench::drive::Approach;
     use crate::bench::machine::{Machine, State};
@@ -318,5 +321,15 @@ mod tests {
             state.motor_q = [0.5, 0.6];
             assert_eq!(machine.encoders(&state), [0.5, 0.3]);
         }
+    }
+
+    #[test]
+    fn a_disc_off_its_axis_reads_ahead_and_behind() {
+        let disc = hidden("encoder_eccentricity", &[("e_s", 0.02), ("e_c", -0.01)]);
+        let machine = Machine::with(double_pendulum(), &[disc]).unwrap();
+        let read = |q: f64| machine.encoders(&State::at_rest([q, 0.3]));
+        assert_eq!(read(0.0), [-0.01, 0.3]);
+        assert!((read(FRAC_PI_2)[0] - FRAC_PI_2 - 0.02).abs() < 1e-15);
+        assert!((read(PI)[0] - PI - 0.01).abs() < 1e-15);
     }
 }

@@ -20,6 +20,8 @@ pub struct Machine {
     pub presliding: Vec<(usize, Presliding)>,
     pub transmissions: [Option<Transmission>; 2],
     pub drives: [Drive; 2],
+    /// By how much each encoder reads too much \[rad\]: the parts that follow the sine and the cosine of its angle.
+    pub eccentricity: [Pair; 2],
 }
 
 /// State of a rig: positions in rad, speeds in rad/s. Motor entries are used only behind a transmission, bristle
@@ -80,6 +82,7 @@ impl Machine {
             presliding: Vec::new(),
             transmissions: [None, None],
             drives: [Drive::default(), Drive::default()],
+            eccentricity: [[0.0; 2]; 2],
         }
     }
 
@@ -93,11 +96,16 @@ impl Machine {
         self.mechanics.declared(self.rotor[0] + motor)
     }
 
-    /// Encoder angles: those of the motors where a transmission follows, else those of the joints.
+    /// What the encoders read: angles of the motors where a transmission follows, else those of the joints, by discs
+    /// that may be off their axes.
     pub fn encoders(&self, state: &State) -> Pair {
-        [0, 1].map(|j| match self.transmissions[j] {
-            Some(_) => state.motor_q[j],
-            None => state.q[j],
+        [0, 1].map(|j| {
+            let angle = match self.transmissions[j] {
+                Some(_) => state.motor_q[j],
+                None => state.q[j],
+            };
+            let [by_sine, by_cosine] = self.eccentricity[j];
+            angle + by_sine * angle.sin() + by_cosine * angle.cos()
         })
     }
 

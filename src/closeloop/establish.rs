@@ -67,7 +67,7 @@ pub(super) fn establish(
                 Status::Supported
             },
             gain: evidence.gain,
-            p_value: evidence.p_of_values.unwrap_or(evidence.p_of_falls),
+            p_value: evidence.p(&study.settings.establish),
             reason,
             without: Ok(less.fitted.clone()),
         }
@@ -99,13 +99,23 @@ struct Evidence {
 }
 
 impl Evidence {
+    /// The p-value of the values or, where they say little, the smaller one.
+    fn p(&self, settings: &EstablishSettings) -> f64 {
+        let of_values = self.p_of_values.unwrap_or(self.p_of_falls);
+        match of_values < settings.significant_alone {
+            true => of_values,
+            false => of_values.min(self.p_of_falls),
+        }
+    }
+
     /// What is missing for the effect to be established.
     fn lack(&self, trials: usize, settings: &EstablishSettings) -> Option<String> {
         #[allow(clippy::cast_precision_loss)] // few trials
         let level = settings.false_alarm / trials.max(1) as f64;
-        let p = self.p_of_values.unwrap_or(self.p_of_falls);
-        let significant = p < level
-            || self.gain > settings.plain && p.min(self.p_of_falls) < settings.significant_alone;
+        let p = self.p(settings);
+        let of_values = self.p_of_values.unwrap_or(self.p_of_falls);
+        let significant =
+            of_values < level || self.gain > settings.plain && p < settings.significant_alone;
         if self.gain < settings.worthwhile {
             return Some(format!(
                 "it lowers the loss on left-out stretches by {:.1} % only",

@@ -13,7 +13,8 @@ pub(super) struct Exchange {
 
 /// Sets of effects in which one of a model's is replaced by another that it is easily confused with, on the same joint.
 /// Seen from the model itself, such a pair promises little: each does most of what the other does. An effect with a whole
-/// number, found where the rest of the set was another, is also exchanged for itself with another number.
+/// number, found where the rest of the set was another, is also exchanged for itself with another number: the one that
+/// promises most, and those next to its own.
 pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) -> Vec<Exchange> {
     let declared = study.declared.effects.len();
     let mut sets = Vec::new();
@@ -31,15 +32,18 @@ pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) 
         for new in acting(study, &like) {
             let present = &rest.model.effects;
             let is_free = !present.iter().any(|p| p.excludes(&new) || p.contains(&new));
-            if new.joint == old.joint
-                && is_free
-                && let Some(start) = in_place_of(study, &rest, &old, &new)
-            {
-                let mut set = present[declared..].to_vec();
-                let labels = [identity(&old), identity(&start)];
-                set.push(start);
-                sets.push(Exchange { set, labels });
+            if new.joint != old.joint || !is_free {
+                continue;
             }
+            let mut starts = Vec::from_iter(in_place_of(study, &rest, &old, &new));
+            if new.effect.name == old.effect.name {
+                starts.extend(with_numbers_beside(study, &rest, &old));
+            }
+            sets.extend(starts.into_iter().map(|start| {
+                let labels = [identity(&old), identity(&start)];
+                let set = [&present[declared..], &[start]].concat();
+                Exchange { set, labels }
+            }));
         }
     }
     sets
@@ -59,6 +63,31 @@ fn in_place_of(
     };
     let carried = carried_over(old, &absent).filter(promises_more);
     Some(carried.unwrap_or(absent))
+}
+
+/// An effect with the whole numbers next to its own among those that are searched.
+fn with_numbers_beside(study: &Study<'_>, rest: &Fitted, old: &FittedEffect) -> Vec<FittedEffect> {
+    let mut starts = Vec::new();
+    for (k, parameter) in old.effect.parameters.iter().enumerate() {
+        if !parameter.whole {
+            continue;
+        }
+        let own = old.values[k].0;
+        let numbers = || parameter.starts.iter().copied();
+        let below = numbers().filter(|number| *number < own).reduce(f64::max);
+        let above = numbers().filter(|number| *number > own).reduce(f64::min);
+        for number in below.into_iter().chain(above) {
+            let mut single = old.clone();
+            single.effect.parameters[k].starts = vec![number];
+            starts.extend(
+                best_start(study, rest, &single).map(|(start, _)| FittedEffect {
+                    effect: old.effect.clone(),
+                    ..start
+                }),
+            );
+        }
+    }
+    starts
 }
 
 /// An effect at the value of another, where each has one, in the same unit.

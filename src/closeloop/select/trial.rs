@@ -40,8 +40,8 @@ impl Trial {
         effects.filter(|effect| effect.shifted().is_some()).count()
     }
 
-    /// Whether every added effect has values that are consistent with each other and that the logs tell from all others,
-    /// and a shape that they determine: a value that gives an effect its shape and stands at a bound was not found there.
+    /// Whether every added effect has values that are consistent with each other and that the logs tell from all others:
+    /// a value that stands at a bound was not found there, unless it is zero and the effect absent.
     pub fn is_valid(&self, study: &Study<'_>) -> bool {
         self.is_consistent(study) && self.is_determined(study)
     }
@@ -64,7 +64,8 @@ impl Trial {
             let mut shapes = effect.effect.parameters.iter().zip(&values);
             let is_inside = |(parameter, value): (&EffectParameter, &f64)| {
                 let [low, high] = parameter.bounds;
-                parameter.is_switch() || parameter.whole || (low < *value && *value < high)
+                let is_absent = parameter.is_switch() && *value == 0.0;
+                is_absent || parameter.whole || (low < *value && *value < high)
             };
             effect.effect.is_valid(&values) && shapes.all(is_inside)
         })
