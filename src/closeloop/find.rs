@@ -89,6 +89,7 @@ pub fn find(
         // What is not established explains nothing.
         left = unexplained(study, library.probes(), &before, &before, rng);
     }
+    study.identifiability = study.identifiability_of(&chosen.after);
     Ok(Found {
         before,
         chosen,

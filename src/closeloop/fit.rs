@@ -5,7 +5,7 @@ use super::fitted::Fitted;
 use super::select::usual_friction;
 use super::start::around;
 use super::study::Study;
-use crate::identify::{FitError, Identifiability, Shooting, fit, identifiability};
+use crate::identify::{FitError, Identifiability, Shooting, Values, fit, identifiability};
 use crate::model::{Effect, FittedEffect, Model};
 
 /// The declared model, fitted, and what the logs determine of it.
@@ -23,9 +23,8 @@ impl Study<'_> {
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
     /// windows, in which even a poor start does not diverge, then over longer ones. It is fitted twice: alone, and with
     /// the friction that most machines have on every joint until the last fit, since without friction the first optimum
-    /// of a rig that has it may lie anywhere. The better of the two counts. Parameters that the logs do not determine are
-    /// found on the way and held from then on at the values reached: only those are sure to be compatible with the
-    /// bounds of the others. A model that diverges with its declared values is fitted from others around them.
+    /// of a rig that has it may lie anywhere. The better of the two counts. Parameters that the logs do not determine stay
+    /// near the declared values. A model that diverges with its declared values is fitted from others around them.
     ///
     /// # Errors
     /// No window, or a model that diverges even over short windows, from all starting values.
@@ -68,83 +67,57 @@ impl Study<'_> {
         }
     }
 
-    /// The declared model, fitted from these values beside some effects and then alone.
+    /// The declared model, fitted from these values beside some effects and then alone, and what the logs determine of it
+    /// beside them.
     fn declared_beside(
         &self,
         start: &Model,
         effects: &[FittedEffect],
     ) -> Result<Declared, FitError> {
-        let mut study = self.again();
         let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
         let model = start.with_effects([own.as_slice(), effects].concat());
-        let (first, held) = study.fit_and_hold(&short, &model)?;
-        study.hold(held);
-        let (mut last, held) = study.fit_and_hold(&self.shooting, &first.model)?;
-        study.hold(held);
-        if !effects.is_empty() {
-            let alone = last
-                .model
-                .with_effects(last.model.effects[..own.len()].to_vec());
-            let (fitted, held) = study.fit_and_hold(&self.shooting, &alone)?;
-            study.hold(held);
-            last = fitted;
+        let first = self.fitted_over(&short, &model)?;
+        let fitted = self.fitted_over(&self.shooting, &first.model)?;
+        let identifiability = self.identifiability_of(&fitted);
+        if effects.is_empty() {
+            return Ok((fitted, identifiability));
         }
-        Ok((last, study.identifiability))
+        let own = fitted.model.effects[..own.len()].to_vec();
+        let alone = self.fitted_over(&self.shooting, &fitted.model.with_effects(own))?;
+        Ok((alone, identifiability))
     }
 
-    /// The declared model, fitted over the study's windows alone from the values that its fit began with. What they do not
-    /// determine is held.
+    /// The declared model, fitted over the study's windows alone from the values that its fit began with.
     ///
     /// # Errors
     /// As [`Study::fit_declared`].
     pub(super) fn fit_started(&mut self) -> Result<Fitted, FitError> {
-        self.identifiability = Identifiability::default();
-        let (fitted, held) = self.fit_and_hold(&self.shooting, &self.started_from())?;
-        self.hold(held);
+        let fitted = self.fitted_over(&self.shooting, &self.started_from())?;
+        self.identifiability = self.identifiability_of(&fitted);
         Ok(fitted)
     }
 
-    fn fit_and_hold(
-        &self,
-        shooting: &Shooting<'_>,
-        model: &Model,
-    ) -> Result<(Fitted, Identifiability), FitError> {
+    fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
         let dynamics = model.dynamics();
-        let active = self.active(&dynamics);
         let locals = shooting.initial_locals(0);
-        let (values, free) = fit(shooting, &dynamics, &active, locals, None)?;
-        // An effect that the file carries stays free; one that is fitted beside it goes again.
-        let declared = model.parameters.len();
-        let carried = 0..self.declared.effects.len();
-        let carried = carried.fold(declared..declared, |all, k| {
-            all.start..model.place_of(k).end
-        });
-        let mut verdict = identifiability(&dynamics, &carried, &values, &free);
-        verdict.hold.retain(|&k| k < declared);
-        let columns = free.columns.iter();
-        verdict.free = columns
-            .filter(|column| column.parameter < carried.end)
-            .count();
-        if verdict.hold.is_empty() {
-            let fitted = Fitted::new(&model, &dynamics, (values, free), self.logs);
-            return Ok((fitted, verdict));
-        }
-        let kept = |k: &usize| !verdict.hold.contains(k);
-        let active: Vec<usize> = active.into_iter().filter(kept).collect();
-        let start = values.put_into(&dynamics, self.logs);
-        let found = fit(shooting, &start, &active, free.locals, None)?;
-        Ok((Fitted::new(&model, &start, found, self.logs), verdict))
+        let found = fit(shooting, &dynamics, &self.active(&dynamics), locals, None)?;
+        Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 
-    fn hold(&mut self, verdict: Identifiability) {
-        self.identifiability
-            .undetermined
-            .extend(verdict.undetermined);
-        self.identifiability.free = self.identifiability.free.max(verdict.free);
-        self.identifiability.hold.extend(verdict.hold);
-        self.identifiability.determined =
-            self.identifiability.free - self.identifiability.hold.len();
+    /// What the logs determine of the declared parameters and of the effects that the file carries, beside all that a fitted
+    /// model has.
+    pub(super) fn identifiability_of(&self, fitted: &Fitted) -> Identifiability {
+        let dynamics = self.smoothed(&fitted.model).dynamics();
+        let values = Values::of(&dynamics, self.logs);
+        let effects = self.declared.parameters.len()..dynamics.parameters.len();
+        let mut verdict = identifiability(&dynamics, &effects, &values, &fitted.fit);
+        let carried = self.declared.effects.len().checked_sub(1);
+        let end = carried.map_or(effects.start, |last| fitted.model.place_of(last).end);
+        let columns = fitted.fit.columns.iter();
+        verdict.free = columns.filter(|column| column.parameter < end).count();
+        verdict.determined = verdict.free - verdict.hold.len();
+        verdict
     }
 }

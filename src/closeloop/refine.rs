@@ -3,7 +3,7 @@
 use super::fitted::Fitted;
 use super::settings::RefineSettings;
 use super::study::Study;
-use crate::identify::{FitError, Shooting, uncertainty};
+use crate::identify::{FitError, uncertainty};
 use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
@@ -40,15 +40,17 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
 
 impl Study<'_> {
     /// The same study in finer steps, to estimate a model that has been chosen. A width of friction's reversal that
-    /// the model file gives stays.
+    /// the model file gives stays, and so do parameters that the logs do not determine: the intervals of the others are
+    /// relative to them.
     pub fn refined(&self) -> Self {
         let RefineSettings { step_s, narrower } = self.settings.refine;
         let narrower = self.declared.sign_width.as_ref().map_or(narrower, |_| 1.0);
         let sign_widths: Vec<f64> = self.sign_widths.iter().map(|w| narrower * w).collect();
         let windows = self.shooting.windows.clone();
-        let shooting = Shooting::new(self.logs, windows, &self.shooting.noise);
+        let shooting = self.shooting.over(windows);
         Self {
             sign_widths,
+            held: self.identifiability.hold.clone(),
             shooting: shooting.in_steps_of(step_s),
             ..self.again()
         }

@@ -29,8 +29,10 @@ pub struct Study<'a> {
     /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
     /// else empty.
     pub moved_to: Vec<Parameter>,
-    /// What the logs determine of the declared parameters; those in `hold` are held in every fit.
+    /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
+    /// Declared parameters that are held in every fit.
+    pub held: Vec<usize>,
 }
 
 /// Some of a study's windows.
@@ -46,7 +48,7 @@ impl<'a> Sample<'a> {
         let members: Vec<usize> = (0..shooting.windows.len()).step_by(every).collect();
         let windows = members.iter().map(|&w| shooting.windows[w]).collect();
         Self {
-            shooting: Shooting::new(shooting.logs, windows, &shooting.noise),
+            shooting: shooting.over(windows),
             members,
         }
     }
@@ -104,7 +106,8 @@ impl<'a> Study<'a> {
                 .collect()
         };
         let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
-        let shooting = Shooting::new(logs, cut(logs, window_s), &noise);
+        let windows = cut(logs, window_s);
+        let shooting = Shooting::new(logs, windows, &noise).near(&declared.parameters);
         Self {
             declared,
             settings,
@@ -118,6 +121,7 @@ impl<'a> Study<'a> {
             deadline: None,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
+            held: Vec::new(),
         }
     }
 
@@ -134,6 +138,7 @@ impl<'a> Study<'a> {
     {
         let windows = cut(logs, self.settings.fit.window_s);
         let shooting = Shooting::new(logs, windows, &self.shooting.noise);
+        let shooting = shooting.near(&self.declared.parameters);
         Study {
             declared: self.declared,
             settings: self.settings,
@@ -147,12 +152,13 @@ impl<'a> Study<'a> {
             deadline: self.deadline,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
+            held: Vec::new(),
         }
     }
 
     /// Its logs, cut into windows of this length in s.
     pub(super) fn windows_of(&self, length_s: f64) -> Shooting<'a> {
-        Shooting::new(self.logs, cut(self.logs, length_s), &self.shooting.noise)
+        self.shooting.over(cut(self.logs, length_s))
     }
 
     /// The same study over windows in which even a poor start does not diverge.
@@ -183,6 +189,7 @@ impl<'a> Study<'a> {
         Self {
             moved_to: self.moved_to.clone(),
             identifiability: self.identifiability.clone(),
+            held: self.held.clone(),
             ..self.on(self.logs)
         }
     }
@@ -278,10 +285,14 @@ impl<'a> Study<'a> {
         self.smoothed(&model).dynamics()
     }
 
+    /// Whether the logs determine a parameter: other values are not told from one that they do not.
+    pub(super) fn is_told(&self, parameter: usize) -> bool {
+        !self.identifiability.hold.contains(&parameter)
+    }
+
     /// Parameters that a fit may change.
     pub fn active(&self, dynamics: &Dynamics) -> Vec<usize> {
-        let free =
-            |k: &usize| !dynamics.parameters[*k].fixed && !self.identifiability.hold.contains(k);
+        let free = |k: &usize| !dynamics.parameters[*k].fixed && !self.held.contains(k);
         (0..dynamics.parameters.len()).filter(free).collect()
     }
 }

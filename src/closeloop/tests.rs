@@ -363,6 +363,49 @@ recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
     }
 }
 
+/// Three parameters of which the motion tells two combinations, inertia about the pivot and weight. A fit that begins at other
+/// values that explain the logs comes back to the nearest to the declared ones.
+#[test]
+fn what_the_logs_do_not_determine_stays_near_the_declared_values() {
+    const RIG: &str = r#"
+model = "pendulum"
+parameters = { C_g = -17.4, C_i = 4.6 }
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [1.6], band_hz = [0.15, 2.0], tones = 8 }
+recording = { logs = 3, duration_s = 8, start = [0, 0] }
+effect = []
+"#;
+    const FILE: &str = r#"
+[system]
+name = "rod"
+joints = 1
+[parameters]
+m = { value = 1.0, positive = true }
+l = { value = 0.5, positive = true }
+I = { value = 0.1, positive = true }
+[dynamics]
+qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
+"#;
+    let declared = Model::from_text(Path::new("rod.toml"), FILE, &[]).unwrap();
+    let (logs, settings) = (recorded(RIG, 0), Settings::default());
+    let study = Study::new(&declared, &logs, &settings);
+    let (inertia, moment) = (1.0 / 4.6, 17.4 / 4.6 / 9.81);
+    let mut start = declared.clone();
+    let far = [2.0, moment / 2.0, inertia - moment * moment / 2.0];
+    for (parameter, value) in start.parameters.iter_mut().zip(far) {
+        parameter.value = value;
+    }
+    let locals = study.shooting.initial_locals(0);
+    let fitted = study.refit(&start, locals, None).unwrap();
+    let [m, l, i] = fitted.model.values()[..] else {
+        panic!()
+    };
+    assert!((m * l / moment - 1.0).abs() < 0.01, "{m} {l}");
+    assert!(((i + m * l * l) / inertia - 1.0).abs() < 0.01, "{i}");
+    assert!((0.7..1.3).contains(&m), "{m}");
+    assert_eq!(study.identifiability_of(&fitted).determined, 2);
+}
+
 /// Without torque nothing tells inertia from friction: what is declared of the inertia is held, so that the friction of the
 /// file gets a value.
 #[test]

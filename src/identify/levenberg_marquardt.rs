@@ -95,7 +95,7 @@ impl<'a> Search<'a> {
         if scale.is_none() {
             search.rescale();
         } else {
-            search.cost = costs.iter().sum();
+            search.cost = costs.iter().sum::<f64>() + search.departure();
         }
         Ok(search)
     }
@@ -120,10 +120,15 @@ impl<'a> Search<'a> {
     }
 
     fn total(&self, values: &Values, locals: &[Vec<f64>]) -> f64 {
-        self.shooting
-            .costs(self.dynamics, values, locals, self.scale)
-            .iter()
-            .sum()
+        let costs = self
+            .shooting
+            .costs(self.dynamics, values, locals, self.scale);
+        costs.iter().sum::<f64>() + self.shooting.prior.cost(&self.layout.columns, values)
+    }
+
+    /// The part of the cost that its values owe to their distance from the declared ones.
+    fn departure(&self) -> f64 {
+        self.shooting.prior.cost(&self.layout.columns, &self.values)
     }
 
     /// Take steps until none is worth taking, or until there have been `most`.
@@ -178,14 +183,15 @@ impl<'a> Search<'a> {
 
     /// Whether the quadratic model of the cost, hardly damped, does not lead anywhere near a cost of use.
     fn is_out_of_reach(&mut self, terms: &[WindowTerms]) -> bool {
-        if self.cost <= self.below {
+        let below = self.below + self.departure();
+        if self.cost <= below {
             return false;
         }
         let damping = self.damping;
         self.damping = damping.min(FIRST_DAMPING);
         let predicted = self.predicted_decrease(terms);
         self.damping = damping;
-        predicted.is_some_and(|decrease| self.cost - OUT_OF_REACH * decrease > self.below)
+        predicted.is_some_and(|decrease| self.cost - OUT_OF_REACH * decrease > below)
     }
 
     /// Predicted decrease of the cost by the next step; `None` where there is none.
@@ -212,14 +218,13 @@ impl<'a> Search<'a> {
     }
 
     fn normal(&self, terms: &[WindowTerms]) -> Normal {
-        let shared = self.tangent.active.len();
-        Normal::new(
-            terms,
-            &self.shooting.windows,
-            &self.layout,
-            shared,
-            self.damping,
-        )
+        let (shared, layout) = (self.tangent.active.len(), &self.layout);
+        let windows = &self.shooting.windows;
+        let mut normal = Normal::new(terms, windows, layout, shared, self.damping);
+        let (gradient, matrix) = (&mut normal.gradient, &mut normal.matrix);
+        let prior = &self.shooting.prior;
+        prior.add_to(&layout.columns, &self.values, gradient, matrix);
+        normal
     }
 
     fn propose(&self, terms: &[WindowTerms]) -> Option<Step> {
@@ -282,12 +287,17 @@ impl<'a> Search<'a> {
         let reduced = windows
             .map(|(terms, window)| Reduced::of(terms, self.layout.places(window)))
             .collect();
+        let mut prior = WindowTerms::zeros(self.layout.columns.len());
+        let (gradient, matrix) = (&mut prior.gradient, &mut prior.hessian);
+        let known = &self.shooting.prior;
+        known.add_to(&self.layout.columns, &self.values, gradient, matrix);
         let fit = Fit {
             active: self.tangent.active.clone(),
+            cost: self.cost - self.departure(),
             columns: self.layout.columns,
             locals: self.locals,
             scale: self.scale,
-            cost: self.cost,
+            prior,
             reduced,
             steps: self.steps,
             trace: self.trace,

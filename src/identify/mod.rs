@@ -12,6 +12,7 @@ mod normal_equations;
 mod offsets;
 mod outcome;
 mod pack;
+mod prior;
 mod sensitivity;
 mod shooting;
 mod start;

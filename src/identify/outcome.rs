@@ -33,6 +33,8 @@ pub struct Fit {
     pub scale: f64,
     /// Sum of the losses at that scale.
     pub cost: f64,
+    /// What the declared values add to the normal equations; no cost.
+    pub(super) prior: WindowTerms,
     /// The normal equations of each window in the free values, its own values eliminated.
     pub reduced: Vec<Reduced>,
     /// Steps that were taken.
@@ -55,6 +57,14 @@ impl Fit {
         for window in &self.reduced {
             window.add_to(&mut all);
         }
+        all
+    }
+
+    /// The same with what the declared values tell: those whose gradient is zero where the fit ended.
+    pub fn equations_and_prior(&self) -> WindowTerms {
+        let mut all = self.equations();
+        all.gradient += &self.prior.gradient;
+        all.hessian += &self.prior.hessian;
         all
     }
 

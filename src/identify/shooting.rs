@@ -2,10 +2,11 @@ use rayon::prelude::*;
 
 use super::normal_equations::WindowTerms;
 use super::pack::Pack;
+use super::prior::Prior;
 use super::sensitivity::{LANES, Tangent};
 use super::values::Values;
 use crate::data::{Log, half_width_s};
-use crate::model::Dynamics;
+use crate::model::{Dynamics, Parameter};
 use crate::sim::{Commands, Point, Window, initial_state};
 
 /// Multiple shooting: least squares over windows of logs. In each window the model is integrated from a free start
@@ -17,6 +18,7 @@ pub struct Shooting<'l> {
     /// Standard deviation of the position noise, per joint, in rad (or m).
     pub noise: Vec<f64>,
     packs: Vec<Pack>,
+    pub(super) prior: Prior,
 }
 
 impl<'l> Shooting<'l> {
@@ -36,7 +38,16 @@ impl<'l> Shooting<'l> {
             windows,
             noise: noise.to_vec(),
             packs,
+            prior: Prior::default(),
         }
+    }
+
+    /// Other windows of the same logs, of the same rig.
+    #[must_use]
+    pub fn over(&self, windows: Vec<Window>) -> Self {
+        let mut other = Self::new(self.logs, windows, &self.noise);
+        other.prior = self.prior.worth(other.residuals_of_a_window());
+        other
     }
 
     /// The same windows, of whose start states nothing is known.
@@ -44,6 +55,20 @@ impl<'l> Shooting<'l> {
     pub fn with_free_starts(mut self) -> Self {
         self.packs.iter_mut().for_each(Pack::free_starts);
         self
+    }
+
+    /// The same windows of a rig whose parameters are known to be of the size that is declared. That is worth as much as the
+    /// residuals of one window: they are correlated, and a few windows overrule it.
+    #[must_use]
+    pub fn near(mut self, declared: &[Parameter]) -> Self {
+        self.prior = Prior::near(declared, self.residuals_of_a_window());
+        self
+    }
+
+    #[allow(clippy::cast_precision_loss)] // some thousands
+    fn residuals_of_a_window(&self) -> f64 {
+        let rows: usize = self.windows.iter().map(Window::rows).sum();
+        (rows * self.noise.len()) as f64 / self.windows.len().max(1) as f64
     }
 
     /// The same windows, integrated in substeps of at most `longest_s`.

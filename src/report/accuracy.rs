@@ -156,8 +156,8 @@ pub(super) fn parameters(outcome: &Outcome) -> String {
         let name = &outcome.models.before.model.parameters[k].name;
         let _ = writeln!(
             out,
-            "- `{name}` is held: the logs determine it only in combination with others. \
-             Fitted values of the others, and of effects, are relative to it."
+            "- `{name}` is held: the logs determine it only in combination with others, and it stays as near to its declared \
+             value as they allow. Intervals of the others, and of effects, are relative to it."
         );
     }
     out + "\n"

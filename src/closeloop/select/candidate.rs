@@ -166,7 +166,7 @@ fn best_by_switches(
     let shooting = &study.sample.shooting;
     let scale = fitted.fit.scale;
     let fit = as_it_stands(shooting, &dynamics, &active, locals.to_vec(), scale).ok()?;
-    let all = fit.equations();
+    let all = fit.equations_and_prior();
     let cost = |place: &Range<usize>| {
         let is_own = |column: &Column| {
             column.parameter < places[0].start || place.contains(&column.parameter)

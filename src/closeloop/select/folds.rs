@@ -100,7 +100,7 @@ pub fn predicted(
 /// For each group, the step of a fit's values when it is left out.
 pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
     let (_, groups) = folds.equations(fit);
-    let all = fit.equations();
+    let all = fit.equations_and_prior();
     let step = |part: &WindowTerms| {
         // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
         let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);

@@ -20,8 +20,9 @@ pub struct Outlook {
     present: usize,
     /// The free values of each item.
     columns_of: Vec<Vec<usize>>,
-    /// Free values that belong to no item.
+    /// Free values that belong to no item, and those of them that the logs determine.
     base: Vec<usize>,
+    told: Vec<usize>,
     /// Of each free value: how far it is from its bounds, and from being switched off.
     room: Vec<[f64; 2]>,
     to_zero: Vec<f64>,
@@ -29,6 +30,8 @@ pub struct Outlook {
     stretches: Vec<WindowTerms>,
     groups: Vec<WindowTerms>,
     all: WindowTerms,
+    /// What the logs alone tell.
+    information: DMatrix<f64>,
 }
 
 /// A set of items, in rising order.
@@ -116,12 +119,16 @@ impl Outlook {
         };
         let folds = Folds::of(study);
         let (stretches, groups) = folds.equations(fit);
+        let base: Vec<usize> = (0..fit.columns.len()).filter(is_base).collect();
+        let told = |i: &&usize| study.is_told(fit.columns[**i].parameter);
         Self {
-            base: (0..fit.columns.len()).filter(is_base).collect(),
+            told: base.iter().filter(told).copied().collect(),
+            base,
             room: fit.columns.iter().map(room).collect(),
             to_zero: fit.columns.iter().map(to_zero).collect(),
             groups_of: folds.groups,
-            all: fit.equations(),
+            all: fit.equations_and_prior(),
+            information: fit.equations().hessian,
             items,
             present,
             columns_of,
@@ -187,8 +194,8 @@ impl Outlook {
             }
         }
         let mut minimum = Minimum { free, held, moved };
-        let matrix = sub(&self.all.hessian, &minimum.free, &minimum.free);
-        if !tells_apart(&matrix, self.base.len()) {
+        let told = [&self.told, &minimum.free[self.base.len()..]].concat();
+        if !tells_apart(&sub(&self.information, &told, &told), self.told.len()) {
             return None;
         }
         loop {

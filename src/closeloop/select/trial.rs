@@ -53,8 +53,13 @@ impl Trial {
             return true;
         }
         let first = model.place_of(added.start).start;
-        let base = fit.columns.iter().filter(|column| column.parameter < first);
-        tells_apart(&fit.equations().hessian, base.count())
+        let columns = &fit.columns;
+        let told = |&i: &usize| study.is_told(columns[i].parameter);
+        let told: Vec<usize> = (0..columns.len()).filter(told).collect();
+        let base = told.iter().filter(|&&i| columns[i].parameter < first);
+        let information = fit.equations().hessian;
+        let information = information.select_rows(&told).select_columns(&told);
+        tells_apart(&information, base.count())
     }
 
     fn is_consistent(&self, study: &Study<'_>) -> bool {

@@ -1,0 +1,153 @@
+use nalgebra::{DMatrix, DVector};
+
+use super::values::{Column, Values};
+use crate::model::Parameter;
+
+/// What is known of a model's values beside the logs: that declared ones are of the right size. Of values with which a model
+/// explains the logs equally well, those nearest to the declared ones are found.
+///
+/// The cost of a value is half the square of its departure, which grows as the logarithm of its ratio to the declared one where
+/// they differ much, and stays finite where the value changes its sign.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Prior {
+    /// Declared values; none is zero.
+    declared: Vec<Declared>,
+    /// So many residuals say as much as this prior does.
+    weight: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Declared {
+    parameter: usize,
+    value: f64,
+}
+
+/// A ratio to the declared value is small below one over this: zero departs from it as far as a tenfold value does.
+const STEEPNESS: f64 = 5.0;
+
+impl Declared {
+    /// About the logarithm of the ratio, 0 where it is 1; and its slope.
+    fn departure(&self, value: f64) -> (f64, f64) {
+        let ratio = STEEPNESS * value / self.value;
+        let slope = STEEPNESS / self.value / (1.0 + ratio * ratio).sqrt();
+        (ratio.asinh() - STEEPNESS.asinh(), slope)
+    }
+}
+
+impl Prior {
+    /// Values are near those declared. `weight` is the number of residuals that say as much.
+    pub fn near(declared: &[Parameter], weight: f64) -> Self {
+        let known = declared.iter().enumerate().filter(|(_, p)| p.value != 0.0);
+        let declared = known.map(|(parameter, of)| Declared {
+            parameter,
+            value: of.value,
+        });
+        Self {
+            declared: declared.collect(),
+            weight,
+        }
+    }
+
+    /// The same where so many residuals say as much.
+    #[must_use]
+    pub fn worth(&self, weight: f64) -> Self {
+        Self {
+            weight,
+            ..self.clone()
+        }
+    }
+
+    /// The departures of free values: which of `columns`, how far, and the slope.
+    fn departures<'a>(
+        &'a self,
+        columns: &'a [Column],
+        values: &'a Values,
+    ) -> impl Iterator<Item = (usize, f64, f64)> + 'a {
+        columns.iter().enumerate().filter_map(|(i, &column)| {
+            let is_it = |declared: &&Declared| declared.parameter == column.parameter;
+            let declared = self.declared.iter().find(is_it)?;
+            let (departure, slope) = declared.departure(values.get(column));
+            Some((i, departure, slope))
+        })
+    }
+
+    /// The cost of free values.
+    pub fn cost(&self, columns: &[Column], values: &Values) -> f64 {
+        let departures = self.departures(columns, values);
+        0.5 * self.weight * departures.map(|(_, d, _)| d * d).sum::<f64>()
+    }
+
+    /// Add its gradient and Gauss-Newton matrix to those of the logs.
+    pub fn add_to(
+        &self,
+        columns: &[Column],
+        values: &Values,
+        gradient: &mut DVector<f64>,
+        matrix: &mut DMatrix<f64>,
+    ) {
+        for (i, departure, slope) in self.departures(columns, values) {
+            gradient[i] += self.weight * departure * slope;
+            matrix[(i, i)] += self.weight * slope * slope;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use nalgebra::{DMatrix, DVector};
+
+    use super::Prior;
+    use crate::identify::{Column, Values};
+    use crate::model::{Library, Model};
+
+    fn pendulum() -> Model {
+        Library::built_in().model(Path::new("pendulum")).unwrap()
+    }
+
+    fn columns() -> [Column; 2] {
+        let of_all_logs = |parameter| Column {
+            parameter,
+            log: None,
+        };
+        [0, 1].map(of_all_logs)
+    }
+
+    fn at(common: [f64; 2]) -> Values {
+        Values {
+            common: common.to_vec(),
+            own: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_value_costs_more_the_farther_it_is_from_the_declared_one() {
+        let prior = Prior::near(&pendulum().parameters, 2.0);
+        let declared = pendulum().values();
+        let cost = |ratio: f64| prior.cost(&columns(), &at([declared[0] * ratio, declared[1]]));
+        assert_eq!(cost(1.0), 0.0);
+        // Up and down by a factor cost about the square of its logarithm.
+        assert!((cost(5.0).sqrt() - 5.0_f64.ln()).abs() < 0.05);
+        assert!((cost(0.2).sqrt() - 5.0_f64.ln()).abs() < 0.2);
+        assert!(cost(0.0) < cost(20.0) && cost(-1.0) > cost(0.0) && cost(-1.0).is_finite());
+    }
+
+    #[test]
+    fn its_gradient_is_that_of_the_cost() {
+        let prior = Prior::near(&pendulum().parameters, 3.0);
+        let values = at([7.0, -1.0]);
+        let (mut gradient, mut matrix) = (DVector::zeros(2), DMatrix::zeros(2, 2));
+        prior.add_to(&columns(), &values, &mut gradient, &mut matrix);
+        let h = 1e-6;
+        let moved = |by: f64| prior.cost(&columns(), &at([7.0 + by, -1.0]));
+        let slope = (moved(h) - moved(-h)) / (2.0 * h);
+        assert!(
+            (gradient[0] - slope).abs() < 1e-6,
+            "{} {slope}",
+            gradient[0]
+        );
+        assert_eq!(matrix[(0, 1)], 0.0);
+        assert!(matrix[(0, 0)] > 0.0 && matrix[(1, 1)] > 0.0);
+    }
+}
