@@ -8,7 +8,7 @@ use super::candidate::{beside, best_start, candidates, has_switch};
 use super::exchange::{Exchange, exchanges};
 use super::outlook::Outlook;
 use super::sets::{descent, promising};
-use super::simpler::simpler;
+use super::simpler::{mended, simpler};
 use super::trial::{Trial, key};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::stage::{Progress, Stage};
@@ -219,9 +219,9 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// The declared model with each set of effects in place of those of a trial, fitted at its scale; those that cannot
     /// be fitted, or leave more than a loss of `below`, are left out. No loss on stretches left out is smaller than that
-    /// of the fit itself.
+    /// of the fit itself. An effect whose values stand at a bound gives way to what it contains.
     fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>, below: f64) -> Vec<Trial> {
-        let study = self.study;
+        let (study, library) = (self.study, self.library);
         sets.iter_mut().for_each(without_contained);
         sets.retain(|set| set.len() <= study.settings.select.most_effects);
         let mut keys = vec![from.added_key(study)];
@@ -232,14 +232,25 @@ impl<'a, 'p> Search<'a, 'p> {
             is_new
         });
         let trial = |set: Vec<FittedEffect>| {
-            if !study.has_time() {
+            let found = fitted_from(study, from, &set, below)?;
+            if found.is_valid(study) {
+                return Some(found);
+            }
+            let mended = mended(library, found.added(study));
+            if key(&mended) == found.added_key(study) {
                 return None;
             }
-            let effects = [study.declared.effects.as_slice(), &set].concat();
-            let fitted = study.with_better_effects(&from.fitted, effects, below)?;
-            Some(Trial::of(study, fitted)).filter(|trial| trial.is_valid(study))
+            fitted_from(study, &found, &mended, below).filter(|trial| trial.is_valid(study))
         };
-        sets.into_par_iter().filter_map(trial).collect()
+        let mut trials: Vec<Trial> = sets.into_par_iter().filter_map(trial).collect();
+        let mut keys = Vec::new();
+        trials.retain(|trial| {
+            let key = trial.key();
+            let is_new = !keys.contains(&key);
+            keys.push(key);
+            is_new
+        });
+        trials
     }
 
     /// Fit the sets in which one effect is exchanged for another like it, the best first. What was in vain once is not
@@ -265,7 +276,7 @@ impl<'a, 'p> Search<'a, 'p> {
         trials.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
         let gain = |trial: &Trial| 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE);
         let tried = |trial: &Trial| Tried {
-            effects: trial.fitted.model.effects[self.study.added(&trial.fitted.model)].to_vec(),
+            effects: trial.added(self.study).to_vec(),
             gain: gain(trial),
             chosen: false,
         };
@@ -341,6 +352,17 @@ impl<'a, 'p> Search<'a, 'p> {
         trials.retain(|trial| trial.is_as_good_as(best, settings));
         trials
     }
+}
+
+/// The declared model with a set of effects in place of those of a trial, fitted at its scale to a loss of `below`, if time is
+/// left.
+fn fitted_from(study: &Study<'_>, from: &Trial, set: &[FittedEffect], below: f64) -> Option<Trial> {
+    if !study.has_time() {
+        return None;
+    }
+    let effects = [study.declared.effects.as_slice(), set].concat();
+    let fitted = study.with_better_effects(&from.fitted, effects, below)?;
+    Some(Trial::of(study, fitted))
 }
 
 /// Drop effects that another one of the set contains.

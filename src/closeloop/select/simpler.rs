@@ -1,5 +1,6 @@
 use std::ops::Range;
 
+use super::trial::is_consistent;
 use crate::model::{Effect, FittedEffect};
 
 /// Every set of effects in which one is replaced by some of those that it contains, fewest first. Only effects at the places `added` change.
@@ -19,6 +20,22 @@ pub(super) fn simpler(
         }
     }
     all
+}
+
+/// A set of effects with what it contains in place of each whose values are not consistent: all of it, since the simpler
+/// ones are found from there.
+pub(super) fn mended(library: &[Effect], effects: &[FittedEffect]) -> Vec<FittedEffect> {
+    let mend = |effect: &FittedEffect| {
+        if is_consistent(effect) {
+            return vec![effect.clone()];
+        }
+        let richest = parts_of(library, &effect.effect).pop().unwrap_or_default();
+        richest
+            .into_iter()
+            .map(|part| part_of(effect, part))
+            .collect()
+    };
+    effects.iter().flat_map(mend).collect()
 }
 
 /// The sets of effects contained in one that take fewer parameters together, fewest first.

@@ -63,17 +63,12 @@ impl Trial {
     }
 
     fn is_consistent(&self, study: &Study<'_>) -> bool {
-        let added = &self.fitted.model.effects[study.added(&self.fitted.model)];
-        added.iter().all(|effect| {
-            let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
-            let mut shapes = effect.effect.parameters.iter().zip(&values);
-            let is_inside = |(parameter, value): (&EffectParameter, &f64)| {
-                let [low, high] = parameter.bounds;
-                let is_absent = parameter.is_switch() && *value == 0.0;
-                is_absent || parameter.whole || (low < *value && *value < high)
-            };
-            effect.effect.is_valid(&values) && shapes.all(is_inside)
-        })
+        self.added(study).iter().all(is_consistent)
+    }
+
+    /// The effects beyond the declared ones.
+    pub fn added(&self, study: &Study<'_>) -> &[FittedEffect] {
+        &self.fitted.model.effects[study.added(&self.fitted.model)]
     }
 
     /// Identifies the set of effects, in no particular order.
@@ -83,8 +78,7 @@ impl Trial {
 
     /// The same of the effects beyond the declared ones.
     pub fn added_key(&self, study: &Study<'_>) -> Vec<String> {
-        let model = &self.fitted.model;
-        key(&model.effects[study.added(model)])
+        key(self.added(study))
     }
 
     /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and
@@ -95,6 +89,18 @@ impl Trial {
         let within = mean(&differences) <= settings.simplest * standard_error(&differences);
         rise < settings.negligible || within && rise < settings.simpler
     }
+}
+
+/// Whether the values of an effect are consistent with each other and none stands at a bound.
+pub fn is_consistent(effect: &FittedEffect) -> bool {
+    let values: Vec<f64> = effect.values.iter().map(|(value, _)| *value).collect();
+    let mut shapes = effect.effect.parameters.iter().zip(&values);
+    let is_inside = |(parameter, value): (&EffectParameter, &f64)| {
+        let [low, high] = parameter.bounds;
+        let is_absent = parameter.is_switch() && *value == 0.0;
+        is_absent || parameter.whole || (low < *value && *value < high)
+    };
+    effect.effect.is_valid(&values) && shapes.all(is_inside)
 }
 
 /// The effects of a model, in no particular order.
