@@ -6,7 +6,7 @@ use super::candidate::candidates;
 use super::exchange::exchanges;
 use super::folds::{Folds, left_out_losses, predicted};
 use super::outlook::Outlook;
-use super::simpler::simpler;
+use super::simpler::{mended, simpler};
 use super::trial::{Trial, key};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::study::Study;
@@ -79,6 +79,23 @@ fn a_set_with_a_value_at_its_bound_is_not_valid() {
     let disc = &mut trial.fitted.model.effects[1];
     disc.values[0].0 = disc.effect.parameters[0].bounds[1];
     assert!(!trial.is_valid(&study));
+}
+
+/// Its fastest possible velocity says that friction does not fall: it is Coulomb friction at the level found.
+#[test]
+fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
+    let library = Library::built_in();
+    let mut stribeck = absent("stribeck_friction");
+    let fastest = stribeck.effect.parameters[2].bounds[1];
+    stribeck.values = vec![(0.1, None), (0.2, None), (fastest, None)];
+    let set = [absent("joint_spring"), stribeck];
+    let mended = mended(library.effects(), &set);
+    let labels: Vec<String> = mended.iter().map(FittedEffect::label).collect();
+    assert_eq!(
+        labels,
+        ["joint_spring on joint 1", "coulomb_friction on joint 1"]
+    );
+    assert_eq!(mended[1].values[0].0, 0.1);
 }
 
 /// A gain of the torque beside a free inertia has any value.
