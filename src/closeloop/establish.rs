@@ -99,12 +99,17 @@ struct Evidence {
 }
 
 impl Evidence {
+    /// The p-value of the values, or of the falls where there is none.
+    fn p_alone(&self) -> f64 {
+        self.p_of_values.unwrap_or(self.p_of_falls)
+    }
+
     /// The p-value of the values or, where they say little, the smaller one.
     fn p(&self, settings: &EstablishSettings) -> f64 {
-        let of_values = self.p_of_values.unwrap_or(self.p_of_falls);
-        match of_values < settings.significant_alone {
-            true => of_values,
-            false => of_values.min(self.p_of_falls),
+        let alone = self.p_alone();
+        match alone < settings.significant_alone {
+            true => alone,
+            false => alone.min(self.p_of_falls),
         }
     }
 
@@ -113,9 +118,8 @@ impl Evidence {
         #[allow(clippy::cast_precision_loss)] // few trials
         let level = settings.false_alarm / trials.max(1) as f64;
         let p = self.p(settings);
-        let of_values = self.p_of_values.unwrap_or(self.p_of_falls);
         let significant =
-            of_values < level || self.gain > settings.plain && p < settings.significant_alone;
+            self.p_alone() < level || self.gain > settings.plain && p < settings.significant_alone;
         if self.gain < settings.worthwhile {
             return Some(format!(
                 "it lowers the loss on left-out stretches by {:.1} % only",

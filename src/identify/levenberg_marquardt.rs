@@ -123,12 +123,18 @@ impl<'a> Search<'a> {
         let costs = self
             .shooting
             .costs(self.dynamics, values, locals, self.scale);
-        costs.iter().sum::<f64>() + self.shooting.prior.cost(&self.layout.columns, values)
+        costs.iter().sum::<f64>() + self.shooting.departure(&self.layout.columns, values)
     }
 
     /// The part of the cost that its values owe to their distance from the declared ones.
     fn departure(&self) -> f64 {
-        self.shooting.prior.cost(&self.layout.columns, &self.values)
+        self.shooting.departure(&self.layout.columns, &self.values)
+    }
+
+    /// What it adds to the normal equations.
+    fn departure_terms(&self) -> WindowTerms {
+        self.shooting
+            .departure_terms(&self.layout.columns, &self.values)
     }
 
     /// Take steps until none is worth taking, or until there have been `most`.
@@ -221,9 +227,9 @@ impl<'a> Search<'a> {
         let (shared, layout) = (self.tangent.active.len(), &self.layout);
         let windows = &self.shooting.windows;
         let mut normal = Normal::new(terms, windows, layout, shared, self.damping);
-        let (gradient, matrix) = (&mut normal.gradient, &mut normal.matrix);
-        let prior = &self.shooting.prior;
-        prior.add_to(&layout.columns, &self.values, gradient, matrix);
+        let declared = self.departure_terms();
+        normal.gradient += declared.gradient;
+        normal.matrix += declared.hessian;
         normal
     }
 
@@ -287,10 +293,7 @@ impl<'a> Search<'a> {
         let reduced = windows
             .map(|(terms, window)| Reduced::of(terms, self.layout.places(window)))
             .collect();
-        let mut prior = WindowTerms::zeros(self.layout.columns.len());
-        let (gradient, matrix) = (&mut prior.gradient, &mut prior.hessian);
-        let known = &self.shooting.prior;
-        known.add_to(&self.layout.columns, &self.values, gradient, matrix);
+        let prior = self.departure_terms();
         let fit = Fit {
             active: self.tangent.active.clone(),
             cost: self.cost - self.departure(),

@@ -1,5 +1,4 @@
-use nalgebra::{DMatrix, DVector};
-
+use super::normal_equations::WindowTerms;
 use super::values::{Column, Values};
 use crate::model::Parameter;
 
@@ -12,8 +11,6 @@ use crate::model::Parameter;
 pub(super) struct Prior {
     /// Declared values; none is zero.
     declared: Vec<Declared>,
-    /// So many residuals say as much as this prior does.
-    weight: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -35,8 +32,8 @@ impl Declared {
 }
 
 impl Prior {
-    /// Values are near those declared. `weight` is the number of residuals that say as much.
-    pub fn near(declared: &[Parameter], weight: f64) -> Self {
+    /// Values are near those declared.
+    pub fn near(declared: &[Parameter]) -> Self {
         let known = declared.iter().enumerate().filter(|(_, p)| p.value != 0.0);
         let declared = known.map(|(parameter, of)| Declared {
             parameter,
@@ -44,16 +41,6 @@ impl Prior {
         });
         Self {
             declared: declared.collect(),
-            weight,
-        }
-    }
-
-    /// The same where so many residuals say as much.
-    #[must_use]
-    pub fn worth(&self, weight: f64) -> Self {
-        Self {
-            weight,
-            ..self.clone()
         }
     }
 
@@ -71,24 +58,20 @@ impl Prior {
         })
     }
 
-    /// The cost of free values.
-    pub fn cost(&self, columns: &[Column], values: &Values) -> f64 {
+    /// The cost of free values where so many residuals say as much.
+    pub fn cost(&self, columns: &[Column], values: &Values, residuals: f64) -> f64 {
         let departures = self.departures(columns, values);
-        0.5 * self.weight * departures.map(|(_, d, _)| d * d).sum::<f64>()
+        0.5 * residuals * departures.map(|(_, d, _)| d * d).sum::<f64>()
     }
 
-    /// Add its gradient and Gauss-Newton matrix to those of the logs.
-    pub fn add_to(
-        &self,
-        columns: &[Column],
-        values: &Values,
-        gradient: &mut DVector<f64>,
-        matrix: &mut DMatrix<f64>,
-    ) {
+    /// Its gradient and Gauss-Newton matrix.
+    pub fn terms(&self, columns: &[Column], values: &Values, residuals: f64) -> WindowTerms {
+        let mut terms = WindowTerms::zeros(columns.len());
         for (i, departure, slope) in self.departures(columns, values) {
-            gradient[i] += self.weight * departure * slope;
-            matrix[(i, i)] += self.weight * slope * slope;
+            terms.gradient[i] = residuals * departure * slope;
+            terms.hessian[(i, i)] = residuals * slope * slope;
         }
+        terms
     }
 }
 
@@ -96,9 +79,7 @@ impl Prior {
 mod tests {
     use std::path::Path;
 
-    use nalgebra::{DMatrix, DVector};
-
-    use super::Prior;
+    use super::{Prior, WindowTerms};
     use crate::identify::{Column, Values};
     use crate::model::{Library, Model};
 
@@ -123,9 +104,10 @@ mod tests {
 
     #[test]
     fn a_value_costs_more_the_farther_it_is_from_the_declared_one() {
-        let prior = Prior::near(&pendulum().parameters, 2.0);
+        let prior = Prior::near(&pendulum().parameters);
         let declared = pendulum().values();
-        let cost = |ratio: f64| prior.cost(&columns(), &at([declared[0] * ratio, declared[1]]));
+        let at_ratio = |ratio: f64| at([declared[0] * ratio, declared[1]]);
+        let cost = |ratio: f64| prior.cost(&columns(), &at_ratio(ratio), 2.0);
         assert_eq!(cost(1.0), 0.0);
         // Up and down by a factor cost about the square of its logarithm.
         assert!((cost(5.0).sqrt() - 5.0_f64.ln()).abs() < 0.05);
@@ -135,19 +117,19 @@ mod tests {
 
     #[test]
     fn its_gradient_is_that_of_the_cost() {
-        let prior = Prior::near(&pendulum().parameters, 3.0);
-        let values = at([7.0, -1.0]);
-        let (mut gradient, mut matrix) = (DVector::zeros(2), DMatrix::zeros(2, 2));
-        prior.add_to(&columns(), &values, &mut gradient, &mut matrix);
+        let prior = Prior::near(&pendulum().parameters);
+        let WindowTerms {
+            gradient, hessian, ..
+        } = prior.terms(&columns(), &at([7.0, -1.0]), 3.0);
         let h = 1e-6;
-        let moved = |by: f64| prior.cost(&columns(), &at([7.0 + by, -1.0]));
+        let moved = |by: f64| prior.cost(&columns(), &at([7.0 + by, -1.0]), 3.0);
         let slope = (moved(h) - moved(-h)) / (2.0 * h);
         assert!(
             (gradient[0] - slope).abs() < 1e-6,
             "{} {slope}",
             gradient[0]
         );
-        assert_eq!(matrix[(0, 1)], 0.0);
-        assert!(matrix[(0, 0)] > 0.0 && matrix[(1, 1)] > 0.0);
+        assert_eq!(hessian[(0, 1)], 0.0);
+        assert!(hessian[(0, 0)] > 0.0 && hessian[(1, 1)] > 0.0);
     }
 }

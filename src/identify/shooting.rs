@@ -4,7 +4,7 @@ use super::normal_equations::WindowTerms;
 use super::pack::Pack;
 use super::prior::Prior;
 use super::sensitivity::{LANES, Tangent};
-use super::values::Values;
+use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
 use crate::model::{Dynamics, Parameter};
 use crate::sim::{Commands, Point, Window, initial_state};
@@ -18,7 +18,7 @@ pub struct Shooting<'l> {
     /// Standard deviation of the position noise, per joint, in rad (or m).
     pub noise: Vec<f64>,
     packs: Vec<Pack>,
-    pub(super) prior: Prior,
+    prior: Prior,
 }
 
 impl<'l> Shooting<'l> {
@@ -46,7 +46,7 @@ impl<'l> Shooting<'l> {
     #[must_use]
     pub fn over(&self, windows: Vec<Window>) -> Self {
         let mut other = Self::new(self.logs, windows, &self.noise);
-        other.prior = self.prior.worth(other.residuals_of_a_window());
+        other.prior = self.prior.clone();
         other
     }
 
@@ -57,14 +57,25 @@ impl<'l> Shooting<'l> {
         self
     }
 
-    /// The same windows of a rig whose parameters are known to be of the size that is declared. That is worth as much as the
-    /// residuals of one window: they are correlated, and a few windows overrule it.
+    /// The same windows of a rig whose parameters are known to be of the size that is declared.
     #[must_use]
     pub fn near(mut self, declared: &[Parameter]) -> Self {
-        self.prior = Prior::near(declared, self.residuals_of_a_window());
+        self.prior = Prior::near(declared);
         self
     }
 
+    /// The cost of free values that are not those declared.
+    pub(super) fn departure(&self, columns: &[Column], values: &Values) -> f64 {
+        (self.prior).cost(columns, values, self.residuals_of_a_window())
+    }
+
+    /// Its gradient and Gauss-Newton matrix.
+    pub(super) fn departure_terms(&self, columns: &[Column], values: &Values) -> WindowTerms {
+        (self.prior).terms(columns, values, self.residuals_of_a_window())
+    }
+
+    /// So many residuals say as much as the declared values do: they are correlated, and a few windows overrule what is
+    /// declared.
     #[allow(clippy::cast_precision_loss)] // some thousands
     fn residuals_of_a_window(&self) -> f64 {
         let rows: usize = self.windows.iter().map(Window::rows).sum();

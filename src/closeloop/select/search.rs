@@ -224,13 +224,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let (study, library) = (self.study, self.library);
         sets.iter_mut().for_each(without_contained);
         sets.retain(|set| set.len() <= study.settings.select.most_effects);
-        let mut keys = vec![from.added_key(study)];
-        sets.retain(|set| {
-            let key = key(set);
-            let is_new = !keys.contains(&key);
-            keys.push(key);
-            is_new
-        });
+        first_of_each(&mut sets, vec![from.added_key(study)], |set| key(set));
         let trial = |set: Vec<FittedEffect>| {
             let found = fitted_from(study, from, &set, below)?;
             if found.is_valid(study) {
@@ -243,13 +237,7 @@ impl<'a, 'p> Search<'a, 'p> {
             fitted_from(study, &found, &mended, below).filter(|trial| trial.is_valid(study))
         };
         let mut trials: Vec<Trial> = sets.into_par_iter().filter_map(trial).collect();
-        let mut keys = Vec::new();
-        trials.retain(|trial| {
-            let key = trial.key();
-            let is_new = !keys.contains(&key);
-            keys.push(key);
-            is_new
-        });
+        first_of_each(&mut trials, Vec::new(), Trial::key);
         trials
     }
 
@@ -363,6 +351,20 @@ fn fitted_from(study: &Study<'_>, from: &Trial, set: &[FittedEffect], below: f64
     let effects = [study.declared.effects.as_slice(), set].concat();
     let fitted = study.with_better_effects(&from.fitted, effects, below)?;
     Some(Trial::of(study, fitted))
+}
+
+/// Drop those whose key has been met: among `met`, or among those before them.
+fn first_of_each<T>(
+    items: &mut Vec<T>,
+    mut met: Vec<Vec<String>>,
+    key: impl Fn(&T) -> Vec<String>,
+) {
+    items.retain(|item| {
+        let key = key(item);
+        let is_new = !met.contains(&key);
+        met.push(key);
+        is_new
+    });
 }
 
 /// Drop effects that another one of the set contains.
