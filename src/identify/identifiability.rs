@@ -24,7 +24,8 @@ pub struct Identifiability {
 /// A combination is undetermined if its standard deviation, relative to the parameters' magnitudes, is larger than this:
 /// its 95 % interval then extends to seven times its value.
 const LOOSE: f64 = 3.0;
-/// It is also undetermined if its eigenvalue is smaller than this share of the largest one, which is rounding.
+/// It is also undetermined if its information is smaller than this share of what its parameters have, each of them alone:
+/// then it is rounding.
 const ROUNDING: f64 = 1e-11;
 /// Holding a parameter with a smaller share of the undetermined directions would determine none of them.
 const NEGLIGIBLE: f64 = 1e-3;
@@ -60,28 +61,30 @@ pub fn identifiability(
     }
 }
 
-/// Hold the parameter with the largest weight in the undetermined directions, one after the other, until none is left that
-/// may be held.
+/// Hold the parameter with the largest weight in the undetermined directions, one after the other, while that leaves fewer
+/// of them.
 fn hold(information: &DMatrix<f64>, fit: &Fit, free: &Range<usize>) -> Vec<usize> {
+    let part = |of: &[usize]| loose_directions(&information.select_rows(of).select_columns(of));
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
+    let mut loose = part(&left);
     let mut hold = Vec::new();
     loop {
-        let part = information.select_rows(&left).select_columns(&left);
-        let loose = loose_directions(&part);
-        let share = |i: usize| {
-            loose
-                .iter()
-                .map(|direction| direction[i].powi(2))
-                .sum::<f64>()
-        };
+        let share = |i: &usize| -> f64 { loose.iter().map(|v| v[*i].powi(2)).sum() };
+        let may_be_held = |i: &usize| !free.contains(&fit.columns[left[*i]].parameter);
+        let mut candidates: Vec<usize> = (0..left.len()).filter(may_be_held).collect();
+        candidates.retain(|i| share(i) > NEGLIGIBLE);
         // Of equal shares the later parameter is held: files name the leading ones first.
-        let Some(most) = (0..left.len())
-            .filter(|&i| !free.contains(&fit.columns[left[i]].parameter) && share(i) > NEGLIGIBLE)
-            .max_by(|&a, &b| share(a).total_cmp(&share(b)))
-        else {
+        candidates.sort_by(|a, b| share(b).total_cmp(&share(a)).then(b.cmp(a)));
+        let without = |i: usize| {
+            let others: Vec<usize> = [&left[..i], &left[i + 1..]].concat();
+            let fewer = part(&others);
+            (fewer.len() < loose.len()).then_some((left[i], others, fewer))
+        };
+        let Some((held, others, fewer)) = candidates.into_iter().find_map(without) else {
             return hold;
         };
-        hold.push(fit.columns[left.remove(most)].parameter);
+        hold.push(fit.columns[held].parameter);
+        (left, loose) = (others, fewer);
     }
 }
 
@@ -104,10 +107,18 @@ fn loose_directions(information: &DMatrix<f64>) -> Vec<Vec<f64>> {
         let axis = |i: usize| (0..size).map(|k| f64::from(u8::from(k == i))).collect();
         return (0..size).map(axis).collect();
     };
-    let best = eigen.eigenvalues.max();
-    let is_loose = |value: f64| value <= ROUNDING * best || value < 1.0 / (LOOSE * LOOSE);
-    (0..size)
-        .filter(|&i| is_loose(eigen.eigenvalues[i]))
-        .map(|i| eigen.eigenvectors.column(i).iter().copied().collect())
+    // The information of each parameter is rounded by itself.
+    let rounding = |direction: &[f64]| {
+        let parts = direction.iter().enumerate();
+        let sizes = parts.map(|(i, w)| w.abs() * information[(i, i)].max(0.0).sqrt());
+        ROUNDING * sizes.sum::<f64>().powi(2)
+    };
+    let directions = eigen.eigenvectors.column_iter().zip(&eigen.eigenvalues);
+    directions
+        .map(|(direction, value)| (direction.iter().copied().collect::<Vec<f64>>(), *value))
+        .filter(|(direction, value)| {
+            *value < 1.0 / (LOOSE * LOOSE) || *value <= rounding(direction)
+        })
+        .map(|(direction, _)| direction)
         .collect()
 }
