@@ -7,6 +7,9 @@ use crate::sim::{Hold, Scheme, StepTorque};
 pub(super) const LANES: usize = 16;
 pub(super) type Lane = Row<f64, LANES>;
 
+/// Damping of a velocity times the length of a step, up to which every scheme is stable.
+const MOST_DAMPING: f64 = 2.0;
+
 /// The free values of each window, besides the parameters that all windows share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Local {
@@ -267,6 +270,7 @@ impl<'t> TangentStepper<'t> {
             for (k, slope) in self.by_state.iter_mut().enumerate() {
                 *slope = *self.tape.output(n + k);
             }
+            self.limit_damping(simd, h);
             // Known at compile time in each call: the loops over rows have no branches.
             match (k == 0, k == last) {
                 (true, true) => self.stage(simd, true, true, &weighed, &reached),
@@ -280,6 +284,27 @@ impl<'t> TangentStepper<'t> {
             self.move_with_new_velocities(simd, h);
         }
         std::mem::swap(&mut self.now, &mut self.sum);
+    }
+
+    /// Scale the derivatives with respect to each velocity so that its damping, over one step, is within what the scheme
+    /// can follow. A joint that sticks is damped far more strongly: its motion stays small, but sensitivities would grow
+    /// without bound where in truth they vanish.
+    #[inline(always)]
+    fn limit_damping<S: Simd>(&mut self, simd: S, h: &Lane) {
+        let n = self.tangent.joints;
+        for j in 0..n {
+            for part in 0..Lane::parts::<S>() {
+                let damping =
+                    -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h.get(simd, part));
+                let most = damping.like(MOST_DAMPING / n as f64);
+                let one = damping.like(1.0);
+                let share = most.if_less(damping, most / damping, one);
+                for row in 0..n {
+                    let slope = &mut self.by_state[2 * n * row + n + j];
+                    slope.set(part, slope.get(simd, part) * share);
+                }
+            }
+        }
     }
 
     /// Move positions with the new velocities: q += h (v' - v), and the same for the sensitivities.
@@ -405,9 +430,10 @@ mod tests {
     use std::path::Path;
 
     use super::{LANES, Local, Tangent, TangentStepper};
+    use crate::data::Joint;
     use crate::lanes::Row;
-    use crate::model::Library;
-    use crate::sim::{Commands, Hold, Point, SCHEMES, Simulator};
+    use crate::model::{FittedEffect, Library};
+    use crate::sim::{Commands, Hold, Point, RK4, SCHEMES, Simulator};
 
     const START: [f64; 4] = [0.7, -0.4, 1.5, -2.0];
     const HELD: [f64; 2] = [0.5, -1.5];
@@ -463,6 +489,34 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    /// Held by more friction than the torque that pulls at it, a joint moves by hardly anything; steps are too long to follow
+    /// how fast it comes to rest.
+    #[test]
+    fn sensitivities_of_a_joint_that_sticks_stay_small() {
+        let library = Library::built_in();
+        let friction =
+            FittedEffect::absent(library.effect("coulomb_friction").unwrap(), Joint::at(0));
+        let pendulum = library.model(Path::new("pendulum")).unwrap();
+        let model = pendulum.with_effects(vec![friction]);
+        let model = model.with_sign_widths(vec![2e-3]).dynamics();
+        let mut values = model.values();
+        *values.last_mut().unwrap() = 4.0;
+        let tangent = Tangent::new(&model, &[2], Local::State);
+        let mut stepper = TangentStepper::new(&tangent, &values, RK4);
+        stepper.start(&[0.0, 0.5].map(Row::splat));
+        let (time, tau) = ([0.0], [vec![1.0]]);
+        let commands = Commands::new(&model, &time, &tau);
+        let (held, from) = ([Row::splat(1.0)], Row::splat(0.0));
+        stepper.advance(&Hold::lasting([&commands; LANES], &held, from, 0.5, 250));
+        for column in 0..tangent.columns() {
+            let [angle, velocity] = [0, 1].map(|row| stepper.now[2 * (1 + column) + row][0]);
+            assert!(
+                angle.abs() < 1.1 && velocity.abs() < 0.1,
+                "{column}: {angle} {velocity}"
+            );
         }
     }
 }
