@@ -26,6 +26,7 @@ mod mechanism;
 mod memory;
 mod metric;
 mod models;
+mod network;
 mod oracles;
 mod parity;
 mod per_log;

@@ -7,6 +7,7 @@ mod dynamics;
 mod effect;
 mod effect_file;
 mod effects_in_file;
+mod fade;
 mod file;
 mod filter;
 mod fitted;

@@ -296,7 +296,7 @@ impl LayerWeights {
         self.outputs * (self.inputs + 1)
     }
 
-    fn zero(inputs: usize, outputs: usize) -> Self {
+    pub(super) fn zero(inputs: usize, outputs: usize) -> Self {
         Self {
             inputs,
             outputs,

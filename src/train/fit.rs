@@ -168,6 +168,19 @@ impl Training {
         }
     }
 
+    /// The run as it ended, with another model as its result.
+    ///
+    /// # Errors
+    /// None for a run made or loaded by this module.
+    pub(super) fn ending_in(self, model: HybridModel) -> Result<Self, TrainError> {
+        Ok(Self {
+            epoch: self.epoch,
+            penalty_weight: self.penalty_weight,
+            history: self.history,
+            ..Self::new(model, self.settings, self.rng)?
+        })
+    }
+
     /// Epochs done.
     pub fn epoch(&self) -> usize {
         self.epoch

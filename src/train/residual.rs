@@ -72,9 +72,18 @@ impl ResidualTrainer {
             progress(&format!("epoch {} of {}", at.epoch, at.epochs));
             ControlFlow::Continue(())
         })?;
-        let hybrid = run.result()?.to_dynamics()?;
+        let model = fading(&run.result()?, &training)?;
+        let hybrid = model.to_dynamics()?;
+        let run = run.ending_in(model)?;
         Ok(Some(TrainedResidual { run, hybrid }))
     }
+}
+
+/// The model with a residual that is silent far from these segments: nothing says that it is right there.
+fn fading(model: &HybridModel, segments: &Segments) -> Result<HybridModel, TrainError> {
+    let residual = model.weights().residual.expect("it has been trained");
+    let rows: Vec<[Vec<f64>; 3]> = segments.rows().collect();
+    Ok(model.clone().with_residual(&residual.fading(&rows))?)
 }
 
 fn fit_settings(settings: &LearnSettings) -> FitSettings {

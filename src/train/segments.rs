@@ -168,20 +168,25 @@ impl Segments {
         content_id(&bytes.collect::<Vec<u8>>())
     }
 
-    /// Mean and standard deviation of a network's features over all steps.
-    pub fn scaling(&self, angles: Angles) -> InputScaling {
+    /// Positions, velocities and inputs at each step.
+    pub fn rows(&self) -> impl Iterator<Item = [Vec<f64>; 3]> + Clone {
         let n = self.joints;
-        let rows = (0..self.len() * self.steps).map(|k| {
+        (0..self.len() * self.steps).map(move |k| {
             let (segment, step) = (k / self.steps, k % self.steps);
             let state = 2 * n * (segment * (self.steps + 1) + step);
-            let wide = |numbers: &[f32]| numbers.iter().copied().map(f64::from).collect::<Vec<_>>();
-            angles.row(
-                &wide(&self.states[state..state + n]),
-                &wide(&self.states[state + n..state + 2 * n]),
-                &wide(&self.inputs[n * k..n * (k + 1)]),
-            )
-        });
-        InputScaling::from_rows(angles.features(n), rows)
+            let wide = |numbers: &[f32]| numbers.iter().copied().map(f64::from).collect();
+            [
+                wide(&self.states[state..state + n]),
+                wide(&self.states[state + n..state + 2 * n]),
+                wide(&self.inputs[n * k..n * (k + 1)]),
+            ]
+        })
+    }
+
+    /// Mean and standard deviation of a network's features over all steps.
+    pub fn scaling(&self, angles: Angles) -> InputScaling {
+        let rows = self.rows().map(|[q, qd, tau]| angles.row(&q, &qd, &tau));
+        InputScaling::from_rows(angles.features(self.joints), rows)
     }
 
     /// A new network for models of this motion, its features scaled to it.
