@@ -39,6 +39,7 @@ mod shift;
 mod simulators;
 mod support;
 mod sweep;
+mod together;
 mod train;
 mod undeclared_effect;
 mod unexplained;

@@ -123,10 +123,15 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// A trial at a scale of its own: the residuals have fallen, and smaller effects show. It stays at the one it has where no
-    /// loss is known at the new one.
+    /// loss is known at the new one. An effect whose values have moved to a bound gives way to what it contains: no set with
+    /// it would be valid from then on.
     fn estimated(&self, trial: Trial) -> Result<Trial, FitError> {
         let anew = Trial::of(self.study, self.study.estimate(&trial.fitted)?);
-        Ok(if anew.loss().is_finite() { anew } else { trial })
+        let anew = if anew.loss().is_finite() { anew } else { trial };
+        match mended_from(self.study, self.library, &anew, f64::INFINITY) {
+            Some(simpler) => self.estimated(simpler),
+            None => Ok(anew),
+        }
     }
 
     /// The best of a round that is better than what the round began with by this share of the loss, and not worse in its
@@ -230,11 +235,7 @@ impl<'a, 'p> Search<'a, 'p> {
             if found.is_valid(study) {
                 return Some(found);
             }
-            let mended = mended(library, found.added(study));
-            if key(&mended) == found.added_key(study) {
-                return None;
-            }
-            fitted_from(study, &found, &mended, below).filter(|trial| trial.is_valid(study))
+            mended_from(study, library, &found, below)
         };
         let mut trials: Vec<Trial> = sets.into_par_iter().filter_map(trial).collect();
         first_of_each(&mut trials, Vec::new(), Trial::key);
@@ -351,6 +352,16 @@ fn fitted_from(study: &Study<'_>, from: &Trial, set: &[FittedEffect], below: f64
     let effects = [study.declared.effects.as_slice(), set].concat();
     let fitted = study.with_better_effects(&from.fitted, effects, below)?;
     Some(Trial::of(study, fitted))
+}
+
+/// A trial with what each effect contains in place of those whose values are not consistent, fitted from there to a loss of
+/// `below`; `None` where all are, or where that leaves no valid set.
+fn mended_from(study: &Study<'_>, library: &[Effect], trial: &Trial, below: f64) -> Option<Trial> {
+    if trial.is_consistent(study) {
+        return None;
+    }
+    let set = mended(library, trial.added(study));
+    fitted_from(study, trial, &set, below).filter(|found| found.is_valid(study))
 }
 
 /// Drop those whose key has been met: among `met`, or among those before them.

@@ -62,7 +62,8 @@ impl Trial {
         tells_apart(&information, base.count())
     }
 
-    fn is_consistent(&self, study: &Study<'_>) -> bool {
+    /// Whether the values of each added effect are consistent with each other and none stands at a bound.
+    pub fn is_consistent(&self, study: &Study<'_>) -> bool {
         self.added(study).iter().all(is_consistent)
     }
 
