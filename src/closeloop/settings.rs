@@ -107,8 +107,12 @@ settings! {
         rounds: usize = 8,
         /// A round must lower the loss on left-out stretches by this share for another one to follow.
         step: f64 = 0.02,
+        /// One that lowers it by this share is taken as it is; otherwise exchanges are tried before anything is added.
+        large: f64 = 0.5,
         /// An exchange of one effect for another must lower it by this share: more than fits that end early err.
         exchange: f64 = 0.003,
+        /// Of those after which a set is as good with as many values, so many are looked at for others that they make needless.
+        exchanged: usize = 4,
         /// A set is not chosen, however much it lowers the loss, that raises the open-loop error on left-out stretches by
         /// more than so many standard errors
         worse_by: f64 = 1.0,

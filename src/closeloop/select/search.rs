@@ -44,6 +44,13 @@ pub struct Search<'a, 'p> {
     progress: &'p mut dyn FnMut(Progress<'_>),
 }
 
+/// A set that is better than what its round began with, and its rank among the sets of the round.
+struct Better {
+    round: usize,
+    rank: usize,
+    trial: Trial,
+}
+
 impl<'a, 'p> Search<'a, 'p> {
     /// `progress` receives what is being tried.
     pub fn new(
@@ -98,20 +105,8 @@ impl<'a, 'p> Search<'a, 'p> {
             if !study.has_time() {
                 break;
             }
-            let step = study.settings.select.step;
-            let next = match self.better(&best, step, |search, best| search.round(best)) {
-                Some(next) => {
-                    self.vain.clear();
-                    next
-                }
-                // An exchange adds nothing: a smaller gain will do.
-                None => {
-                    let step = study.settings.select.exchange;
-                    match self.better(&best, step, |search, best| search.exchanged(best)) {
-                        Some(next) => next,
-                        None => break,
-                    }
-                }
+            let Some(next) = self.next(&best) else {
+                break;
             };
             best = self.estimated(next)?;
             if passed.contains(&best.key()) {
@@ -120,6 +115,24 @@ impl<'a, 'p> Search<'a, 'p> {
             passed.push(best.key());
         }
         Ok(best)
+    }
+
+    /// The best set with effects added or, where that is not a large gain, with one exchanged: what is missing beside a wrong effect
+    /// may be little more than that effect's error.
+    fn next(&mut self, best: &Trial) -> Option<Trial> {
+        let settings = &self.study.settings.select;
+        let added = self.better(best, settings.step, Self::round);
+        let is_large = |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large);
+        if added.as_ref().is_some_and(is_large) {
+            self.vain.clear();
+            return added.map(|added| self.choose(added));
+        }
+        // An exchange adds nothing, so it goes first, and a smaller gain will do.
+        if let Some(exchanged) = self.better(best, settings.exchange, Self::exchanged) {
+            return Some(self.choose(exchanged));
+        }
+        self.vain.clear();
+        added.map(|added| self.choose(added))
     }
 
     /// A trial at a scale of its own: the residuals have fallen, and smaller effects show. It stays at the one it has where no
@@ -141,21 +154,25 @@ impl<'a, 'p> Search<'a, 'p> {
         from: &Trial,
         share: f64,
         round: impl FnOnce(&mut Self, &Trial) -> Vec<Trial>,
-    ) -> Option<Trial> {
+    ) -> Option<Better> {
         let enough = from.loss() * (1.0 - share);
         let trials = round(self, from);
         let better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
         let mut better = better.peekable();
         better.peek()?;
         let ahead = Ahead::of(self.study, from);
-        let (rank, best) = better.find(|(_, trial)| {
+        let (rank, trial) = better.find(|(_, trial)| {
             let settings = &self.study.settings.select;
             !Ahead::of(self.study, trial).is_worse_than(&ahead, settings)
         })?;
-        if let Some(round) = self.rounds.last_mut() {
-            round.tried[rank].chosen = true;
-        }
-        Some(best)
+        let round = self.rounds.len() - 1;
+        Some(Better { round, rank, trial })
+    }
+
+    /// The trial that a round found, noted as chosen.
+    fn choose(&mut self, Better { round, rank, trial }: Better) -> Trial {
+        self.rounds[round].tried[rank].chosen = true;
+        trial
     }
 
     /// Report progress.
@@ -177,6 +194,7 @@ impl<'a, 'p> Search<'a, 'p> {
             let fitted = search.fitted_for_the_best(declared, blocks);
             search.noted(declared, fitted, 0)
         });
+        let best = best.map(|best| self.choose(best));
         match best.map(|best| self.estimated(best)) {
             Some(Ok(best)) => best,
             _ => declared,
@@ -249,6 +267,9 @@ impl<'a, 'p> Search<'a, 'p> {
         let study = self.study;
         let mut exchanges = exchanges(study, self.library, &from.fitted);
         exchanges.retain(|exchange| !self.vain.contains(&exchange.labels));
+        if exchanges.is_empty() {
+            return Vec::new();
+        }
         let sets = exchanges.iter().map(|exchange| exchange.set.clone());
         let fitted = self.fitted(from, sets.collect(), from.loss());
         let better = fitted.iter().filter(|trial| trial.loss() < from.loss());
@@ -294,8 +315,16 @@ impl<'a, 'p> Search<'a, 'p> {
                 less.remove(k - declared);
                 less
             }));
-            let mut good = self.as_good_as(best, &current, sets);
-            good.retain(|trial| trial.values() < current.values());
+            let good = self.as_good_as(best, &current, sets);
+            let is_simpler = |trial: &Trial| trial.values() < current.values();
+            let (mut good, mut other): (Vec<_>, Vec<_>) = good.into_iter().partition(is_simpler);
+            if good.is_empty() {
+                // An exchange may make others needless.
+                other.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
+                let few = other.iter().take(study.settings.select.exchanged);
+                good = few.map(|trial| self.least(trial, best)).collect();
+                good.retain(is_simpler);
+            }
             let order = |a: &Trial, b: &Trial| {
                 let by_loss = a.loss().total_cmp(&b.loss());
                 a.shifts().cmp(&b.shifts()).then(by_loss)
