@@ -297,8 +297,10 @@ impl<'t> TangentStepper<'t> {
                 let damping =
                     -(self.by_state[(2 * n + 1) * j + n].get(simd, part) * h.get(simd, part));
                 let most = damping.like(MOST_DAMPING / n as f64);
-                let one = damping.like(1.0);
-                let share = most.if_less(damping, most / damping, one);
+                if !most.any_less(damping) {
+                    continue;
+                }
+                let share = most.if_less(damping, most / damping, damping.like(1.0));
                 for row in 0..n {
                     let slope = &mut self.by_state[2 * n * row + n + j];
                     slope.set(part, slope.get(simd, part) * share);
