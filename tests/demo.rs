@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::support::{refuses, residyn, succeeds, text};
+use crate::support::{evaluated, refuses, residyn, succeeds, text};
 
 fn demo(seed: &str) -> (Value, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
@@ -161,11 +161,7 @@ fn other_commands_read_the_written_files() {
         "--out",
         text(&log),
     ]);
-    let error = |arguments: &[&str]| {
-        let all = [&["evaluate", "--json", "--test", text(&log)], arguments].concat();
-        let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
-        value["position_rmse"][1][0].as_f64().unwrap()
-    };
+    let error = |model: &[&str]| evaluated(model, text(&log));
     let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
     let fitted = error(&["--model", text(&model)]);
     assert!(fitted < 0.01, "{fitted}");

@@ -13,7 +13,7 @@ use residyn::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
 use serde_json::Value;
 
 use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
-use crate::support::{refuses, succeeds, text};
+use crate::support::{evaluated, refuses, succeeds, text};
 use rand::RngExt;
 
 const DELAY_S: f64 = 0.0073;
@@ -236,11 +236,7 @@ fn closing_the_loop_names_the_effect_with_memory_or_of_the_sensor() {
         assert!(end(0) < truth && truth < end(1), "{parameter}");
 
         // What was written predicts the same when it is read again.
-        let error = |model: &[&str]| -> f64 {
-            let all = [&["evaluate", "--json", "--test", test], model].concat();
-            let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
-            value["position_rmse"][1][0].as_f64().unwrap()
-        };
+        let error = |model: &[&str]| evaluated(model, test);
         let told = |which: &str| {
             report["error"][which]["position_rmse"][1][0]
                 .as_f64()

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::{succeeds, text};
+use crate::support::{evaluated, succeeds, text};
 
 /// Friction on one side of the turn that depends on the angle: no effect of the library, and a network that is trained on
 /// slow motion continues it at random where the pendulum swings higher and faster.
@@ -57,14 +57,9 @@ fn it_helps_on_motion_like_its_own_and_does_no_harm_on_other_motion() {
     let report: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["network"]["used"], true, "{}", report["network"]);
     // As the program reads the two models that it wrote.
-    let error = |model: &[&str], log: &str| {
-        let all = [&["evaluate", "--json", "--test", log], model].concat();
-        let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
-        value["position_rmse"][1][0].as_f64().unwrap()
-    };
     let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
-    let after = |log: &str| error(&["--model", text(&model)], log);
-    let hybrid = |log: &str| error(&["--checkpoint", text(&checkpoint)], log);
+    let after = |log: &str| evaluated(&["--model", text(&model)], log);
+    let hybrid = |log: &str| evaluated(&["--checkpoint", text(&checkpoint)], log);
     let share = hybrid(test) / after(test);
     assert!(share < 0.5, "{share}");
     let share = hybrid(&fast) / after(&fast);

@@ -37,6 +37,13 @@ pub fn refuses(arguments: &[&str]) -> String {
     errors
 }
 
+/// The error 0.5 s ahead of the first joint on a log, as `residyn evaluate` gives it for `--model FILE` or `--checkpoint DIR`.
+pub fn evaluated(model: &[&str], log: &str) -> f64 {
+    let all = [&["evaluate", "--json", "--test", log], model].concat();
+    let value: serde_json::Value = serde_json::from_str(&succeeds(&all)).unwrap();
+    value["position_rmse"][1][0].as_f64().unwrap()
+}
+
 /// A path as text.
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are UTF-8")

@@ -117,8 +117,8 @@ impl<'a, 'p> Search<'a, 'p> {
         Ok(best)
     }
 
-    /// The best set with effects added or, where that is not a large gain, with one exchanged: what is missing beside a wrong effect
-    /// may be little more than that effect's error.
+    /// The best set with effects added or, where that is not a large gain, with one exchanged: what is missing beside a
+    /// wrong effect may be little more than that effect's error.
     fn next(&mut self, best: &Trial) -> Option<Trial> {
         let settings = &self.study.settings.select;
         let added = self.better(best, settings.step, Self::round);
