@@ -400,8 +400,8 @@ fn a_rig_at_rest_is_inconclusive() {
     }
 }
 
-/// The horizons of the report on one log of this length, without test logs.
-fn horizons(duration_s: f64) -> Vec<f64> {
+/// The horizons of the report on one log of this length, without test logs, and those that it does not give.
+fn horizons(duration_s: f64) -> [Vec<f64>; 2] {
     let mut plant = rig();
     plant.recording.duration_s = duration_s;
     let log = plant.record(&mut rng(0)).unwrap();
@@ -412,14 +412,15 @@ fn horizons(duration_s: f64) -> Vec<f64> {
         assert_eq!(outcome.verdict, Verdict::Inconclusive);
     }
     let horizons = &outcome.errors.after.horizons;
-    horizons.iter().map(|errors| errors.horizon_s).collect()
+    let scored = horizons.iter().map(|errors| errors.horizon_s).collect();
+    [scored, outcome.given.unscored_s]
 }
 
 #[test]
 fn one_short_log_is_split_so_that_it_can_be_judged() {
-    assert_eq!(horizons(12.0), [0.1, 0.5, 1.0]);
-    assert_eq!(horizons(3.2), [0.1, 0.5]);
-    assert_eq!(horizons(1.6), [0.1]);
+    assert_eq!(horizons(12.0), [vec![0.1, 0.5, 1.0], vec![]]);
+    assert_eq!(horizons(3.2), [vec![0.1, 0.5], vec![1.0]]);
+    assert_eq!(horizons(1.6), [vec![0.1], vec![0.5, 1.0]]);
     let split = Split::of(vec![recorded("a.csv", 0)], &Settings::default().split);
     let SplitMethod::EndOfEachLog { share, .. } = split.method else {
         panic!("{:?}", split.method);

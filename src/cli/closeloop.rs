@@ -80,9 +80,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     request.against = against;
     request.learner = Some(&learner);
     request.budget = Some(arguments.budget);
+    let mut estimate = progress::Estimate::new();
     let mut outcome = close_loop(request, &mut rng, &mut |now| {
         bar.set_position(now.stage.number() as u64);
-        bar.set_message(now.text.to_owned());
+        bar.set_message(estimate.message(&now));
     })?;
     bar.finish_and_clear();
     let origin = origin(arguments, &declared);

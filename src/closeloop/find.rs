@@ -5,10 +5,10 @@ use super::establish::{Standing, establish, without_each};
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
 use super::select::{Rival, Round, Search, Trial, candidates, left_out_losses, starts};
-use super::stage::{Progress, Stage};
+use super::stage::{Observer, Stage};
 use super::study::Study;
 use crate::identify::{FitError, Identifiability};
-use crate::model::{Library, Status};
+use crate::model::{Library, Model, Status};
 
 /// The result of searching the logs for what the declared model lacks.
 pub struct Found {
@@ -41,6 +41,22 @@ impl Chosen {
             .filter(|s| s.status == Status::Established)
             .count()
     }
+
+    /// None of the effects is established, for this reason.
+    pub fn demote(&mut self, reason: &str) {
+        for standing in &mut self.standings {
+            standing.status = Status::Supported;
+            standing.reason = Some(reason.into());
+        }
+    }
+
+    /// Note in a model with these effects how each of them stands.
+    pub fn mark(&self, study: &Study<'_>, model: &mut Model) {
+        let added = study.added(model);
+        for (effect, standing) in model.effects[added].iter_mut().zip(&self.standings) {
+            effect.status = Some(standing.status);
+        }
+    }
 }
 
 /// Stages 3 to 5: fit the declared model, choose the set of effects that explains the logs best, judge each of them and
@@ -52,7 +68,7 @@ pub fn find(
     study: &mut Study<'_>,
     library: &Library,
     rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
 ) -> Result<Found, StudyError> {
     progress(Stage::Fit.into());
     let before = study.fit_declared(library.effects())?;
@@ -73,18 +89,11 @@ pub fn find(
     if left.is_significant()
         && share_left(study, &before, &chosen.after) > study.settings.establish.masking
     {
-        for standing in &mut chosen.standings {
-            standing.status = Status::Supported;
-            standing.reason = Some(MASKING.into());
-        }
+        chosen.demote(MASKING);
     }
-    let added = study.added(&chosen.after.model);
-    for (effect, standing) in chosen.after.model.effects[added]
-        .iter_mut()
-        .zip(&chosen.standings)
-    {
-        effect.status = Some(standing.status);
-    }
+    let mut marked = chosen.after.model.clone();
+    chosen.mark(study, &mut marked);
+    chosen.after.model = marked;
     if chosen.established() == 0 && !chosen.standings.is_empty() {
         // What is not established explains nothing.
         left = unexplained(study, library.probes(), &before, &before, rng);
@@ -107,7 +116,7 @@ fn second_search(
     study: &Study<'_>,
     library: &Library,
     before: &Fitted,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
 ) -> Option<(Identifiability, Chosen)> {
     let mut short = study.over_short_windows();
     let declared = short.fit_started().ok()?;
@@ -125,7 +134,7 @@ fn choose(
     study: &Study<'_>,
     library: &Library,
     before: &Fitted,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
     select: impl FnOnce(&mut Search<'_, '_>) -> Result<Trial, FitError>,
 ) -> Chosen {
     let mut search = Search::new(study, library.effects(), progress);

@@ -13,7 +13,7 @@ use super::fitted::Fitted;
 use super::refine::Refined;
 use super::settings::LearnSettings;
 use super::split::between;
-use super::stage::{Progress, Stage};
+use super::stage::{Observer, Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::model::{Dynamics, Origin};
@@ -111,7 +111,7 @@ pub(super) fn learn(
     refined: &Refined<'_>,
     learner: Option<&dyn ResidualLearner>,
     rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
 ) -> Result<Option<Learned>, LearnError> {
     let Some(learner) = learner else {
         return Ok(None);

@@ -55,6 +55,6 @@ pub use settings::{
 };
 pub(crate) use split::between;
 pub use split::{Split, SplitMethod};
-pub use stage::{Progress, Stage};
+pub use stage::{Fits, Observer, Progress, Stage};
 pub use study::Study;
 pub use verdict::Verdict;

@@ -44,6 +44,8 @@ pub struct Given {
     /// Of the training logs, then of the test logs.
     pub audits: Vec<Audit>,
     pub settings: Settings,
+    /// Horizons in s of which the test logs hold no window.
+    pub unscored_s: Vec<f64>,
     /// For each joint whether it slides rather than turns.
     pub prismatic: Vec<bool>,
 }

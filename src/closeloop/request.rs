@@ -55,21 +55,22 @@ impl<'a> Request<'a> {
         Self::new(model, library, split)
     }
 
-    /// The same with those of the horizons of which the test logs hold a window.
+    /// The same with those of the horizons of which the test logs hold a window, and the others.
     ///
     /// # Errors
     /// Test logs without a window of any of them.
-    pub(super) fn scorable(mut self) -> Result<Self, StudyError> {
-        let horizons_s = &mut self.settings.score.horizons_s;
-        let shortest_s = horizons_s.iter().copied().fold(f64::INFINITY, f64::min);
-        horizons_s.retain(|horizon_s| window_count(&self.split.test, *horizon_s) > 0);
-        if horizons_s.is_empty() {
+    pub(super) fn scorable(mut self) -> Result<(Self, Vec<f64>), StudyError> {
+        let horizons_s = self.settings.score.horizons_s.drain(..);
+        let (scored_s, unscored_s): (Vec<_>, Vec<_>) =
+            horizons_s.partition(|horizon_s| window_count(&self.split.test, *horizon_s) > 0);
+        if scored_s.is_empty() {
             return Err(StudyError::NoTest {
-                shortest_s,
+                shortest_s: unscored_s.into_iter().fold(f64::INFINITY, f64::min),
                 found: self.serious_in_test(),
             });
         }
-        Ok(self)
+        self.settings.score.horizons_s = scored_s;
+        Ok((self, unscored_s))
     }
 
     /// The first serious finding about a test log, as the end of a sentence; empty without one.

@@ -12,9 +12,9 @@ use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
-use super::stage::{Clock, Progress, Stage};
+use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
-use super::verdict::verdict;
+use super::verdict::{Verdict, verdict};
 use crate::data::{Audit, Log, audit};
 use crate::model::{Library, Status};
 
@@ -26,8 +26,9 @@ use crate::model::{Library, Status};
 pub fn close_loop(
     request: Request<'_>,
     rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
 ) -> Result<Outcome, StudyError> {
+    let (request, unscored_s) = request.scorable()?;
     let Request {
         model,
         library,
@@ -36,10 +37,10 @@ pub fn close_loop(
         settings,
         budget,
         learner,
-    } = request.scorable()?;
+    } = request;
     let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
     let mut clock = Clock::start();
-    let progress: &mut dyn FnMut(Progress<'_>) = &mut |now: Progress<'_>| {
+    let progress: &mut Observer<'_> = &mut |now: Progress<'_>| {
         clock.note(now.stage);
         progress(now);
     };
@@ -59,10 +60,10 @@ pub fn close_loop(
     // Where nothing moves, anything could be found.
     let nothing = Library::empty();
     let library = if study.moves() { library } else { &nothing };
-    let found = find(&mut study, library, rng, progress)?;
+    let mut found = find(&mut study, library, rng, progress)?;
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
-    let refined = refine(&study, &found.before, &found.chosen.after);
+    let mut refined = refine(&study, &found.before, &found.chosen.after);
     let remainder = remainder(&study, &found, &refined);
     let mut of_train = of_train;
     // Logs over which the model diverges tell of no push.
@@ -82,10 +83,15 @@ pub fn close_loop(
     let hybrid = learned.as_ref().map(|learned| learned.network.hybrid());
     let models = [&refined.before, &refined.after];
     let errors = scorer.errors(model, models, hybrid, &against, rng);
+    let (verdict, reason) = verdict(&study, &found, &refined, &errors);
+    if verdict == Verdict::Unexplained {
+        // What raises the error on the test logs explains nothing.
+        found.chosen.demote(&reason);
+        found.chosen.mark(&study, &mut refined.after.model);
+    }
     let findings = findings(&study, &found.chosen, &refined, &scorer);
     let (findings, supported) =
         (findings.into_iter()).partition(|finding| finding.status == Status::Established);
-    let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     Ok(Outcome {
         verdict,
         reason,
@@ -108,6 +114,7 @@ pub fn close_loop(
             split: split.method,
             audits: [of_train, of_test].concat(),
             settings: settings.clone(),
+            unscored_s,
             prismatic: model.prismatic.clone(),
             studied,
         },

@@ -59,12 +59,25 @@ impl Stage {
 pub struct Progress<'t> {
     pub stage: Stage,
     pub text: &'t str,
+    /// How much of it is done, where it is a number of models to fit.
+    pub fits: Option<Fits>,
 }
+
+/// Models of which some are fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Fits {
+    pub done: usize,
+    pub of: usize,
+}
+
+/// Receives progress, from any of the threads that fit models.
+pub type Observer<'o> = dyn FnMut(Progress<'_>) + Send + 'o;
 
 impl<'t> Progress<'t> {
     /// A step within a stage.
     pub(super) fn within(stage: Stage, text: &'t str) -> Self {
-        Self { stage, text }
+        let fits = None;
+        Self { stage, text, fits }
     }
 }
 

@@ -246,6 +246,32 @@ effect = [
     );
 }
 
+/// Effects that the test logs contradict are not named where something is missing; where nothing is, more must be known.
+#[test]
+fn effects_that_raise_the_error_on_the_test_logs_explain_nothing() {
+    let (declared, library) = (pendulum(), Library::built_in());
+    let outcome = |significance: f64| {
+        let mut request = Request::of(&declared, &library, logs());
+        // Every effect counts as worse, and every remainder as noteworthy.
+        request.settings.verdict.worse = 0.0;
+        request.settings.establish.masking = f64::INFINITY;
+        let remainder = &mut request.settings.remainder;
+        (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
+        remainder.significance = significance;
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        close_loop(request, &mut rng, &mut |_| {}).unwrap()
+    };
+    let missing = outcome(2.0);
+    assert_eq!(missing.verdict, Verdict::Unexplained);
+    assert!(missing.effects.findings.is_empty());
+    let supported = &missing.effects.supported[0];
+    assert!(supported.reason.as_ref().unwrap().contains("test logs"));
+    let status = missing.models.after.model.effects[0].status;
+    assert_eq!(status, Some(Status::Supported));
+    let nothing_missing = outcome(0.0);
+    assert_eq!(nothing_missing.verdict, Verdict::Inconclusive);
+}
+
 /// The model is the same before and after, and so is its error.
 #[test]
 fn without_effects_the_error_reduction_is_zero() {

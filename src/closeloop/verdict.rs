@@ -30,11 +30,14 @@ pub(super) fn verdict(
 ) -> (Verdict, String) {
     let added = study.added(&found.chosen.after.model).len();
     let established = found.chosen.established();
+    let are_worse =
+        errors.after.position_rms() > study.settings.verdict.worse * errors.before.position_rms();
     match at_rest(study)
         .or_else(|| failure(found, refined))
-        .or_else(|| inconclusive(study, added, errors))
+        .or_else(|| inconclusive(study))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
+        None if added > 0 && are_worse => contradicted_by_test(&found.unexplained),
         None if found.chosen.stopped && established == 0 => {
             (Verdict::Inconclusive, format!("{STOPPED} than none"))
         }
@@ -73,7 +76,7 @@ fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
 }
 
 /// Why the logs allow no conclusion, if they do not.
-fn inconclusive(study: &Study<'_>, added: usize, errors: &Errors) -> Option<String> {
+fn inconclusive(study: &Study<'_>) -> Option<String> {
     let settings = &study.settings.verdict;
     let windows = study.shooting.windows.len();
     if windows < settings.fewest_windows {
@@ -83,25 +86,33 @@ fn inconclusive(study: &Study<'_>, added: usize, errors: &Errors) -> Option<Stri
         ));
     }
     let known = &study.identifiability;
-    if known.free > 0 && known.determined == 0 {
-        return Some(
-            "the training logs determine no parameter of the declared model; move the joints more"
-                .into(),
-        );
-    }
-    let worse = errors.after.position_rms() > settings.worse * errors.before.position_rms();
-    (added > 0 && worse).then(|| {
-        "the effects lower the loss on left-out stretches of the training logs but raise the error on the test logs: \
-         do not use them before logs of more varied motion confirm them"
+    (known.free > 0 && known.determined == 0).then(|| {
+        "the training logs determine no parameter of the declared model; move the joints more"
             .into()
     })
 }
 
-fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
-    let what_is_left = match left.place.as_str() {
+/// The verdict on effects that raise the error on the test logs.
+fn contradicted_by_test(left: &Unexplained) -> (Verdict, String) {
+    let reason = "the effects lower the loss on left-out stretches of the training logs but raise the error on the test \
+                  logs: do not use them before logs of more varied motion confirm them";
+    if left.is_significant() {
+        let reason = format!("{reason}; {}", what_is_left(left));
+        (Verdict::Unexplained, reason)
+    } else {
+        (Verdict::Inconclusive, reason.into())
+    }
+}
+
+fn what_is_left(left: &Unexplained) -> String {
+    match left.place.as_str() {
         UNKNOWN => "an unexplained remainder depends on none of the variables tested".to_owned(),
         place => format!("an unexplained remainder depends on {place}"),
-    };
+    }
+}
+
+fn conclusion(added: usize, left: &Unexplained) -> (Verdict, String) {
+    let what_is_left = what_is_left(left);
     match (added, left.is_significant()) {
         (0, false) => (
             Verdict::NoMissingEffect,

@@ -97,6 +97,12 @@ pub(super) fn errors(outcome: &Outcome) -> String {
             );
         }
     }
+    for horizon in &outcome.given.unscored_s {
+        let _ = writeln!(
+            out,
+            "\nNo test log holds a window of {horizon} s, so no error is given at that horizon."
+        );
+    }
     if let Some([low, high]) = outcome.errors.reduction_ci95 {
         let _ = writeln!(
             out,

@@ -200,6 +200,7 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
     ErrorEntry {
         logs: "test",
         horizons_s: errors.before.horizons.iter().map(|h| h.horizon_s).collect(),
+        unscored_s: outcome.given.unscored_s.clone(),
         declared: model(&errors.declared),
         before: model(&errors.before),
         after: model(&errors.after),

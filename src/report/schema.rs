@@ -195,6 +195,8 @@ pub(super) struct ErrorEntry {
     pub logs: &'static str,
     #[schemars(length(min = 1), extend("items" = json!({"type": "number", "exclusiveMinimum": 0})))]
     pub horizons_s: Vec<f64>,
+    /// horizons that were asked for, but are longer than any stretch of the test logs
+    pub unscored_s: Vec<f64>,
     /// the declared model with the values in its file, before any fit
     pub declared: ModelError,
     /// the declared model, its own parameters fitted

@@ -11,7 +11,7 @@ use super::fold::{Fold, Measured};
 use super::mujoco::Task;
 use crate::bench::answer::answer;
 use crate::closeloop::{
-    Progress, Request, ResidualLearner, Settings, Split, Study, StudyError, Verdict, close_loop,
+    Observer, Request, ResidualLearner, Settings, Split, Study, StudyError, Verdict, close_loop,
 };
 use crate::data::Log;
 use crate::model::{Library, Model};
@@ -148,7 +148,7 @@ impl Method {
         rig: &Measured,
         fold: &Fold,
         tools: &Tools<'_>,
-        progress: &mut dyn FnMut(Progress<'_>),
+        progress: &mut Observer<'_>,
     ) -> anyhow::Result<Found> {
         let (errors, said) = match self {
             Self::AsTheyAre => (as_they_are(rig, fold), None),
@@ -192,7 +192,7 @@ fn closed(
     rig: &Measured,
     fold: &Fold,
     tools: &Tools<'_>,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
 ) -> Result<Closed, StudyError> {
     let split = Split::given(fold.train.clone(), fold.test.clone());
     let mut request = Request::new(&rig.declared, tools.library, split);

@@ -92,7 +92,7 @@ pub fn calibrate(
     library: &Library,
     runs: usize,
     rng: &mut impl Rng,
-    progress: &mut dyn FnMut(Repetition<'_>),
+    progress: &mut (dyn FnMut(Repetition<'_>) + Send),
 ) -> Result<Calibration, StudyError> {
     let simulated = SimulatedLogs::new(study, accepted)?;
     let mut limits = detection_limits(study, accepted, library.effects())?;
@@ -147,7 +147,7 @@ struct Repeat<'a> {
     declared: Model,
     done: usize,
     of: usize,
-    progress: &'a mut dyn FnMut(Repetition<'_>),
+    progress: &'a mut (dyn FnMut(Repetition<'_>) + Send),
 }
 
 impl Repeat<'_> {

@@ -3,7 +3,7 @@ use thiserror::Error;
 use super::separation::{Separation, separation};
 use crate::closeloop::find::Found;
 use crate::closeloop::select::Rival;
-use crate::closeloop::stage::{Progress, Stage};
+use crate::closeloop::stage::{Observer, Progress, Stage};
 use crate::closeloop::study::Study;
 use crate::model::FittedEffect;
 
@@ -33,7 +33,7 @@ pub enum NotSimulated {
 pub(in crate::closeloop) fn discriminate(
     study: &Study<'_>,
     found: &Found,
-    progress: &mut dyn FnMut(Progress<'_>),
+    progress: &mut Observer<'_>,
 ) -> Vec<Alternative> {
     let fitted = &found.chosen.after;
     let stands = |effect: &FittedEffect| {

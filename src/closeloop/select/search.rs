@@ -1,4 +1,6 @@
 use std::collections::HashSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -11,7 +13,7 @@ use super::sets::{descent, promising};
 use super::simpler::{mended, simpler};
 use super::trial::{Trial, key};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::stage::{Progress, Stage};
+use crate::closeloop::stage::{Fits, Observer, Progress, Stage};
 use crate::closeloop::study::Study;
 use crate::identify::FitError;
 use crate::model::{Effect, FittedEffect};
@@ -41,7 +43,9 @@ pub struct Search<'a, 'p> {
     pub rounds: Vec<Round>,
     /// Exchanges that made the set worse since a round changed it, by the labels of the old and the new effect.
     vain: HashSet<[String; 2]>,
-    progress: &'p mut dyn FnMut(Progress<'_>),
+    /// What is being done, as it was told last.
+    doing: String,
+    progress: Mutex<&'p mut Observer<'p>>,
 }
 
 /// A set that is better than what its round began with, and its rank among the sets of the round.
@@ -56,14 +60,15 @@ impl<'a, 'p> Search<'a, 'p> {
     pub fn new(
         study: &'a Study<'a>,
         library: &'a [Effect],
-        progress: &'p mut dyn FnMut(Progress<'_>),
+        progress: &'p mut Observer<'p>,
     ) -> Self {
         Self {
             study,
             library,
             rounds: Vec::new(),
             vain: HashSet::new(),
-            progress,
+            doing: Stage::Select.text().into(),
+            progress: Mutex::new(progress),
         }
     }
 
@@ -87,7 +92,11 @@ impl<'a, 'p> Search<'a, 'p> {
     /// A model found there that cannot be fitted over longer windows, or a selected one that cannot be fitted again.
     pub fn select_from(&mut self, short: &Study<'_>, declared: Fitted) -> Result<Trial, FitError> {
         let study = self.study;
-        let mut search = Search::new(short, self.library, self.progress);
+        let progress = self
+            .progress
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner);
+        let mut search = Search::new(short, self.library, progress);
         let first = search.first(Trial::of(short, declared));
         let best = search.rounds_from(first)?;
         self.rounds = search.rounds;
@@ -176,12 +185,21 @@ impl<'a, 'p> Search<'a, 'p> {
     }
 
     /// Report progress.
-    pub fn tell(&mut self, progress: Progress<'_>) {
-        (self.progress)(progress);
+    pub fn tell(&self, progress: Progress<'_>) {
+        let mut observer = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        observer(progress);
     }
 
     fn say(&mut self, text: &str) {
+        text.clone_into(&mut self.doing);
         self.tell(Progress::within(Stage::Select, text));
+    }
+
+    /// Report that so many of the sets of effects are fitted.
+    fn tell_fitted(&self, done: usize, of: usize) {
+        let fits = Some(Fits { done, of });
+        let doing = Progress::within(Stage::Select, &self.doing);
+        self.tell(Progress { fits, ..doing });
     }
 
     /// The declared model or, where it helps, the model with what most machines have.
@@ -255,7 +273,12 @@ impl<'a, 'p> Search<'a, 'p> {
             }
             mended_from(study, library, &found, below)
         };
-        let mut trials: Vec<Trial> = sets.into_par_iter().filter_map(trial).collect();
+        let (of, done) = (sets.len(), AtomicUsize::new(0));
+        self.tell_fitted(0, of);
+        let tell =
+            |_: &Option<Trial>| self.tell_fitted(done.fetch_add(1, Ordering::Relaxed) + 1, of);
+        let tried = sets.into_par_iter().map(trial).inspect(tell);
+        let mut trials: Vec<Trial> = tried.flatten().collect();
         first_of_each(&mut trials, Vec::new(), Trial::key);
         trials
     }
