@@ -42,11 +42,14 @@ impl Chosen {
             .count()
     }
 
-    /// None of the effects is established, for this reason.
-    pub fn demote(&mut self, reason: &str) {
-        for standing in &mut self.standings {
-            standing.status = Status::Supported;
-            standing.reason = Some(reason.into());
+    /// Effects of which `is_meant` holds are not established, for this reason.
+    pub fn demote(&mut self, reason: &str, is_meant: impl Fn(&Standing) -> bool) {
+        let established = |standing: &&mut Standing| standing.status == Status::Established;
+        for standing in self.standings.iter_mut().filter(established) {
+            if is_meant(standing) {
+                standing.status = Status::Supported;
+                standing.reason = Some(reason.into());
+            }
         }
     }
 
@@ -89,7 +92,15 @@ pub fn find(
     if left.is_significant()
         && share_left(study, &before, &chosen.after) > study.settings.establish.masking
     {
-        chosen.demote(MASKING);
+        chosen.demote(MASKING, |_| true);
+    }
+    if left.is_significant() {
+        let share = |model: &Fitted| share_left(study, &before, model);
+        let with = share(&chosen.after);
+        chosen.demote(OUTWEIGHED, |standing| {
+            let without = standing.without.as_ref();
+            without.is_ok_and(|without| share(without) - with < left.fraction)
+        });
     }
     let mut marked = chosen.after.model.clone();
     chosen.mark(study, &mut marked);
@@ -109,6 +120,10 @@ pub fn find(
 /// Why effects are not established that leave most of the loss and an unexplained remainder.
 const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
+
+/// Why an effect is not established beside a remainder that is larger.
+const OUTWEIGHED: &str =
+    "more than it explains stays unexplained: it may be a part of the real cause's shape";
 
 /// A search that begins over short windows and from the declared values: with most of the force missing, fits over longer
 /// ones end in minima from which no set of effects looks right, and where other parameters seem undetermined.

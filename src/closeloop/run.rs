@@ -86,7 +86,7 @@ pub fn close_loop(
     let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     if verdict == Verdict::Unexplained {
         // What raises the error on the test logs explains nothing.
-        found.chosen.demote(&reason);
+        found.chosen.demote(&reason, |_| true);
         found.chosen.mark(&study, &mut refined.after.model);
     }
     let findings = findings(&study, &found.chosen, &refined, &scorer);
