@@ -7,24 +7,28 @@ use super::latex::Latex;
 use super::notation::{COMPARE, Notation, PRODUCT, Part, SIGN, SUM, Text, atom};
 use super::op::{Binary, Node, Op, Unary};
 
+/// Inputs and constants in a formula that is written out wherever it is used. Without a limit, the equations of a long chain
+/// would double with each of its joints.
+const READABLE: usize = 60;
+
 impl Program {
     /// The equations as formulas that the parser reads back: one line for each labelled intermediate, then one for each
     /// output, with these `names`.
     pub fn text(&self, names: &[&str]) -> String {
-        self.lines(&Text, names)
-            .map(|(l, r)| format!("{l} = {r}\n"))
-            .collect()
+        let lines = self.lines(&Text, names).into_iter();
+        lines.map(|(l, r)| format!("{l} = {r}\n")).collect()
     }
 
     /// The equations as assignments, left side and right side, with a name for every value that is used more than once;
     /// `names` are those of the outputs.
     pub fn assignments(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
-        let shared = self.shared();
+        let shared = self.shared(0);
         self.lines_with(notation, &shared, names).collect()
     }
 
-    /// The labels, and names for whatever else is used more than once.
-    fn shared(&self) -> Vec<(Node, String)> {
+    /// The labels, and names for whatever else is used more than once and has more than `terms` inputs and constants when it
+    /// is written out.
+    fn shared(&self, terms: usize) -> Vec<(Node, String)> {
         let mut uses = vec![0; self.ops.len()];
         let operands = self.ops.iter().flat_map(|op| op.operands());
         for node in operands.chain(self.outputs.iter().copied()) {
@@ -32,18 +36,25 @@ impl Program {
         }
         let mut taken: HashSet<String> = self.inputs.iter().cloned().collect();
         taken.extend(self.labels.iter().map(|(_, label)| label.clone()));
-        let labelled: HashSet<Node> = self.labels.iter().map(|(node, _)| *node).collect();
         let mut fresh = (1..)
             .map(|k| format!("w{k}"))
             .filter(|name| !taken.contains(name));
-        let more = (0..)
-            .map(Node)
-            .zip(&uses)
-            .filter(|(node, uses)| **uses > 1 && self.is_step(*node) && !labelled.contains(node));
-        let more: Vec<_> = more
-            .map(|(node, _)| (node, fresh.next().expect("names do not run out")))
-            .collect();
-        self.labels.iter().cloned().chain(more).collect()
+        let mut named = self.labels.clone();
+        let mut known: HashSet<Node> = named.iter().map(|(node, _)| *node).collect();
+        let mut sizes: Vec<usize> = Vec::with_capacity(self.ops.len());
+        for (node, uses) in (0..).map(Node).zip(uses) {
+            let operands = self.ops[node.index()].operands();
+            let size: usize = operands.map(|operand| sizes[operand.index()]).sum();
+            if uses > 1 && size > terms && self.is_step(node) && known.insert(node) {
+                named.push((node, fresh.next().expect("names do not run out")));
+            }
+            sizes.push(if known.contains(&node) {
+                1
+            } else {
+                size.max(1)
+            });
+        }
+        named
     }
 
     /// The formula of one output, with all intermediates written out.
@@ -60,19 +71,14 @@ impl Program {
 
     /// The equations as lines of a LaTeX `align` environment.
     pub fn latex(&self, names: &[&str]) -> String {
-        let lines: Vec<String> = self
-            .lines(&Latex, names)
-            .map(|(l, r)| format!("{l} &= {r}"))
-            .collect();
+        let lines = self.lines(&Latex, names).into_iter();
+        let lines: Vec<String> = lines.map(|(l, r)| format!("{l} &= {r}")).collect();
         lines.join(" \\\\\n")
     }
 
-    fn lines(
-        &self,
-        notation: &dyn Notation,
-        names: &[&str],
-    ) -> impl Iterator<Item = (String, String)> {
-        self.lines_with(notation, &self.labels, names)
+    fn lines(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
+        let named = self.shared(READABLE);
+        self.lines_with(notation, &named, names).collect()
     }
 
     /// One line for each node that has a name, then one for each output.
