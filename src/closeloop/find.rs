@@ -97,9 +97,10 @@ pub fn find(
     if left.is_significant() {
         let share = |model: &Fitted| share_left(study, &before, model);
         let with = share(&chosen.after);
+        let least = study.settings.establish.outweighed * left.fraction;
         chosen.demote(OUTWEIGHED, |standing| {
             let without = standing.without.as_ref();
-            without.is_ok_and(|without| share(without) - with < left.fraction)
+            without.is_ok_and(|without| share(without) - with < least)
         });
     }
     let mut marked = chosen.after.model.clone();
@@ -123,7 +124,7 @@ const MASKING: &str = "an unexplained remainder stays, and all effects together 
 
 /// Why an effect is not established beside a remainder that is larger.
 const OUTWEIGHED: &str =
-    "more than it explains stays unexplained: it may be a part of the real cause's shape";
+    "over twice what it explains stays unexplained: it may be a part of the real cause's shape";
 
 /// A search that begins over short windows and from the declared values: with most of the force missing, fits over longer
 /// ones end in minima from which no set of effects looks right, and where other parameters seem undetermined.

@@ -14,7 +14,7 @@ use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
 use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
-use super::verdict::{Verdict, verdict};
+use super::verdict::verdict;
 use crate::data::{Audit, Log, audit};
 use crate::model::{Library, Status};
 
@@ -60,10 +60,10 @@ pub fn close_loop(
     // Where nothing moves, anything could be found.
     let nothing = Library::empty();
     let library = if study.moves() { library } else { &nothing };
-    let mut found = find(&mut study, library, rng, progress)?;
+    let found = find(&mut study, library, rng, progress)?;
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
-    let mut refined = refine(&study, &found.before, &found.chosen.after);
+    let refined = refine(&study, &found.before, &found.chosen.after);
     let remainder = remainder(&study, &found, &refined);
     let mut of_train = of_train;
     // Logs over which the model diverges tell of no push.
@@ -84,11 +84,6 @@ pub fn close_loop(
     let models = [&refined.before, &refined.after];
     let errors = scorer.errors(model, models, hybrid, &against, rng);
     let (verdict, reason) = verdict(&study, &found, &refined, &errors);
-    if verdict == Verdict::Unexplained {
-        // What raises the error on the test logs explains nothing.
-        found.chosen.demote(&reason, |_| true);
-        found.chosen.mark(&study, &mut refined.after.model);
-    }
     let findings = findings(&study, &found.chosen, &refined, &scorer);
     let (findings, supported) =
         (findings.into_iter()).partition(|finding| finding.status == Status::Established);

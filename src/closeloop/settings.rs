@@ -163,6 +163,9 @@ settings! {
         /// Where an unexplained remainder stays, effects that leave more than this share of the loss do not explain
         /// it either: they would mask the real cause, and none is established.
         masking: f64 = 0.5,
+        /// Where an unexplained remainder stays, an effect that takes away less than this part of it is not established: it
+        /// may be a part of the real cause's shape.
+        outweighed: f64 = 0.5,
     }
 }
 

@@ -246,15 +246,16 @@ effect = [
     );
 }
 
-/// Effects that the test logs contradict are not named where something is missing; where nothing is, more must be known.
+/// Where the test logs contradict the effects, something is missing if a remainder stays; else more must be known.
 #[test]
-fn effects_that_raise_the_error_on_the_test_logs_explain_nothing() {
+fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
     let (declared, library) = (pendulum(), Library::built_in());
     let outcome = |significance: f64| {
         let mut request = Request::of(&declared, &library, logs());
         // Every effect counts as worse, and every remainder as noteworthy.
         request.settings.verdict.worse = 0.0;
         request.settings.establish.masking = f64::INFINITY;
+        request.settings.establish.outweighed = 0.0;
         let remainder = &mut request.settings.remainder;
         (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
         remainder.significance = significance;
@@ -262,14 +263,31 @@ fn effects_that_raise_the_error_on_the_test_logs_explain_nothing() {
         close_loop(request, &mut rng, &mut |_| {}).unwrap()
     };
     let missing = outcome(2.0);
-    assert_eq!(missing.verdict, Verdict::Unexplained);
-    assert!(missing.effects.findings.is_empty());
-    let supported = &missing.effects.supported[0];
-    assert!(supported.reason.as_ref().unwrap().contains("test logs"));
-    let status = missing.models.after.model.effects[0].status;
-    assert_eq!(status, Some(Status::Supported));
+    assert_eq!(missing.verdict, Verdict::PartlyExplained);
+    assert!(
+        missing.reason.contains("raise the error"),
+        "{}",
+        missing.reason
+    );
     let nothing_missing = outcome(0.0);
     assert_eq!(nothing_missing.verdict, Verdict::Inconclusive);
+}
+
+/// An effect beside a remainder that outweighs it may be a part of the real cause's shape.
+#[test]
+fn an_effect_that_a_remainder_outweighs_is_not_established() {
+    let (declared, library) = (pendulum(), Library::built_in());
+    let mut request = Request::of(&declared, &library, logs());
+    let remainder = &mut request.settings.remainder;
+    (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
+    remainder.significance = 2.0;
+    request.settings.establish.outweighed = f64::INFINITY;
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let outcome = close_loop(request, &mut rng, &mut |_| {}).unwrap();
+    assert!(outcome.effects.findings.is_empty());
+    let reason = outcome.effects.supported[0].reason.as_ref().unwrap();
+    assert!(reason.contains("stays unexplained"), "{reason}");
+    assert_eq!(outcome.verdict, Verdict::Unexplained);
 }
 
 /// The model is the same before and after, and so is its error.

@@ -37,7 +37,7 @@ pub(super) fn verdict(
         .or_else(|| inconclusive(study))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
-        None if added > 0 && are_worse => contradicted_by_test(&found.unexplained),
+        None if added > 0 && are_worse => contradicted(established, &found.unexplained),
         None if found.chosen.stopped && established == 0 => {
             (Verdict::Inconclusive, format!("{STOPPED} than none"))
         }
@@ -92,16 +92,15 @@ fn inconclusive(study: &Study<'_>) -> Option<String> {
     })
 }
 
-/// The verdict on effects that raise the error on the test logs.
-fn contradicted_by_test(left: &Unexplained) -> (Verdict, String) {
+/// The verdict on effects that raise the error on the test logs. That something is missing is sure where a remainder stays.
+fn contradicted(established: usize, left: &Unexplained) -> (Verdict, String) {
     let reason = "the effects lower the loss on left-out stretches of the training logs but raise the error on the test \
                   logs: do not use them before logs of more varied motion confirm them";
-    if left.is_significant() {
-        let reason = format!("{reason}; {}", what_is_left(left));
-        (Verdict::Unexplained, reason)
-    } else {
-        (Verdict::Inconclusive, reason.into())
+    if !left.is_significant() {
+        return (Verdict::Inconclusive, reason.into());
     }
+    let (verdict, _) = conclusion(established, left);
+    (verdict, format!("{reason}; {}", what_is_left(left)))
 }
 
 fn what_is_left(left: &Unexplained) -> String {
