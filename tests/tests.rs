@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod against;
+mod arms;
 mod bad_input;
 mod bench;
 mod bench_rigs;

@@ -1,7 +1,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use serde::Serialize;
 
@@ -10,7 +10,7 @@ use super::{Answer, Common};
 use crate::data::{Joint, LeaveOut, Log};
 use crate::identify::calibrate;
 use crate::model::{Dynamics, Model};
-use crate::sim::metric::{Summary, assess, summarise};
+use crate::sim::metric::{Summary, TorqueError, assess, summarise, torque_error};
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]
@@ -26,6 +26,9 @@ pub(super) struct Arguments {
     /// Horizons in s
     #[arg(long, num_args = 1.., default_values_t = [0.1, 0.5, 1.0], value_name = "S")]
     horizon: Vec<f64>,
+    /// Compare the torques that the logged motion needs with the logged ones as well
+    #[arg(long, conflicts_with = "checkpoint")]
+    torque: bool,
     /// Estimate each log's own sensor offsets on this fraction of it and score the rest
     #[arg(long, value_name = "F")]
     calibrate: Option<f64>,
@@ -43,6 +46,8 @@ pub(super) struct Arguments {
 struct Printed {
     #[serde(flatten)]
     summary: Summary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    torque: Option<TorqueError>,
     logs: Vec<LogEntry>,
     /// Estimated sensor offsets (rad or m), one list a log.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,6 +87,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             summary.horizons_s[h]
         );
     }
+    let torque = arguments
+        .torque
+        .then(|| torque(&declared, &logs))
+        .transpose()?;
     if arguments.common.json {
         let entry = |log: &Log| LogEntry {
             name: log.name(),
@@ -93,6 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         };
         let printed = Printed {
             summary,
+            torque,
             logs: logs.iter().map(entry).collect(),
             offsets: offsets.map(|offsets| offsets.offsets),
             integrator_step_s: assessment.step_s,
@@ -100,7 +110,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         };
         inputs::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
     } else {
-        inputs::print(&table(&summary))?;
+        let torque = torque.as_ref().map_or_else(String::new, torques);
+        inputs::print(&(table(&summary) + &torque))?;
     }
     Ok(Answer::Yes)
 }
@@ -121,6 +132,31 @@ fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
             Ok((declared, dynamics))
         }
     }
+}
+
+/// The error of the torques on logs.
+fn torque(model: &Model, logs: &[Log]) -> Result<TorqueError> {
+    if !model.has_mass_matrix() {
+        bail!(
+            "--torque: {} gives accelerations; state it as `mass` and `bias`, or as a chain",
+            model.name
+        );
+    }
+    torque_error(model, logs)
+        .ok_or_else(|| anyhow!("--torque: no log is longer than a second; give a longer one"))
+}
+
+fn torques(error: &TorqueError) -> String {
+    let mut out = String::from("\njoint  torque rms\n");
+    for (joint, rms) in Joint::all(error.rms.len()).zip(&error.rms) {
+        let _ = writeln!(out, "{joint:>5}  {rms:>10.5}");
+    }
+    let _ = writeln!(
+        out,
+        "relative to the logged torques: {:.2} %",
+        100.0 * error.relative
+    );
+    out
 }
 
 fn table(summary: &Summary) -> String {

@@ -12,10 +12,14 @@ use crate::model::{Library, Model};
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  residyn new --from-urdf arm.urdf --out arm.toml")]
+#[command(after_help = "Example:\n  residyn new --from-urdf arm.urdf --tip tool0 --out arm.toml")]
 pub(super) struct Arguments {
     #[command(flatten)]
     description: Description,
+    /// The last link of the chain (a body in MJCF); without it, the end of the longest branch. What hangs on other branches
+    /// is held where the file draws it
+    #[arg(long, value_name = "LINK")]
+    tip: Option<String>,
     /// The model file to write; standard output if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -76,7 +80,7 @@ impl FromArgMatches for Description {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Description { reader, file } = &arguments.description;
-    let chain = (reader.read)(file)?;
+    let chain = (reader.read)(file, arguments.tip.as_deref())?;
     let text = model_text(&chain);
     let name = Path::new(&chain.name);
     let model = Model::from_text(name, &text, Library::built_in().effects())?;

@@ -18,6 +18,9 @@ pub struct Columns {
     pub qd: Option<Vec<Column>>,
     /// Joint torques, joint 1 first.
     pub tau: Vec<Column>,
+    /// Names of the joints, if they have any. A standard column that a header lacks may be called by its joint's: `q_elbow`
+    /// for `q2`.
+    pub joint_names: Vec<String>,
 }
 
 impl Default for Columns {
@@ -28,6 +31,7 @@ impl Default for Columns {
             q: vec![],
             qd: Some(vec![]),
             tau: vec![],
+            joint_names: vec![],
         }
     }
 }
@@ -88,7 +92,29 @@ impl Columns {
             q: list("q", &self.q)?,
             qd: self.qd.as_ref().map(|qd| list("qd", qd)).transpose()?,
             tau: list("tau", &self.tau)?,
+            joint_names: self.joint_names.clone(),
         })
+    }
+
+    /// These columns, each that has its standard name and is not in the header by the name of its joint if that is there.
+    fn renamed_for(mut self, header: &[String]) -> Columns {
+        let has = |name: &String| header.contains(name);
+        let lists = [
+            ("q", Some(&mut self.q)),
+            ("qd", self.qd.as_mut()),
+            ("tau", Some(&mut self.tau)),
+        ];
+        for (stem, list) in lists {
+            let named = list.into_iter().flatten().zip(&self.joint_names);
+            for ((column, joint), number) in named.zip(1..) {
+                let by_joint = format!("{stem}_{joint}");
+                if column.name == format!("{stem}{number}") && !has(&column.name) && has(&by_joint)
+                {
+                    column.name = by_joint;
+                }
+            }
+        }
+        self
     }
 }
 
@@ -136,16 +162,20 @@ impl Header<'_> {
     pub fn layout(&self, joints: usize, columns: &Columns) -> Result<Layout, LogError> {
         self.check_is_a_header()?;
         let columns = columns.completed(joints, self.path)?;
-        if columns == Columns::standard(joints) {
+        let standard = Columns {
+            joint_names: columns.joint_names.clone(),
+            ..Columns::standard(joints)
+        };
+        if columns == standard {
             self.check_joint_count(joints)?;
         }
+        let passive = columns.tau == standard.tau && !self.has_one_like(LIKE_TORQUE);
+        let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY);
+        let columns = columns.renamed_for(&self.names);
         let all = |list: &[Column], quantity| {
             let find = |column: &Column| self.find(column, quantity, &columns);
             list.iter().map(find).collect::<Result<Vec<_>, _>>()
         };
-        let standard = Columns::standard(joints);
-        let passive = columns.tau == standard.tau && !self.has_one_like(LIKE_TORQUE);
-        let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY);
         let qd = columns.qd.as_deref().filter(|_| !still);
         let tau = Some(&columns.tau).filter(|_| !passive);
         Ok(Layout {
@@ -350,6 +380,19 @@ mod tests {
             (found.q, found.qd, found.tau),
             (vec![cell(2)], Some(vec![cell(4)]), Some(vec![cell(6)]))
         );
+    }
+
+    #[test]
+    fn columns_may_have_the_names_of_the_joints() {
+        let columns = Columns {
+            joint_names: vec!["base".into(), "elbow".into()],
+            ..Columns::default()
+        };
+        let header = "time,q_elbow,q_base,qd1,qd2,tau_base,tau_elbow";
+        let found = layout(header, 2, &columns).unwrap();
+        assert_eq!(found.q, [cell(2), cell(1)]);
+        assert_eq!(found.qd, Some(vec![cell(3), cell(4)]));
+        assert_eq!(found.tau, Some(vec![cell(5), cell(6)]));
     }
 
     #[test]

@@ -19,9 +19,11 @@ mod lag;
 pub mod leave_out;
 mod local_cubic;
 mod log;
+mod low_pass;
 mod projection;
 mod read;
 mod signal;
+mod smooth;
 pub(crate) mod statistics;
 mod trajectory;
 
@@ -36,4 +38,5 @@ pub use joint::Joint;
 pub use leave_out::{LeaveOut, LeaveOutError};
 pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};
+pub use smooth::Smooth;
 pub use trajectory::{Thinning, Trajectory, trajectories};

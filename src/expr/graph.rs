@@ -104,6 +104,15 @@ impl Graph {
         self.binary(Binary::Div, a, b)
     }
 
+    /// The sum of products.
+    pub fn dot(&mut self, a: &[Node], b: &[Node]) -> Node {
+        let zero = self.constant(0.0);
+        a.iter().zip(b).fold(zero, |sum, (a, b)| {
+            let product = self.mul(*a, *b);
+            self.add(sum, product)
+        })
+    }
+
     pub fn neg(&mut self, a: Node) -> Node {
         self.unary(Unary::Neg, a)
     }

@@ -36,7 +36,8 @@ pub struct Format {
 pub struct RobotReader {
     /// What can be read, in a few words.
     pub about: &'static str,
-    pub read: fn(&Path) -> Result<Chain, FileError>,
+    /// The chain that ends at a body; without one at the end of the longest branch.
+    pub read: fn(&Path, Option<&str>) -> Result<Chain, FileError>,
 }
 
 /// A file to be written.

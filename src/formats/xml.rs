@@ -41,7 +41,12 @@ impl<'x> Source<'x> {
 
     /// Note something about an element that is not an error.
     pub fn note(&self, node: Node<'_, '_>, message: impl fmt::Display) {
-        let place = self.document.text_pos_at(node.range().start);
+        self.note_at(node.range().start, message);
+    }
+
+    /// The same about what begins at that position, bytes.
+    pub fn note_at(&self, at: usize, message: impl fmt::Display) {
+        let place = self.document.text_pos_at(at);
         self.notes
             .borrow_mut()
             .push((place.row, message.to_string()));

@@ -35,6 +35,27 @@ impl Model {
         }
     }
 
+    /// The torque (N m, or N) of each joint by which a motion needs more than acts, after all effects: zero where the model is
+    /// right. Inputs are those of [`Dynamics`], then the accelerations. `None` for a model that gives accelerations, which
+    /// has no torques.
+    pub fn inverse_dynamics(&self) -> Option<Program> {
+        let sign = self.sign();
+        let mut assembly = Assembly::new(self, &self.effects, &sign);
+        let joints = Joint::all(self.joints);
+        let qdd: Vec<Node> = joints
+            .map(|joint| assembly.graph.input(&joint.name("qdd")))
+            .collect();
+        assembly.apply_sensors();
+        assembly.apply_torque_effects();
+        assembly.apply_forces();
+        let needed = assembly.torques(&qdd)?;
+        let both = needed.iter().zip(&assembly.tau);
+        let differences: Vec<Node> = both
+            .map(|(needed, acting)| assembly.graph.sub(*needed, *acting))
+            .collect();
+        Some(assembly.graph.finish(&differences))
+    }
+
     /// Every parameter of the model: the declared ones, then those of the effects, in their order.
     pub fn all_parameters(&self) -> Vec<Parameter> {
         let mut parameters = self.parameters.clone();
@@ -184,32 +205,59 @@ impl<'a> Assembly<'a> {
 
     fn accelerations(&mut self) -> Vec<Node> {
         let scope = self.declared_scope();
-        match &self.system.equations.motion {
-            Motion::Accelerations(formulas) => formulas
-                .iter()
-                .map(|formula| lower(&scope, &mut self.graph, formula))
-                .collect(),
+        let (mut matrix, bias) = match &self.system.equations.motion {
+            Motion::Accelerations(formulas) => return self.lowered(&scope, formulas),
             Motion::MassAndBias { mass, bias } => {
-                let mut matrix: Vec<Vec<Node>> = mass
-                    .iter()
-                    .map(|row| {
-                        row.iter()
-                            .map(|entry| lower(&scope, &mut self.graph, entry))
-                            .collect()
-                    })
-                    .collect();
-                self.add_inertia(&mut matrix);
-                let right: Vec<Node> = bias
-                    .iter()
-                    .zip(self.tau.clone())
-                    .map(|(entry, tau)| {
-                        let bias = lower(&scope, &mut self.graph, entry);
-                        self.graph.sub(tau, bias)
-                    })
-                    .collect();
-                self.graph.solve_spd(&matrix, &right)
+                let rows = mass.iter().map(|row| self.lowered(&scope, row));
+                (rows.collect(), self.lowered(&scope, bias))
             }
-        }
+            Motion::Chain(bodies) => {
+                let still = vec![self.graph.constant(0.0); self.system.joints];
+                let mut links = bodies.links(&mut self.graph, &scope);
+                (links.mass(), links.torques(&self.qd, &still))
+            }
+        };
+        self.add_inertia(&mut matrix);
+        self.solved(&matrix, &bias)
+    }
+
+    /// The torques that accelerations need.
+    fn torques(&mut self, qdd: &[Node]) -> Option<Vec<Node>> {
+        let scope = self.declared_scope();
+        let (mut matrix, bias) = match &self.system.equations.motion {
+            Motion::Accelerations(_) => return None,
+            Motion::MassAndBias { mass, bias } => {
+                let rows = mass.iter().map(|row| self.lowered(&scope, row));
+                (rows.collect(), self.lowered(&scope, bias))
+            }
+            Motion::Chain(bodies) => {
+                let none = vec![self.graph.constant(0.0); self.system.joints];
+                let mut links = bodies.links(&mut self.graph, &scope);
+                (vec![none; self.system.joints], links.torques(&self.qd, qdd))
+            }
+        };
+        self.add_inertia(&mut matrix);
+        let needed = matrix.iter().zip(bias).map(|(row, bias)| {
+            let accelerating = self.graph.dot(row, qdd);
+            self.graph.add(accelerating, bias)
+        });
+        Some(needed.collect())
+    }
+
+    fn lowered(&mut self, scope: &Scope, formulas: &[Located<Formula>]) -> Vec<Node> {
+        let formulas = formulas.iter();
+        formulas
+            .map(|formula| lower(scope, &mut self.graph, formula))
+            .collect()
+    }
+
+    /// The accelerations under the torques: matrix qdd + bias = tau.
+    fn solved(&mut self, matrix: &[Vec<Node>], bias: &[Node]) -> Vec<Node> {
+        let both = self.tau.iter().zip(bias);
+        let right: Vec<Node> = both
+            .map(|(tau, bias)| self.graph.sub(*tau, *bias))
+            .collect();
+        self.graph.solve_spd(matrix, &right)
     }
 
     fn add_inertia(&mut self, matrix: &mut [Vec<Node>]) {

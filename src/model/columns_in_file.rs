@@ -5,8 +5,15 @@ use crate::data::{Column, Columns, Quantity};
 
 const KEYS: &[&str] = &["column", "unit", "factor", "wrapped"];
 
-pub(super) fn columns(section: Option<Section<'_>>, joints: usize) -> Result<Columns, FileError> {
-    let mut columns = Columns::standard(joints);
+pub(super) fn columns(
+    section: Option<Section<'_>>,
+    joints: usize,
+    joint_names: &[String],
+) -> Result<Columns, FileError> {
+    let mut columns = Columns {
+        joint_names: joint_names.to_vec(),
+        ..Columns::standard(joints)
+    };
     let Some(section) = section else {
         return Ok(columns);
     };

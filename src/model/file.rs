@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::columns_in_file::columns;
 use super::effect::Effect;
 use super::reader::{Document, FileError, Located, Section};
-use super::system::{Equations, Model};
-use super::{effects_in_file, sections};
+use super::system::{Equations, Model, Motion};
+use super::{chain_in_file, effects_in_file, sections};
 use crate::expr::{Formula, Graph, Scope};
 
 impl Model {
@@ -34,6 +34,7 @@ impl Model {
             "columns",
             "parameters",
             "dynamics",
+            "chain",
             "energy",
             "residual",
             "effect",
@@ -41,24 +42,26 @@ impl Model {
         let section = top.required_section("system")?;
         section.only(sections::SYSTEM_KEYS)?;
         let joints = sections::joints(&section)?;
-        let dynamics = top.required_section("dynamics")?;
+        let joint_names = sections::joint_names(&section, joints)?;
+        let prismatic = sections::prismatic(&section, joints)?;
         let system = Self {
             name: section.required_text("name")?.value,
             about: section.text_or_empty("about")?,
             joints,
-            prismatic: sections::prismatic(&section, joints)?,
             sign_width: sections::sign_width(&section, joints)?,
-            columns: columns(top.section("columns")?, joints)?,
+            columns: columns(top.section("columns")?, joints, &joint_names)?,
+            joint_names,
             parameters: sections::parameters(top.section("parameters")?)?,
             effects: effects_in_file::read(&top, joints, library)?,
             hidden: sections::hidden(top.section("residual")?, joints)?,
             text: document.text.clone(),
             declaration: sections::declaration(&document.text),
             equations: Arc::new(Equations {
-                lets: sections::lets(document, &dynamics)?,
-                motion: sections::motion(document, &dynamics, joints)?,
+                lets: sections::lets(document, &top)?,
+                motion: motion(document, &top, &prismatic)?,
                 energy: sections::energy(top.section("energy")?)?,
             }),
+            prismatic,
         };
         system.check_names(&top)?;
         system.check_formulas(document)?;
@@ -95,7 +98,11 @@ impl Model {
     /// Lower every formula once, so that a wrong name is met here, with its place.
     fn check_formulas(&self, document: &Document) -> Result<(), FileError> {
         let mut graph = Graph::new();
-        let names = self.input_names();
+        let mut names = self.input_names();
+        if matches!(self.equations.motion, Motion::Chain(_)) {
+            // Bodies stay what they are while they move.
+            names.drain(..=3 * self.joints);
+        }
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {
             scope
@@ -116,4 +123,17 @@ impl Model {
         }
         Ok(())
     }
+}
+
+/// Equations of motion by formulas, or those of a chain of bodies.
+fn motion(document: &Document, top: &Section<'_>, prismatic: &[bool]) -> Result<Motion, FileError> {
+    let Some(chain) = top.section("chain")? else {
+        let dynamics = top.required_section("dynamics")?;
+        return sections::motion(document, &dynamics, prismatic.len());
+    };
+    if let Some(dynamics) = top.section("dynamics")? {
+        dynamics.only(&["let"])?;
+    }
+    let bodies = chain_in_file::chain(document, &chain, prismatic)?;
+    Ok(Motion::Chain(Box::new(bodies)))
 }

@@ -1,7 +1,9 @@
 //! Dynamics models: the file format, the library of effects, and the assembly of equations and effects into one program.
 
 mod assemble;
+mod bodies;
 pub mod chain;
+mod chain_in_file;
 mod columns_in_file;
 mod dynamics;
 mod effect;
@@ -37,4 +39,5 @@ pub use reader::FileError;
 pub(crate) use residual::nothing_but;
 pub use residual::with_residual;
 pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
+pub use sections::MOST_JOINTS;
 pub use system::Model;

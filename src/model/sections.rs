@@ -1,16 +1,25 @@
 //! The tables of a model file, read one by one.
 
+use std::collections::HashSet;
+
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Motion};
 use super::{MlpSettings, Parameter};
 use crate::expr::Formula;
 
-pub(super) const SYSTEM_KEYS: &[&str] = &["name", "about", "joints", "prismatic", "sign_width"];
+pub(super) const SYSTEM_KEYS: &[&str] = &[
+    "name",
+    "about",
+    "joints",
+    "joint_names",
+    "prismatic",
+    "sign_width",
+];
 const PARAMETER_KEYS: &[&str] = &[
     "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
 ];
 /// Enough for every serial arm; a limit catches slips such as `joints = 100`.
-const MOST_JOINTS: usize = 12;
+pub const MOST_JOINTS: usize = 12;
 
 pub(super) fn joints(section: &Section<'_>) -> Result<usize, FileError> {
     match section.whole("joints")? {
@@ -21,6 +30,20 @@ pub(super) fn joints(section: &Section<'_>) -> Result<usize, FileError> {
         }
         None => Err(section.error("`joints` is missing in [system]; give their number")),
     }
+}
+
+/// One name a joint, all different; without them an empty list.
+pub(super) fn joint_names(section: &Section<'_>, joints: usize) -> Result<Vec<String>, FileError> {
+    let Some(names) = section.texts("joint_names")? else {
+        return Ok(Vec::new());
+    };
+    let names: Vec<String> = names.into_iter().map(|name| name.value).collect();
+    let distinct: HashSet<&str> = names.iter().map(|name| name.trim()).collect();
+    if names.len() != joints || distinct.len() != joints || distinct.contains("") {
+        let message = format!("`joint_names` is a list of {joints} different names, one a joint");
+        return Err(section.error_at("joint_names", message));
+    }
+    Ok(names)
 }
 
 /// `prismatic = [1]` lists the joints that slide.
@@ -119,9 +142,13 @@ pub(super) fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<
 
 pub(super) fn lets(
     document: &Document,
-    dynamics: &Section<'_>,
+    top: &Section<'_>,
 ) -> Result<Vec<(String, Located<Formula>)>, FileError> {
-    let Some(section) = dynamics.section("let")? else {
+    let dynamics = top.section("dynamics")?;
+    let section = dynamics
+        .map(|dynamics| dynamics.section("let"))
+        .transpose()?;
+    let Some(section) = section.flatten() else {
         return Ok(Vec::new());
     };
     section

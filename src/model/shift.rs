@@ -3,6 +3,7 @@
 use super::Parameter;
 use super::effect::{Effect, EffectParameter, Entry, Measure};
 use super::fitted::FittedEffect;
+use super::reader::Located;
 use super::system::{Model, Motion};
 use crate::data::Joint;
 use crate::expr::{Formula, parse};
@@ -42,14 +43,16 @@ impl Model {
                 carriers.push(name);
             }
         }
-        let enters = |joint: &Joint| match &self.equations.motion {
-            Motion::Accelerations(formulas) => carries(&formulas[*joint].value, &carriers),
-            Motion::MassAndBias { mass, bias } => {
+        let enters = |formula: &Located<Formula>| carries(&formula.value, &carriers);
+        let last = |enters: &dyn Fn(&Joint) -> bool| Joint::all(self.joints).rev().find(enters);
+        match &self.equations.motion {
+            Motion::Accelerations(formulas) => last(&|joint| enters(&formulas[*joint])),
+            Motion::MassAndBias { mass, bias } => last(&|joint| {
                 let mut row = mass[*joint].iter().chain([&bias[*joint]]);
-                row.any(|formula| carries(&formula.value, &carriers))
-            }
-        };
-        Joint::all(self.joints).rev().find(enters)
+                row.any(enters)
+            }),
+            Motion::Chain(bodies) => bodies.outermost(enters),
+        }
     }
 }
 

@@ -2,6 +2,8 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::bodies::Bodies;
+use super::chain::Recovered;
 use super::dynamics::{Dynamics, OwnValue, Parameter};
 use super::effect::{Effect, Entry, Measure};
 use super::fitted::FittedEffect;
@@ -22,6 +24,8 @@ pub(super) enum Motion {
         mass: Vec<Vec<Located<Formula>>>,
         bias: Vec<Located<Formula>>,
     },
+    /// The same, of a chain of bodies.
+    Chain(Box<Bodies>),
 }
 
 /// The balance of energy and work: d(total)/dt = power along every motion.
@@ -48,6 +52,8 @@ pub struct Model {
     pub name: String,
     pub about: String,
     pub joints: usize,
+    /// As a URDF or the rig calls the joints; empty where they have numbers alone.
+    pub joint_names: Vec<String>,
     /// For each joint whether it slides (m, N) rather than turns (rad, N m).
     pub prismatic: Vec<bool>,
     /// Speed (rad/s or m/s) over which dry friction of each joint reverses, 0 for a jump. `None` if the file sets none:
@@ -89,6 +95,14 @@ impl Model {
     pub(super) fn own_names(&self) -> impl Iterator<Item = &str> {
         let lets = self.equations.lets.iter().map(|(name, _)| name.as_str());
         self.parameters.iter().map(|p| p.name.as_str()).chain(lets)
+    }
+
+    /// A joint for people: `2`, or `2 (elbow)` where it has a name.
+    pub fn joint_label(&self, joint: Joint) -> String {
+        match self.joint_names.get(joint.index()) {
+            Some(name) => format!("{joint} ({name})"),
+            None => joint.to_string(),
+        }
     }
 
     /// The names that formulas may use before any `let`: states, torques, time, parameters.
@@ -291,13 +305,12 @@ impl Model {
 
     /// Whether the file gives mass matrix and bias, which effects of the inertia need.
     pub fn has_mass_matrix(&self) -> bool {
-        matches!(self.equations.motion, Motion::MassAndBias { .. })
+        !matches!(self.equations.motion, Motion::Accelerations(_))
     }
 
     /// Total energy and the power of the torques as a program of [`Model::input_names`], where the file
-    /// states them: `[total, power, d total/dq.., d total/dqd..]`.
+    /// states them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
-        let energy = self.equations.energy.as_ref()?;
         let mut graph = Graph::new();
         let names = self.input_names();
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
@@ -312,10 +325,36 @@ impl Model {
             let node = lower(&scope, formula);
             scope.bind(name, node);
         }
-        let (total, power) = (lower(&scope, &energy.total), lower(&scope, &energy.power));
+        let (total, power) = match (&self.equations.energy, &self.equations.motion) {
+            (Some(energy), _) => (lower(&scope, &energy.total), lower(&scope, &energy.power)),
+            (None, Motion::Chain(bodies)) => bodies.energy(&mut graph, &scope),
+            _ => return None,
+        };
         let one = graph.constant(1.0);
         let slopes = graph.gradient(&[total], &[one], &states);
         Some(graph.finish(&[&[total, power], slopes.as_slice()].concat()))
+    }
+}
+
+impl Model {
+    /// The bodies that the file describes, where it describes a chain, at other values of the declared parameters.
+    pub(crate) fn mechanism(&self, values: &[f64]) -> Option<Recovered> {
+        let Motion::Chain(bodies) = &self.equations.motion else {
+            return None;
+        };
+        let mut graph = Graph::new();
+        let names = self.parameters.iter().map(|p| p.name.as_str());
+        let mut scope = Scope::of_inputs(&mut graph, names);
+        for (name, formula) in &self.equations.lets {
+            let node = scope.lower(&mut graph, &formula.value);
+            scope.bind(
+                name,
+                node.expect("formulas were checked when the file was read"),
+            );
+        }
+        let nodes = bodies.constants(&mut graph, &scope);
+        let numbers = graph.finish(&nodes).eval(&values[..self.parameters.len()]);
+        Some(bodies.mechanism(&numbers))
     }
 }
 
@@ -324,6 +363,7 @@ impl Motion {
         match self {
             Self::Accelerations(formulas) => Box::new(formulas.iter()),
             Self::MassAndBias { mass, bias } => Box::new(mass.iter().flatten().chain(bias)),
+            Self::Chain(bodies) => Box::new(bodies.formulas()),
         }
     }
 }

@@ -43,6 +43,11 @@ impl Model {
                     matrix(&column("tau"))
                 ));
             }
+            Motion::Chain(_) => lines.push(format!(
+                "M(q)\\,{} + h(q, \\dot q) &= {}",
+                matrix(&column("qdd")),
+                matrix(&column("tau"))
+            )),
         }
         lines
     }

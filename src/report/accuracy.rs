@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::text::label;
 use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
@@ -81,7 +82,8 @@ pub(super) fn errors(outcome: &Outcome) -> String {
             let cells: Vec<String> = models.iter().map(cell).collect();
             let _ = writeln!(
                 out,
-                "| {horizon} s | {joint} | {} | {} | {:.2} |",
+                "| {horizon} s | {} | {} | {} | {:.2} |",
+                label(outcome, joint),
                 before.windows[h],
                 cells.join(" | "),
                 rmse(after) / rmse(before).max(f64::MIN_POSITIVE)

@@ -7,9 +7,9 @@ use super::schema::{
     ModelError, NormEntry, ParameterEntry, Report, TriedEntry, UnexplainedEntry,
 };
 use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, Tried};
-use crate::data::{Audit, Log};
+use crate::data::{Audit, Joint, Log};
 use crate::identify::{Fit, FitError};
-use crate::model::{FittedEffect, Origin, OwnValue, Parameter};
+use crate::model::{FittedEffect, Model, Origin, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
@@ -30,6 +30,7 @@ impl Report {
             settings: outcome.given.settings.clone(),
             system: model.name.clone(),
             joints: model.joints,
+            joint_names: joint_names(&model),
             verdict: outcome.verdict,
             reason: outcome.reason.clone(),
             effects: outcome.effects.findings.iter().map(effect).collect(),
@@ -266,4 +267,14 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
     };
     let round = |round: &Round| round.tried.iter().map(entry).collect();
     outcome.effects.rounds.iter().map(round).collect()
+}
+
+fn joint_names(model: &Model) -> Vec<String> {
+    if model.joint_names.is_empty() {
+        Joint::all(model.joints)
+            .map(|joint| joint.name("q"))
+            .collect()
+    } else {
+        model.joint_names.clone()
+    }
 }

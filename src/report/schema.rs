@@ -41,6 +41,8 @@ pub struct Report {
     pub(super) system: String,
     #[schemars(range(min = 1))]
     pub(super) joints: usize,
+    /// as the model file or a URDF calls the joints, in their order; q1, q2 .. where they have no names
+    pub(super) joint_names: Vec<String>,
     pub(super) verdict: Verdict,
     /// why, in a sentence
     pub(super) reason: String,

@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use super::calibration::line;
 use super::remainder::proposal_line;
-use super::text::{headline, serious};
+use super::text::{headline, label, serious};
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::Outcome;
 use crate::data::Joint;
@@ -17,7 +17,8 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
     );
     out = serious(outcome).replace("**", "") + &out;
     for finding in &outcome.effects.findings {
-        let (name, joint) = (finding.effect.title(), finding.effect.joint);
+        let name = finding.effect.title();
+        let joint = label(outcome, finding.effect.joint);
         let _ = writeln!(
             out,
             "  {name} on joint {joint}: {}\n    {}",
@@ -50,7 +51,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
                 "rad"
             };
             let (before, after) = (small(before[h][joint]), small(after[h][joint]));
-            let seconds = horizon.horizon_s;
+            let (joint, seconds) = (label(outcome, joint), horizon.horizon_s);
             let _ = writeln!(
                 out,
                 "  joint {joint}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}"
@@ -85,7 +86,7 @@ fn errors(outcome: &Outcome, model: &Assessment) -> String {
             "rad"
         };
         let errors = list(&mut position_rmse.iter().map(|row| small(row[joint])));
-        format!("joint {joint} {errors} {unit}")
+        format!("joint {} {errors} {unit}", label(outcome, joint))
     };
     let seconds = list(&mut horizons_s.iter().map(f64::to_string));
     format!(

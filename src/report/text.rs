@@ -4,15 +4,15 @@ use super::accuracy::{contradicted, errors, parameters};
 use super::calibration::section;
 use super::remainder::remainder;
 use super::wording::{capitalised, listed, probability, reduction, values};
-use crate::closeloop::{Finding, Outcome, SplitMethod, Verdict};
-use crate::data::{Audit, Severity};
+use crate::closeloop::{Outcome, SplitMethod, Verdict};
+use crate::data::{Audit, Joint, Severity};
 use crate::model::FittedEffect;
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(outcome: &Outcome, seed: u64) -> String {
     let sections = [
         answer(outcome),
-        effects(&outcome.effects.findings),
+        effects(outcome),
         supported(outcome),
         errors(outcome),
         parameters(outcome),
@@ -61,7 +61,10 @@ pub(super) fn headline(outcome: &Outcome) -> String {
         .effects
         .findings
         .iter()
-        .map(|f| format!("**{}** on joint {}", f.effect.title(), f.effect.joint))
+        .map(|f| {
+            let joint = label(outcome, f.effect.joint);
+            format!("**{}** on joint {joint}", f.effect.title())
+        })
         .collect();
     match (outcome.verdict, found.is_empty()) {
         (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
@@ -73,7 +76,13 @@ pub(super) fn headline(outcome: &Outcome) -> String {
     }
 }
 
-fn effects(findings: &[Finding]) -> String {
+/// A joint for people.
+pub(super) fn label(outcome: &Outcome, joint: Joint) -> String {
+    outcome.models.after.model.joint_label(joint)
+}
+
+fn effects(outcome: &Outcome) -> String {
+    let findings = &outcome.effects.findings;
     if findings.is_empty() {
         return String::new();
     }
@@ -86,7 +95,7 @@ fn effects(findings: &[Finding]) -> String {
             out,
             "| {} | {} | `{}` | {} | {} | {} |",
             finding.effect.title(),
-            finding.effect.joint,
+            label(outcome, finding.effect.joint),
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
@@ -109,7 +118,7 @@ fn alternatives(outcome: &Outcome) -> String {
             out,
             "- **{}** on joint {}: {}. To tell them apart: {}.",
             alternative.effect.title(),
-            alternative.effect.joint,
+            label(outcome, alternative.effect.joint),
             alternative.reason,
             alternative.experiment()
         );
@@ -131,7 +140,7 @@ fn supported(outcome: &Outcome) -> String {
             out,
             "- **{}** on joint {}, {}: {}.",
             finding.effect.title(),
-            finding.effect.joint,
+            label(outcome, finding.effect.joint),
             values(finding).join(", "),
             finding.reason.as_deref().unwrap_or_default()
         );

@@ -8,24 +8,24 @@ use roxmltree::Node;
 
 use super::classes::Classes;
 use super::orientation::Angles;
-use super::{actuator, geom};
+use super::{actuator, equality, geom};
 use crate::formats::robot::element::Element;
-use crate::formats::robot::tree::{self, Body, Hinge};
+use crate::formats::robot::tree::{self, Body, Hinge, Mimics};
 use crate::formats::xml::{self, Source, elements, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, Spring};
 
-/// Read a serial mechanism from an MJCF file.
+/// Read the serial chain from the world of an MJCF file to the body `tip`, without one to the end of the longest branch.
 ///
 /// # Errors
 /// An unreadable file, invalid XML, anything but a serial chain of hinge and slide joints, or data outside of the file,
 /// such as meshes: with line, column and remedy.
-pub fn read_mjcf(path: &Path) -> Result<Chain, FileError> {
+pub fn read_mjcf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;
     let reader = Reader::new(&source)?;
     let gravity = reader.gravity()?;
-    let joints = tree::chain(&source, &reader.world()?)?;
+    let joints = tree::chain(&source, &reader.world()?, tip)?;
     reader.note_the_rest()?;
     let name = reader
         .root
@@ -64,6 +64,8 @@ struct Reader<'s, 'x> {
     inertia_from_geom: String,
     /// Effort limit of the drive (N m or N), by joint.
     efforts: HashMap<String, f64>,
+    /// What joints follow others, by their names.
+    mimics: HashMap<String, Mimics>,
 }
 
 impl<'s, 'x> Reader<'s, 'x> {
@@ -98,6 +100,7 @@ impl<'s, 'x> Reader<'s, 'x> {
                 .unwrap_or("auto")
                 .to_owned(),
             efforts: actuator::efforts(source, root, &classes, autolimits)?,
+            mimics: equality::mimics(source, root)?,
             source,
             root,
             classes,
@@ -142,7 +145,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             at: self.root.range().start,
             pose: Pose::identity(),
             joints: Vec::new(),
-            inertia: Inertia::none(),
+            inertia: Ok(Inertia::none()),
             children,
         })
     }
@@ -171,7 +174,7 @@ impl<'s, 'x> Reader<'s, 'x> {
                 origin: own.vector("pos")?,
             },
             joints: joints.collect::<Result<_, _>>()?,
-            inertia: self.inertia(node, class, &name)?,
+            inertia: self.inertia(node, class, &name),
             children: self.children(node, class)?,
             name,
         })
@@ -218,12 +221,14 @@ impl<'s, 'x> Reader<'s, 'x> {
         };
         let stiffness = linear(joint, "stiffness")?;
         let rest = position("springref")?;
+        let reference = position("ref")?;
         Ok(Hinge {
             at: joint.at(),
             slides,
             axis: joint.direction("axis", Vector3::z())?,
             anchor: joint.vector("pos")?,
-            reference: position("ref")?,
+            reference,
+            mimics: self.mimics.get(&name).cloned(),
             drivetrain: Drivetrain {
                 damping: linear(joint, "damping")?,
                 friction: joint.not_negative("frictionloss")?,
@@ -283,10 +288,6 @@ impl<'s, 'x> Reader<'s, 'x> {
     /// Note everything else in the file that acts on the motion.
     fn note_the_rest(&self) -> Result<(), FileError> {
         let section = |name| named(self.root, name).flat_map(elements);
-        if let Some(closed) = section("equality").find(|e| e.attribute("active") != Some("false")) {
-            let message = "equality constraints close loops; remove them, or set active=\"false\"";
-            return Err(self.source.error(closed, message));
-        }
         for (name, what) in [
             ("tendon", "tendons"),
             ("deformable", "flexible bodies"),

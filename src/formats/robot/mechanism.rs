@@ -72,7 +72,13 @@ impl Mechanism {
         if model.depends_on_time() {
             return Err("its equations depend on time".into());
         }
-        let found = recover(&model.declared(), &model.system.prismatic)?;
+        let found = match model.system.mechanism(&model.equations.values()) {
+            Some(chain) => chain,
+            None => recover(&model.declared(), &model.system.prismatic)?,
+        };
+        if found.joints.iter().any(|joint| joint.follows.is_some()) {
+            return Err("one of its links follows the joint of another".into());
+        }
         let still = Drive {
             gain: 1.0,
             gear: 1.0,
@@ -156,7 +162,7 @@ impl Mechanism {
         let mut parent = Pose::identity();
         let link = |joint: &Joint| {
             let own = frame(joint);
-            let pose = parent.then(&at_zero(joint)).then(&own.inverse());
+            let pose = parent.then(&joint.at_zero()).then(&own.inverse());
             parent = own;
             let inertia = joint.inertia.seen_from(&own);
             let centre = inertia.moment / inertia.mass;
@@ -191,25 +197,6 @@ fn frame(joint: &Joint) -> Pose {
         ]),
         origin: Vector3::zeros(),
     }
-}
-
-/// The joint's frame where its coordinate is zero.
-fn at_zero(joint: &Joint) -> Pose {
-    let (sin, cos) = joint.reference.sin_cos();
-    let back = if joint.slides {
-        Pose {
-            rotation: Matrix3::identity(),
-            origin: -Vector3::z() * joint.reference,
-        }
-    } else {
-        #[rustfmt::skip]
-        let rotation = Matrix3::new(cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0);
-        Pose {
-            rotation,
-            origin: Vector3::zeros(),
-        }
-    };
-    joint.pose.then(&back)
 }
 
 /// For each joint the velocity (rad/s or m/s) over which dry friction reverses; 0 where it jumps.

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
-use crate::formats::robot::tree::{self, Body, Hinge};
+use crate::formats::robot::tree::{self, Body, Hinge, Mimics};
 use crate::formats::xml::{self, Source, named};
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
@@ -14,12 +14,13 @@ use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 /// The format does not contain gravity: m/s^2, against z.
 const GRAVITY: f64 = 9.81;
 
-/// Read a serial mechanism from a URDF file. Gravity acts against z of the root link.
+/// Read the serial chain from the root of a URDF file to the link `tip`, without one to the end of the longest branch. Gravity
+/// acts against z of the root link.
 ///
 /// # Errors
 /// An unreadable file, invalid XML, or anything but a serial chain of revolute, continuous or prismatic joints: with
 /// line, column and remedy.
-pub fn read_urdf(path: &Path) -> Result<Chain, FileError> {
+pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;
     let file = Robot {
@@ -29,7 +30,7 @@ pub fn read_urdf(path: &Path) -> Result<Chain, FileError> {
     let base = file.base()?;
     let tree = file.body(base, None)?;
     file.check_all_hang_on(&tree)?;
-    let joints = tree::chain(&source, &tree)?;
+    let joints = tree::chain(&source, &tree, tip)?;
     file.note_the_rest();
     let name = file
         .root
@@ -108,7 +109,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             at: joint.unwrap_or(link).range().start,
             pose,
             joints: joints.into_iter().collect(),
-            inertia: self.inertia(link)?,
+            inertia: self.inertia(link),
             children,
         })
     }
@@ -182,12 +183,14 @@ impl<'s, 'x> Robot<'s, 'x> {
                 return Err(element.attribute_error("type", message));
             }
         };
-        if let Some(mimic) = named(joint, "mimic").next() {
-            let message = format!(
-                "joint `{name}` mimics another, which closes a loop; remove <mimic> and fix the joint, or let it move freely"
-            );
-            return Err(source.error(mimic, message));
-        }
+        let mimic = named(joint, "mimic").next().map(|mimic| {
+            let mimic = source.element(mimic);
+            Ok::<_, FileError>(Mimics {
+                leader: mimic.required_text("joint")?.to_owned(),
+                ratio: mimic.number_or("multiplier", 1.0)?,
+                offset: mimic.number_or("offset", 0.0)?,
+            })
+        });
         let axis = match named(joint, "axis").next() {
             Some(axis) => source.element(axis).direction("xyz", Vector3::x())?,
             None => Vector3::x(),
@@ -206,6 +209,7 @@ impl<'s, 'x> Robot<'s, 'x> {
             axis,
             anchor: Vector3::zeros(),
             reference: 0.0,
+            mimics: mimic.transpose()?,
             drivetrain,
         }))
     }

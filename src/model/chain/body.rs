@@ -1,6 +1,8 @@
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::{Inertia, Pose};
+use super::recursive::{Body, Place};
+use super::{Inertia, Pose, turn};
+use crate::data;
 
 /// A spring between a joint and its base: force `-stiffness * (q - rest)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +27,16 @@ pub struct Drivetrain {
     pub effort: Option<f64>,
 }
 
+/// How a joint follows another one: its coordinate is `ratio * q + offset` of the leader's q.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Follows {
+    /// Index of the leader among the joints of the chain.
+    pub leader: usize,
+    pub ratio: f64,
+    /// rad or m
+    pub offset: f64,
+}
+
 /// One joint of a serial chain, with everything that moves with it up to the next joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint {
@@ -44,10 +56,44 @@ pub struct Joint {
     pub axis: Vector3<f64>,
     /// In the joint's frame.
     pub inertia: Inertia,
+    /// Another joint of the chain that moves it.
+    pub follows: Option<Follows>,
     pub drivetrain: Drivetrain,
 }
 
-/// A serial mechanism: from 1 to [`MOST_JOINTS`](super::MOST_JOINTS) joints, each carrying the next.
+impl Joint {
+    /// The joint's frame in that of the previous joint (or the world) where its coordinate is zero.
+    pub fn at_zero(&self) -> Pose {
+        let back = if self.slides {
+            Pose {
+                rotation: Matrix3::identity(),
+                origin: -Vector3::z() * self.reference,
+            }
+        } else {
+            Pose {
+                rotation: turn(Vector3::z(), -self.reference),
+                origin: Vector3::zeros(),
+            }
+        };
+        self.pose.then(&back)
+    }
+
+    /// The inertia of its body, part by part.
+    pub fn body_parts(&self) -> Body<f64> {
+        let Inertia {
+            mass,
+            moment,
+            tensor,
+        } = self.inertia;
+        Body {
+            mass,
+            moment: moment.into(),
+            tensor: [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at| tensor[at]),
+        }
+    }
+}
+
+/// A serial mechanism: from 1 to [`MOST_JOINTS`](crate::model::MOST_JOINTS) joints, each carrying the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
     pub name: String,
@@ -56,4 +102,35 @@ pub struct Chain {
     pub joints: Vec<Joint>,
     /// Properties of the file that the model file does not carry, or carries in another form.
     pub notes: Vec<String>,
+}
+
+impl Chain {
+    /// The joints that follow no other, with their numbers.
+    pub fn leaders(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
+        let leaders = self.joints.iter().filter(|joint| joint.follows.is_none());
+        leaders
+            .enumerate()
+            .map(|(k, joint)| (data::Joint::at(k), joint))
+    }
+}
+
+/// Where each link sits, and what moves it. Joints that follow no other are numbered in their order.
+pub(super) fn places(joints: &[Joint]) -> Vec<Place> {
+    let leads = |joint: &&Joint| joint.follows.is_none();
+    let number = |at: usize| data::Joint::at(joints[..at].iter().filter(leads).count());
+    let place = |(at, joint): (usize, &Joint)| {
+        let follows = joint.follows.unwrap_or(Follows {
+            leader: at,
+            ratio: 1.0,
+            offset: 0.0,
+        });
+        Place {
+            pose: joint.at_zero(),
+            slides: joint.slides,
+            joint: number(follows.leader),
+            ratio: follows.ratio,
+            offset: follows.offset,
+        }
+    };
+    joints.iter().enumerate().map(place).collect()
 }

@@ -3,7 +3,7 @@
 //! Velocities are propagated along the chain as Jacobians (the share of each joint), in the axes of each link. The
 //! contribution of one unit of a parameter to the mass matrix and to the potential is then a sum of products.
 
-use nalgebra::{Cholesky, DMatrix, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::body::Joint;
 use super::series::{Series, Wave};
@@ -72,7 +72,7 @@ impl Kind {
     }
 
     /// The value of a joint's parameter; 0 where it is rounding.
-    fn value(self, joint: &Joint) -> f64 {
+    pub fn value(self, joint: &Joint) -> f64 {
         let (inertia, size) = (&joint.inertia, joint.inertia.tensor.trace());
         let (value, size) = match self {
             Self::Tensor(a, b) => (inertia.tensor[(a, b)], size),
@@ -117,27 +117,6 @@ fn rotor(joints: usize, joint: usize) -> Vec<Vec<Series>> {
     let mut mass = vec![vec![Series::default(); joints]; joints];
     mass[joint][joint] = Series::constant(1.0);
     mass
-}
-
-/// The outermost joint that moves no inertia in some position, if any.
-pub(crate) fn without_inertia(joints: &[Joint]) -> Option<usize> {
-    let columns = columns(joints, &Vector3::zeros());
-    let is_regular =
-        |first: usize| (0..4).all(|trial| is_regular(&columns, joints.len(), first, trial));
-    (0..joints.len()).rev().find(|first| !is_regular(*first))
-}
-
-/// Whether the mass matrix of the joints from `first` on is positive definite, beyond rounding.
-fn is_regular(columns: &[Column], joints: usize, first: usize, trial: u32) -> bool {
-    let q: Vec<f64> = (0..joints)
-        .map(|j| 0.3 + f64::from(trial) * (1.0 + 0.4 * j as f64))
-        .collect();
-    let mass = DMatrix::from_fn(joints - first, joints - first, |i, j| {
-        let of = |column: &Column| column.value * column.mass[first + i][first + j].value(&q);
-        columns.iter().map(of).sum::<f64>()
-    });
-    let scale: f64 = mass.diagonal().iter().product();
-    Cholesky::new(mass).is_some_and(|root| root.determinant() > 1e-12 * scale)
 }
 
 /// The motion of a link's frame, in its own axes.

@@ -1,299 +1,88 @@
 //! Writes the model file of a chain.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 
-use super::base::{Base, base_parameters};
+use super::bodies_text::Bodies;
 use super::body::{Chain, Joint};
-use super::equations::{Kind, Lengths, columns};
-use super::formula::{factors, join, number, sum};
-use super::series::{Series, rounded};
+use super::closed_form::ClosedForm;
+use super::equations::Kind;
+use super::formula::number;
+use super::series::{LONGEST_CLOSED_FORM, rounded};
 use crate::data;
-
-/// Lines of formulas are broken beyond this many characters.
-const WIDTH: usize = 110;
 
 const ABOUT: &str = "equations derived from the description of a serial mechanism";
 
-/// The text of a model file for a chain: its equations in closed form with base parameters; damping, dry friction,
-/// rotors, springs and effort limits as effects.
+/// The text of a model file for a chain: of up to three joints its equations in closed form with base parameters, of more
+/// its bodies; damping, dry friction, rotors, springs and effort limits as effects.
 pub fn model_text(chain: &Chain) -> String {
-    let base = base_parameters(columns(&chain.joints, &chain.gravity));
-    let (of_drives, of_bodies): (Vec<Base>, Vec<Base>) = base
-        .into_iter()
-        .partition(|base| base.column.kind == Kind::Rotor);
-    let equations = Equations {
-        chain,
-        names: of_bodies
-            .iter()
-            .map(|b| name(b.column.kind, b.column.joint))
-            .collect(),
-        base: of_bodies,
-        lengths: Lengths::of(&chain.joints),
+    let follows = |joint: &Joint| joint.follows.is_some();
+    let is_long = chain.joints.len() > LONGEST_CLOSED_FORM;
+    let (equations, rotors) = if is_long || chain.joints.iter().any(follows) {
+        let armatures = chain.leaders().map(|(_, joint)| joint.drivetrain.armature);
+        (Bodies(chain).text(), armatures.collect())
+    } else {
+        let closed = ClosedForm::of(chain);
+        (closed.text(), closed.rotors())
     };
-    [
-        equations.head(),
-        equations.parameters(),
-        equations.dynamics(),
-        equations.energy(),
-        effects(chain, &of_drives),
-    ]
-    .concat()
+    [head(chain), equations, effects(chain, &rotors)].concat()
+}
+
+fn head(chain: &Chain) -> String {
+    let mut text = "# In the frame of each joint k, whose z is its axis: m_k mass, mx_k.. mass times centre of mass, xx_k.. inertia\n\
+        # tensor of what moves with it up to the next joint, J_k inertia of its rotor.\n"
+        .to_owned();
+    for (number, joint) in chain.leaders() {
+        let does = if joint.slides { "slides" } else { "turns" };
+        let _ = writeln!(
+            text,
+            "# joint {number} ({}) {does} {}: z is {}, x is {} of its frame",
+            joint.name,
+            joint.body,
+            direction(&joint.axis),
+            direction(&joint.across)
+        );
+    }
+    for note in &chain.notes {
+        let _ = writeln!(text, "# {note}");
+    }
+    let _ = write!(
+        text,
+        "\n[system]\nname = {}\nabout = {}\njoints = {}\n",
+        quoted(&chain.name),
+        quoted(ABOUT),
+        chain.leaders().count()
+    );
+    let names: Vec<String> = chain
+        .leaders()
+        .map(|(_, joint)| quoted(&joint.name))
+        .collect();
+    // In MJCF joints may have no names.
+    if names.iter().collect::<HashSet<_>>().len() == names.len() {
+        let _ = writeln!(text, "joint_names = [{}]", names.join(", "));
+    }
+    let slides: Vec<String> = chain
+        .leaders()
+        .filter(|(_, joint)| joint.slides)
+        .map(|(number, _)| number.to_string())
+        .collect();
+    if !slides.is_empty() {
+        let _ = writeln!(text, "prismatic = [{}]", slides.join(", "));
+    }
+    text
 }
 
 /// `zz_1`
-fn name(kind: Kind, joint: data::Joint) -> String {
+pub(super) fn name(kind: Kind, joint: data::Joint) -> String {
     format!("{}_{joint}", kind.stem())
 }
 
-/// The joints of a chain with their numbers.
-fn numbered(chain: &Chain) -> impl Iterator<Item = (data::Joint, &Joint)> {
-    data::Joint::all(chain.joints.len()).zip(&chain.joints)
-}
-
 /// A TOML string.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     toml_edit::Value::from(text).to_string()
 }
 
-/// The parts of the file.
-struct Equations<'c> {
-    chain: &'c Chain,
-    base: Vec<Base>,
-    names: Vec<String>,
-    lengths: Lengths,
-}
-
-impl Equations<'_> {
-    fn joints(&self) -> usize {
-        self.chain.joints.len()
-    }
-
-    fn head(&self) -> String {
-        let chain = self.chain;
-        let mut text = "# In the frame of each joint k, whose z is its axis: m_k mass, mx_k.. mass times centre of mass, xx_k.. inertia\n\
-            # tensor of what moves with it up to the next joint, J_k inertia of its rotor.\n"
-            .to_owned();
-        for (number, joint) in numbered(chain) {
-            let does = if joint.slides { "slides" } else { "turns" };
-            let _ = writeln!(
-                text,
-                "# joint {number} ({}) {does} {}: z is {}, x is {} of its frame",
-                joint.name,
-                joint.body,
-                direction(&joint.axis),
-                direction(&joint.across)
-            );
-        }
-        for note in &chain.notes {
-            let _ = writeln!(text, "# {note}");
-        }
-        let _ = write!(
-            text,
-            "\n[system]\nname = {}\nabout = {}\njoints = {}\n",
-            quoted(&chain.name),
-            quoted(ABOUT),
-            self.joints()
-        );
-        let slides: Vec<String> = numbered(chain)
-            .filter(|(_, joint)| joint.slides)
-            .map(|(number, _)| number.to_string())
-            .collect();
-        if !slides.is_empty() {
-            let _ = writeln!(text, "prismatic = [{}]", slides.join(", "));
-        }
-        text
-    }
-
-    fn parameters(&self) -> String {
-        let mut text = "\n[parameters]\n".to_owned();
-        for (base, name) in self.base.iter().zip(&self.names) {
-            let positive = if base.is_positive() {
-                ", positive = true"
-            } else {
-                ""
-            };
-            let _ = writeln!(
-                text,
-                "{name} = {{ value = {:?}, unit = \"{}\"{positive}, about = {} }}",
-                rounded(base.value),
-                unit(base.column.kind),
-                quoted(&about(base, &self.chain.joints[base.column.joint]))
-            );
-        }
-        if self.has_gravity() {
-            let g = self.chain.gravity.norm();
-            let _ = writeln!(
-                text,
-                "g = {{ value = {g:?}, unit = \"m/s^2\", fixed = true }}"
-            );
-        }
-        text
-    }
-
-    fn has_gravity(&self) -> bool {
-        self.base
-            .iter()
-            .any(|base| !base.column.potential.is_zero())
-    }
-
-    fn dynamics(&self) -> String {
-        let n = self.joints();
-        let mut text = "\n[dynamics.let]\n".to_owned();
-        for (i, j) in (0..n).flat_map(|i| (i..n).map(move |j| (i, j))) {
-            if self.moves_together(i, j) {
-                let entry = self.sum(|base| base.column.mass[i][j].clone());
-                text += &entry_line(&mass_name(i, j), &entry);
-            }
-        }
-        for i in (0..n).filter(|i| self.is_drawn(*i)) {
-            let slope = self.sum(|base| base.column.potential.derivative(i));
-            text += &entry_line(&format!("G{}", i + 1), &factors(&slope, "g"));
-        }
-        if self.has_gravity() {
-            let potential = self.sum(|base| base.column.potential.clone());
-            text += &entry_line("V", &factors(&potential, "g"));
-        }
-        let row = |i| {
-            let entries: Vec<String> = (0..n)
-                .map(|j| format!("\"{}\"", self.mass_entry(i, j)))
-                .collect();
-            format!("[{}]", entries.join(", "))
-        };
-        let rows: Vec<String> = (0..n).map(row).collect();
-        let _ = write!(
-            text,
-            "\n[dynamics]\nmass = [{}]\nbias = [\n",
-            rows.join(", ")
-        );
-        for i in 0..n {
-            let _ = writeln!(text, "    {},", formula_text(&self.bias(i)));
-        }
-        text + "]\n"
-    }
-
-    fn mass_entry(&self, i: usize, j: usize) -> String {
-        if self.moves_together(i, j) {
-            mass_name(i.min(j), i.max(j))
-        } else {
-            "0".into()
-        }
-    }
-
-    fn moves_together(&self, i: usize, j: usize) -> bool {
-        self.base
-            .iter()
-            .any(|base| !base.column.mass[i][j].is_zero())
-    }
-
-    /// Whether gravity acts on a joint.
-    fn is_drawn(&self, i: usize) -> bool {
-        self.base
-            .iter()
-            .any(|base| !base.column.potential.derivative(i).is_zero())
-    }
-
-    /// Coriolis and centrifugal terms by Christoffel's symbols, then gravity.
-    fn bias(&self, i: usize) -> String {
-        let n = self.joints();
-        let mut text = String::new();
-        for (j, k) in (0..n).flat_map(|j| (j..n).map(move |k| (j, k))) {
-            let symbol = self.sum(|base| self.christoffel(base, i, j, k));
-            if symbol != "0" {
-                join(&mut text, &factors(&symbol, &speeds(j, k)));
-            }
-        }
-        if self.is_drawn(i) {
-            join(&mut text, &format!("G{}", i + 1));
-        }
-        if text.is_empty() { "0".into() } else { text }
-    }
-
-    /// The coefficient of qd_j qd_k in equation i per unit of a parameter, both orders of j and k together.
-    fn christoffel(&self, base: &Base, i: usize, j: usize, k: usize) -> Series {
-        let mass = &base.column.mass;
-        let slopes = &mass[i][j].derivative(k) + &mass[i][k].derivative(j);
-        let both = &slopes - &mass[j][k].derivative(i);
-        let symbol = &both * if j == k { 0.5 } else { 1.0 };
-        self.lengths.cleaned(base.column.kind, &[i, j, k], &symbol)
-    }
-
-    fn energy(&self) -> String {
-        let n = self.joints();
-        let mut total = String::new();
-        for (i, j) in (0..n).flat_map(|i| (i..n).map(move |j| (i, j))) {
-            if self.moves_together(i, j) {
-                let half = if i == j { "0.5*" } else { "" };
-                join(
-                    &mut total,
-                    &format!("{half}{}*{}", mass_name(i, j), speeds(i, j)),
-                );
-            }
-        }
-        if self.has_gravity() {
-            join(&mut total, "V");
-        }
-        let power: Vec<String> = (1..=n).map(|j| format!("tau{j}*qd{j}")).collect();
-        format!(
-            "\n[energy]\ntotal = \"{total}\"\npower = \"{}\"\n",
-            power.join(" + ")
-        )
-    }
-
-    /// The sum over all parameters of a function of each.
-    fn sum(&self, function: impl Fn(&Base) -> Series) -> String {
-        let series: Vec<Series> = self.base.iter().map(function).collect();
-        let names = self.names.iter().map(String::as_str);
-        let terms: Vec<(&str, &Series)> = names.zip(&series).collect();
-        sum(&terms)
-    }
-}
-
-/// `M12`
-fn mass_name(i: usize, j: usize) -> String {
-    format!("M{}{}", data::Joint::at(i), data::Joint::at(j))
-}
-
-/// `qd1^2`, `qd1*qd2`
-fn speeds(j: usize, k: usize) -> String {
-    let speed = |k: usize| data::Joint::at(k).name("qd");
-    if j == k {
-        format!("{}^2", speed(j))
-    } else {
-        format!("{}*{}", speed(j), speed(k))
-    }
-}
-
-fn entry_line(name: &str, formula: &str) -> String {
-    format!("{name} = {}\n", formula_text(formula))
-}
-
-/// A formula as a TOML string, over several lines if long.
-fn formula_text(formula: &str) -> String {
-    if formula.len() <= WIDTH {
-        return format!("\"{formula}\"");
-    }
-    let (mut lines, mut line) = (Vec::new(), String::new());
-    for word in formula.split(' ') {
-        if line.len() + word.len() > WIDTH && may_break(&line) {
-            lines.push(std::mem::take(&mut line));
-        }
-        line += if line.is_empty() { "" } else { " " };
-        line += word;
-    }
-    lines.push(line);
-    format!("\"\"\"\n    {}\"\"\"", lines.join("\n    "))
-}
-
-/// Whether a line may end here: not after a sign, and not within an angle.
-fn may_break(line: &str) -> bool {
-    let angle = ["cos(", "sin("]
-        .into_iter()
-        .filter_map(|wave| line.rfind(wave))
-        .max();
-    !line.ends_with(['+', '-']) && angle.is_none_or(|at| line[at..].contains(')'))
-}
-
-fn unit(kind: Kind) -> &'static str {
+pub(super) fn unit(kind: Kind) -> &'static str {
     match kind {
         Kind::Tensor(..) | Kind::Rotor => "kg m^2",
         Kind::Moment(_) => "kg m",
@@ -302,54 +91,23 @@ fn unit(kind: Kind) -> &'static str {
 }
 
 /// `(0, 0, 1)`, to six digits.
-fn direction(vector: &nalgebra::Vector3<f64>) -> String {
+pub(super) fn direction(vector: &nalgebra::Vector3<f64>) -> String {
     let parts: Vec<String> = vector.iter().map(|part| number(short(*part))).collect();
     format!("({})", parts.join(", "))
 }
 
 /// To six digits; zero has no sign.
-fn short(value: f64) -> f64 {
+pub(super) fn short(value: f64) -> f64 {
     let short: f64 = format!("{value:.5e}")
         .parse()
         .expect("a printed number is a number");
     if short.abs() < 1e-12 { 0.0 } else { short }
 }
 
-fn about(base: &Base, joint: &Joint) -> String {
-    let body = &joint.body;
-    let axis = |k: usize| ["x", "y", "z"][k];
-    let mut text = match base.column.kind {
-        Kind::Tensor(2, 2) => format!("inertia of {body} about the axis of {}", joint.name),
-        Kind::Tensor(a, b) if a == b => {
-            format!("inertia of {body} about {} at {}", axis(a), joint.name)
-        }
-        Kind::Tensor(a, b) => format!(
-            "inertia of {body}, entry {}{} at {}",
-            axis(a),
-            axis(b),
-            joint.name
-        ),
-        Kind::Moment(a) => format!("mass of {body} times its centre of mass along {}", axis(a)),
-        Kind::Mass => format!("mass of {body}"),
-        Kind::Rotor => format!("inertia of the rotor of {}", joint.name),
-    };
-    for (factor, kind, joint) in &base.others {
-        let sign = if *factor < 0.0 { "less" } else { "plus" };
-        let size = number(short(factor.abs()));
-        let times = if size == "1" {
-            String::new()
-        } else {
-            format!("{size} ")
-        };
-        let _ = write!(text, ", {sign} {times}{}", name(*kind, *joint));
-    }
-    text
-}
-
-/// Drivetrains as effects.
-fn effects(chain: &Chain, rotors: &[Base]) -> String {
+/// Drivetrains as effects, with the inertia (kg m^2 or kg) of the rotor of each joint.
+fn effects(chain: &Chain, rotors: &[f64]) -> String {
     let mut text = String::new();
-    for (number, joint) in numbered(chain) {
+    for (number, joint) in chain.leaders() {
         let mut effect = |name: &str, values: &[(&str, f64)]| {
             let _ = write!(text, "\n[[effect]]\nname = \"{name}\"\njoint = {number}\n");
             for (parameter, value) in values {
@@ -368,8 +126,8 @@ fn effects(chain: &Chain, rotors: &[Base]) -> String {
                 &[("k", spring.stiffness), ("q_0", spring.rest)],
             );
         }
-        if let Some(rotor) = rotors.iter().find(|rotor| rotor.column.joint == number) {
-            effect("rotor_inertia", &[("J", rounded(rotor.value))]);
+        if rotors[number] > 0.0 {
+            effect("rotor_inertia", &[("J", rounded(rotors[number]))]);
         }
         if let Some(effort) = joint.drivetrain.effort {
             effect("actuator_saturation", &[("m", effort)]);

@@ -6,16 +6,16 @@
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// Most joints of a chain: the closed form of longer chains is too long to read.
-pub const MOST_JOINTS: usize = 3;
+/// Joints of the longest chain that is written in closed form: that of longer ones is too long to read.
+pub const LONGEST_CLOSED_FORM: usize = 3;
 
 /// One function of the basis: a monomial times a cosine or a sine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub(super) struct Wave {
     /// Powers of the coordinates.
-    pub powers: [u8; MOST_JOINTS],
+    pub powers: [u8; LONGEST_CLOSED_FORM],
     /// The angle is the sum of these multiples of the coordinates; the first non-zero one is positive.
-    pub angle: [i8; MOST_JOINTS],
+    pub angle: [i8; LONGEST_CLOSED_FORM],
     pub is_sine: bool,
 }
 
@@ -229,15 +229,15 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    use super::{MOST_JOINTS, Series};
+    use super::{LONGEST_CLOSED_FORM, Series};
 
     /// A function with every kind of term.
     fn random(rng: &mut ChaCha8Rng) -> Series {
         let mut series = Series::constant(rng.random_range(-1.0..1.0));
-        for joint in 0..MOST_JOINTS {
+        for joint in 0..LONGEST_CLOSED_FORM {
             for basis in [Series::coordinate, Series::cos, Series::sin] {
                 let factor = &basis(joint) * rng.random_range(-1.0..1.0);
-                series = &(&series * &factor) + &basis((joint + 1) % MOST_JOINTS);
+                series = &(&series * &factor) + &basis((joint + 1) % LONGEST_CLOSED_FORM);
             }
         }
         series
@@ -248,7 +248,8 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..20 {
             let (a, b) = (random(&mut rng), random(&mut rng));
-            let q: [f64; MOST_JOINTS] = std::array::from_fn(|_| rng.random_range(-3.0..3.0));
+            let q: [f64; LONGEST_CLOSED_FORM] =
+                std::array::from_fn(|_| rng.random_range(-3.0..3.0));
             let close = |found: f64, wanted: f64| {
                 assert!((found - wanted).abs() < 1e-11 * wanted.abs().max(1.0));
             };
@@ -263,8 +264,9 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         for _ in 0..20 {
             let a = random(&mut rng);
-            let q: [f64; MOST_JOINTS] = std::array::from_fn(|_| rng.random_range(-2.0..2.0));
-            for joint in 0..MOST_JOINTS {
+            let q: [f64; LONGEST_CLOSED_FORM] =
+                std::array::from_fn(|_| rng.random_range(-2.0..2.0));
+            for joint in 0..LONGEST_CLOSED_FORM {
                 let at = |step: f64| {
                     let mut there = q;
                     there[joint] += step;

@@ -79,6 +79,19 @@ impl Inertia {
         }
     }
 
+    /// Mass, first moments, and xx, xy, xz, yy, yz, zz of the tensor.
+    ///
+    /// # Panics
+    /// When there are not ten parts.
+    pub fn of_parts(parts: &[f64]) -> Self {
+        let [mass, x, y, z, xx, xy, xz, yy, yz, zz] = parts.try_into().expect("ten parts");
+        Self {
+            mass,
+            moment: Vector3::new(x, y, z),
+            tensor: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz),
+        }
+    }
+
     /// A body whose tensor (kg m^2) is given about its centre of mass, in the frame that `pose` puts there.
     pub fn central(mass: f64, tensor: Matrix3<f64>, pose: &Pose) -> Self {
         let here = Self {

@@ -1,13 +1,15 @@
-//! Open-loop prediction error: how far a model that is given only the start state and the torques of a log departs from
-//! it.
+//! How far a model departs from logs: open-loop prediction error, given only the start state and the torques of a log, and
+//! the error of the torques that the logged motion needs.
 
 mod assessment;
 mod open_loop;
 mod summary;
+mod torque;
 mod trace;
 
 pub use assessment::{Assessment, OpenLoop, WindowError};
 pub use open_loop::{assess, window_count};
 pub(crate) use open_loop::{errors_in, windows};
 pub use summary::{Summary, summarise};
+pub use torque::{TorqueError, torque_error};
 pub use trace::{Trace, traces};

@@ -220,6 +220,7 @@ fn plain(number: usize, axis: Vector3<f64>, origin: Vector3<f64>, inertia: Inert
         across: rotation.column(0).into(),
         axis,
         inertia,
+        follows: None,
         drivetrain: Drivetrain::default(),
     }
 }

@@ -5,10 +5,12 @@
 mod links;
 mod shape;
 
-use nalgebra::Vector3;
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::spatial::turn;
-use super::{Joint, Pose};
+use super::{Drivetrain, Follows, Inertia, Joint, Place, Pose};
 use crate::model::Dynamics;
 use links::{Build, Planar};
 use shape::{KNOWN, ROUNDING, Shape};
@@ -19,6 +21,61 @@ pub(crate) struct Recovered {
     pub joints: Vec<Joint>,
     /// m/s^2
     pub gravity: f64,
+}
+
+impl Recovered {
+    /// A chain as it is, turned so that gravity (m/s^2, in the axes of the world) acts against z.
+    pub fn of_chain(places: &[Place], bodies: &[Inertia], gravity: Vector3<f64>) -> Self {
+        let links = places.iter().zip(bodies).enumerate();
+        let mut joints: Vec<Joint> = links
+            .map(|(k, (place, inertia))| Joint {
+                name: format!("joint{}", k + 1),
+                body: format!("link{}", k + 1),
+                slides: place.slides,
+                pose: place.pose,
+                reference: 0.0,
+                across: Vector3::x(),
+                axis: Vector3::z(),
+                inertia: *inertia,
+                follows: follows(places, k),
+                drivetrain: Drivetrain::default(),
+            })
+            .collect();
+        if let Some(first) = joints.first_mut() {
+            let level = Pose {
+                rotation: downwards(gravity),
+                origin: Vector3::zeros(),
+            };
+            first.pose = level.then(&first.pose);
+        }
+        Self {
+            joints,
+            gravity: gravity.norm(),
+        }
+    }
+}
+
+/// The rotation that turns a direction against z.
+fn downwards(direction: Vector3<f64>) -> Matrix3<f64> {
+    let turned = Rotation3::rotation_between(&direction, &-Vector3::z());
+    // None about which to turn where the direction is z itself.
+    turned.map_or_else(|| turn(Vector3::x(), PI), Rotation3::into_inner)
+}
+
+/// How a link follows the first one of its joint.
+fn follows(places: &[Place], link: usize) -> Option<Follows> {
+    let Place {
+        joint,
+        ratio,
+        offset,
+        ..
+    } = places[link];
+    let leader = places.iter().position(|place| place.joint == joint)?;
+    (leader != link).then_some(Follows {
+        leader,
+        ratio,
+        offset,
+    })
 }
 
 /// Gravity where the equations do not contain it, m/s^2.

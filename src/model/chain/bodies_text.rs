@@ -1,0 +1,147 @@
+//! A chain of any length as the table `[chain]` of a model file: frames, and the inertia of each link as parameters.
+
+use std::fmt::Write;
+
+use nalgebra::Vector3;
+
+use super::body::{Chain, Joint, places};
+use super::equations::Kind;
+use super::formula::number;
+use super::model_file::{name, quoted, unit};
+use super::recursive::Place;
+use super::series::rounded;
+use crate::data;
+
+/// First moments and inertia tensor, in the order of the file.
+const MOMENT: [Kind; 3] = [Kind::Moment(0), Kind::Moment(1), Kind::Moment(2)];
+const TENSOR: [Kind; 6] = [
+    Kind::Tensor(0, 0),
+    Kind::Tensor(0, 1),
+    Kind::Tensor(0, 2),
+    Kind::Tensor(1, 1),
+    Kind::Tensor(1, 2),
+    Kind::Tensor(2, 2),
+];
+
+/// The bodies of a chain.
+pub(super) struct Bodies<'c>(pub &'c Chain);
+
+impl Bodies<'_> {
+    /// Parameters and chain of the model file.
+    pub fn text(&self) -> String {
+        let mut text = "\n[parameters]\n".to_owned();
+        for (number, joint) in self.links() {
+            if has_inertia(joint) {
+                parameters(&mut text, number, joint);
+            }
+        }
+        let g = self.0.gravity.norm();
+        if g > 0.0 {
+            let _ = writeln!(
+                text,
+                "g = {{ value = {g:?}, unit = \"m/s^2\", fixed = true }}"
+            );
+        }
+        let _ = write!(text, "\n[chain]\ngravity = {}\n", self.gravity());
+        let places = places(&self.0.joints);
+        for ((number, joint), place) in self.links().zip(&places) {
+            link(&mut text, number, joint, place);
+        }
+        text
+    }
+
+    /// With their numbers along the chain, which name their parameters.
+    fn links(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
+        let joints = self.0.joints.iter().enumerate();
+        joints.map(|(k, joint)| (data::Joint::at(k), joint))
+    }
+
+    /// `["0", "0", "-g"]`
+    fn gravity(&self) -> String {
+        let gravity = self.0.gravity;
+        let direction = gravity.try_normalize(0.0).unwrap_or_default();
+        list(direction.iter().map(|part| match rounded(*part) {
+            0.0 => quoted("0"),
+            1.0 => quoted("g"),
+            -1.0 => quoted("-g"),
+            part => quoted(&format!("{}*g", number(part))),
+        }))
+    }
+}
+
+/// A body without inertia has no parameters.
+fn has_inertia(joint: &Joint) -> bool {
+    joint.inertia.mass > 0.0 || joint.inertia.tensor.norm() > 0.0
+}
+
+fn parameters(text: &mut String, number: data::Joint, joint: &Joint) {
+    let mut line = |kind: Kind, about: &str| {
+        let never_negative =
+            matches!(kind, Kind::Mass) || matches!(kind, Kind::Tensor(a, b) if a == b);
+        let positive = if never_negative {
+            ", positive = true"
+        } else {
+            ""
+        };
+        let _ = writeln!(
+            text,
+            "{} = {{ value = {:?}, unit = \"{}\"{positive}, about = {} }}",
+            name(kind, number),
+            rounded(kind.value(joint)),
+            unit(kind),
+            quoted(&format!("{about} of {}", joint.body))
+        );
+    };
+    line(Kind::Mass, "mass");
+    for kind in MOMENT {
+        line(kind, "mass times centre of mass");
+    }
+    for kind in TENSOR {
+        line(kind, "inertia tensor");
+    }
+}
+
+fn link(text: &mut String, number: data::Joint, joint: &Joint, place: &Place) {
+    let column = |k: usize| vector(&place.pose.rotation.column(k).into());
+    let names = |kinds: &[Kind]| {
+        let name = |kind: &Kind| match has_inertia(joint) {
+            true => quoted(&name(*kind, number)),
+            false => quoted("0"),
+        };
+        list(kinds.iter().map(name))
+    };
+    let _ = write!(
+        text,
+        "\n[[chain.link]] # {}, moved by {}\njoint = {}\n{}origin = {}\naxis = {}\nacross = {}\nmass = {}\nmoment = {}\ninertia = {}\n",
+        joint.body,
+        joint.name,
+        place.joint,
+        follows(joint, place),
+        vector(&place.pose.origin),
+        column(2),
+        column(0),
+        names(&[Kind::Mass]).trim_matches(['[', ']']),
+        names(&MOMENT),
+        names(&TENSOR)
+    );
+}
+
+/// How a link follows a joint that moves another one.
+fn follows(joint: &Joint, place: &Place) -> String {
+    match joint.follows {
+        Some(_) => format!(
+            "ratio = {:?}\noffset = {:?}\nslides = {}\n",
+            place.ratio, place.offset, place.slides
+        ),
+        None => String::new(),
+    }
+}
+
+/// `[0.0, 0.0, 1.0]`
+fn vector(vector: &Vector3<f64>) -> String {
+    list(vector.iter().map(|part| format!("{:?}", rounded(*part))))
+}
+
+fn list(items: impl Iterator<Item = String>) -> String {
+    format!("[{}]", items.collect::<Vec<_>>().join(", "))
+}

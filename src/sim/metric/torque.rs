@@ -1,0 +1,117 @@
+//! Error of the torques: the model's inverse dynamics beside the logged torques.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::data::{Log, Smooth};
+use crate::expr::Program;
+use crate::lanes::Row;
+use crate::model::{Dynamics, Model};
+use crate::sim::Commands;
+
+/// Rows that are evaluated side by side.
+const LANES: usize = 8;
+
+/// The difference between the torques that a motion needs and those that act, over all rows of all logs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TorqueError {
+    /// Root mean square of each joint, N m (or N).
+    pub rms: Vec<f64>,
+    /// The norm of all differences over that of all logged torques.
+    pub relative: f64,
+}
+
+/// The error of the torques on logs, each as [`Smooth`] reads it. `None` for a model that gives accelerations, and where no
+/// log is longer than a second.
+pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
+    let inverse = model.inverse_dynamics()?;
+    let dynamics = model.dynamics();
+    let differences = logs
+        .par_iter()
+        .map(|log| differences(&inverse, &dynamics, log));
+    let mut sums = Sums::new(model.joints);
+    for (smooth, differences) in differences.collect::<Vec<_>>() {
+        sums.add(&smooth, &differences);
+    }
+    sums.error()
+}
+
+/// Of a log, and the torques by which its motion needs more than acts, `[joint][row]`.
+fn differences(inverse: &Program, dynamics: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
+    let in_log = dynamics.in_log(log);
+    let acting = match in_log.filters.is_empty() {
+        true => Smooth::of(log),
+        false => Smooth::of(&Commands::of_log(&*in_log, log).acting_on(log)),
+    };
+    let values = in_log.values();
+    let mut tape = inverse.tape::<f64, LANES>();
+    let mut found = vec![vec![0.0; acting.rows()]; log.joints()];
+    for first in (0..acting.rows()).step_by(LANES) {
+        let rows: [usize; LANES] = std::array::from_fn(|k| (first + k).min(acting.rows() - 1));
+        let of_rows = |channel: &[f64]| Row(rows.map(|row| channel[row]));
+        let Smooth {
+            time,
+            q,
+            qd,
+            qdd,
+            tau,
+        } = &acting;
+        let moving = [q, qd, tau]
+            .into_iter()
+            .flatten()
+            .map(|channel| of_rows(channel));
+        let held = values.iter().map(|value| Row::splat(*value));
+        let inputs = moving
+            .chain([of_rows(time)])
+            .chain(held)
+            .chain(qdd.iter().map(|channel| of_rows(channel)));
+        for (slot, input) in tape.inputs().iter_mut().zip(inputs) {
+            *slot = input;
+        }
+        tape.run();
+        for (j, found) in found.iter_mut().enumerate() {
+            for (row, difference) in rows.iter().zip(tape.output(j).0) {
+                found[*row] = difference;
+            }
+        }
+    }
+    (Smooth::of(log), found)
+}
+
+/// Sums of squares.
+struct Sums {
+    differences: Vec<f64>,
+    torques: f64,
+    rows: usize,
+}
+
+impl Sums {
+    fn new(joints: usize) -> Self {
+        Self {
+            differences: vec![0.0; joints],
+            torques: 0.0,
+            rows: 0,
+        }
+    }
+
+    fn add(&mut self, logged: &Smooth, differences: &[Vec<f64>]) {
+        let squares = |channel: &Vec<f64>| channel.iter().map(|x| x * x).sum::<f64>();
+        for (sum, differences) in self.differences.iter_mut().zip(differences) {
+            *sum += squares(differences);
+        }
+        self.torques += logged.tau.iter().map(squares).sum::<f64>();
+        self.rows += logged.rows();
+    }
+
+    fn error(&self) -> Option<TorqueError> {
+        let all: f64 = self.differences.iter().sum();
+        (self.rows > 0).then(|| TorqueError {
+            rms: self
+                .differences
+                .iter()
+                .map(|sum| (sum / self.rows as f64).sqrt())
+                .collect(),
+            relative: (all / self.torques).sqrt(),
+        })
+    }
+}
