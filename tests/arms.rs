@@ -1,10 +1,15 @@
 //! Chains of many joints: their equations beside those of Pinocchio and MuJoCo.
 
+use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use residyn::model::chain::{Chain, model_text};
-use residyn::model::{Library, Model};
+use rand::RngExt;
+use residyn::data::{Interval, Joint, Log};
+use residyn::identify::fit_torques;
+use residyn::model::chain::{Chain, Inertia, model_text};
+use residyn::model::{FittedEffect, Library, Model};
+use residyn::sim::metric::torque_error;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -60,12 +65,16 @@ fn pinocchio_and_mujoco_find_the_same_torques_and_accelerations() {
             .collect();
         assert_eq!(joints, arm.joints, "{name}");
         let model = model(&chain);
-        let (inverse, forward) = (model.inverse_dynamics().unwrap(), model.dynamics());
+        let (inverse, forward) = (model.torque_balance().unwrap(), model.dynamics());
         let [values, still] = [model.values(), vec![0.0; model.joints]];
         for sample in &arm.samples {
             let [q, qd, qdd] = ["q", "qd", "qdd"].map(|key| numbers(sample, key));
             let inputs = |tau: &[f64]| [&q, &qd, tau, &[0.0], &values].concat();
-            let torques = inverse.eval(&[inputs(&still), qdd.clone()].concat());
+            let needed = |qdd: &[f64]| {
+                let inputs = [&inputs(&still)[..3 * model.joints + 1], qdd, &values].concat();
+                inverse.program.eval(&inputs)
+            };
+            let torques = needed(&qdd);
             for peer in &arm.peers {
                 let wanted = numbers(sample, peer);
                 assert!(
@@ -77,7 +86,7 @@ fn pinocchio_and_mujoco_find_the_same_torques_and_accelerations() {
                 // Where axes of a light wrist are in line, rounding of the torques moves it.
                 let moved = off(found, &qdd);
                 assert!(moved < 1e-7, "{name}: {peer}: {found:?}, {qdd:?}");
-                let torques = inverse.eval(&[&inputs(&still), found].concat());
+                let torques = needed(found);
                 assert!(
                     off(&torques, &wanted) < 1e-10,
                     "{name}: {peer}: {torques:?}"
@@ -200,4 +209,183 @@ fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
     let test = ["--test", text(&one), "--torque"];
     let said = refuses(&[&["evaluate", "--model", "pendulum"], &test[..]].concat());
     assert!(said.contains("pendulum gives accelerations"), "{said}");
+}
+
+/// A log of sines of several frequencies in each joint, with the torques that a model needs for them.
+fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
+    let mut rng = crate::common::rng(seed);
+    let mut waves = || -> Vec<[f64; 3]> {
+        let wave = |f: usize| {
+            let phase = rng.random_range(0.0..TAU);
+            [0.5 / (1.0 + f as f64), TAU * 0.13 * (1.0 + f as f64), phase]
+        };
+        (0..5).map(wave).collect()
+    };
+    let joints: Vec<Vec<[f64; 3]>> = (0..model.joints).map(|_| waves()).collect();
+    let balance = model.torque_balance().unwrap();
+    let (values, n) = (balance.values(), model.joints);
+    let mut log = Log::empty(n);
+    for row in 0..(200.0 * seconds) as usize {
+        let t = 0.005 * row as f64;
+        let sum = |wave: &dyn Fn(&[f64; 3]) -> f64| -> Vec<f64> {
+            joints
+                .iter()
+                .map(|waves| waves.iter().map(wave).sum())
+                .collect()
+        };
+        let q = sum(&|[a, w, p]| a * (w * t + p).sin());
+        let qd = sum(&|[a, w, p]| a * w * (w * t + p).cos());
+        let qdd = sum(&|[a, w, p]| -a * w * w * (w * t + p).sin());
+        let tau = balance
+            .program
+            .eval(&[&q, &qd, &vec![0.0; n], &vec![t][..], &qdd, &values].concat());
+        log.time.push(t);
+        for j in 0..n {
+            log.q[j].push(q[j]);
+            log.qd[j].push(qd[j]);
+            log.tau[j].push(tau[j]);
+        }
+    }
+    log
+}
+
+/// The parameters of bodies that are off by a tenth or two come back from torques, as far as the motion tells them, and
+/// friction with them; what it does not tell stays, and every body stays one.
+#[test]
+fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
+    let declared = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
+    let friction = |level: f64| -> Vec<FittedEffect> {
+        let effect = |joint: usize, name: &str, value: f64| {
+            crate::common::fitted(Library::built_in().effect(name).unwrap(), joint, &[value])
+        };
+        (0..4)
+            .flat_map(|j| {
+                [
+                    effect(j, "viscous_friction", level),
+                    effect(j, "coulomb_friction", 2.0 * level),
+                ]
+            })
+            .collect()
+    };
+    let with = |level: f64| {
+        declared
+            .with_effects(friction(level))
+            .with_sign_widths(vec![0.02; 4])
+    };
+    let mut rig = with(0.4);
+    for (k, body) in rig.inertias().into_iter().enumerate() {
+        // Another body of the same shape: still one.
+        let factor = [1.2, 0.85, 1.15, 0.9, 1.25][k];
+        for parameter in body {
+            rig.parameters[parameter].value *= factor;
+        }
+    }
+    let [train, test] = [1, 2].map(|seed| vec![moved(&rig, 20.0, seed)]);
+    let found = fit_torques(&with(0.1), &declared, &train).unwrap();
+    assert!(
+        found.fit.termination.has_converged(),
+        "{}",
+        found.fit.termination
+    );
+    let error = |model: &Model| torque_error(model, &test).unwrap().relative;
+    let [before, after, best] = [&with(0.4), &found.model, &rig].map(error);
+    // The rig's own model is off where friction reverses, since motion and torque are smoothed.
+    assert!(
+        before > 1.7 * best && after < 1.01 * best,
+        "{before} {after} {best}"
+    );
+    for effect in &found.model.effects {
+        let wanted = if effect.effect.name == "viscous_friction" {
+            0.4
+        } else {
+            0.8
+        };
+        let value = effect.values[0].0;
+        assert!(
+            (value / wanted - 1.0).abs() < 0.05,
+            "{}: {value}",
+            effect.label()
+        );
+    }
+    let body = |model: &Model, k: usize| {
+        Inertia::of_parts(&model.inertias()[k].map(|p| model.parameters[p].value))
+    };
+    let total = |model: &Model| (1..5).map(|k| body(model, k).mass).sum::<f64>();
+    assert!((total(&found.model) / total(&rig) - 1.0).abs() < 0.05);
+    for k in 0..5 {
+        let Inertia {
+            mass,
+            moment,
+            tensor,
+        } = body(&found.model, k);
+        let centre = moment / mass;
+        let shift =
+            nalgebra::Matrix3::identity() * centre.dot(&centre) - centre * centre.transpose();
+        let principal = (tensor - shift * mass).symmetric_eigenvalues();
+        assert!(mass > 0.0 && principal.min() > 0.0, "{k}: {principal}");
+        assert!(2.0 * principal.max() < principal.sum(), "{k}: {principal}");
+    }
+}
+
+/// Fitted near what its URDF declares, with the friction that every arm has, an arm's torques on a part of its log that was
+/// not fitted are as near as by least squares on base parameters, figures of the READMEs of the data sets.
+#[test]
+fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
+    for (arm, train, test, first_s, share, least_squares) in [
+        (
+            "panda",
+            "exciting_trajectory.csv",
+            "exciting_trajectory.csv",
+            0.0,
+            0.7,
+            1.59,
+        ),
+        (
+            "kuka_lwr4",
+            "measurements_1.csv",
+            "measurements_2.csv",
+            2.5,
+            1.0,
+            3.08,
+        ),
+        (
+            "ur10",
+            "ur10_exciting_trajectory.csv",
+            "ur10_exciting_trajectory.csv",
+            0.0,
+            0.65,
+            7.28,
+        ),
+    ] {
+        let Some(data) = measured(arm) else {
+            continue;
+        };
+        let declared = model(&read_to(&data.join(format!("{arm}.urdf")), None));
+        let log = |name: &str| declared.read_log(data.join(name)).unwrap();
+        let [mut train, mut test] = [log(train), log(test)];
+        let split_s = train.time[((train.rows() - 1) as f64 * share) as usize];
+        let span = |start_s: f64, end_s: f64| Interval { start_s, end_s };
+        train.leave_out = vec![span(-1.0, first_s)];
+        test.leave_out = vec![span(-1.0, first_s)];
+        if share < 1.0 {
+            // Half a second at the ends of either part is not used.
+            train.leave_out.push(span(split_s - 0.5, f64::INFINITY));
+            test.leave_out.push(span(-1.0, split_s + 0.5));
+        }
+        let names = ["viscous_friction", "coulomb_friction", "constant_torque"];
+        let library = Library::built_in();
+        let of_joint = |joint: Joint| {
+            let absent = |name| FittedEffect::absent(library.effect(name).unwrap(), joint);
+            names.map(absent)
+        };
+        let effects: Vec<FittedEffect> = Joint::all(declared.joints).flat_map(of_joint).collect();
+        let widths = vec![0.02; declared.joints];
+        let with = declared.with_effects(effects).with_sign_widths(widths);
+        let found = fit_torques(&with, &declared, &[train]).unwrap().model;
+        let error = 100.0 * torque_error(&found, &[test]).unwrap().relative;
+        assert!(
+            error < least_squares,
+            "{arm}: {error} %, least squares {least_squares} %"
+        );
+    }
 }

@@ -107,7 +107,7 @@ impl<'a> Study<'a> {
         };
         let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
         let windows = cut(logs, window_s);
-        let shooting = Shooting::new(logs, windows, &noise).near(&declared.parameters);
+        let shooting = Shooting::new(logs, windows, &noise).near(declared);
         Self {
             declared,
             settings,
@@ -138,7 +138,7 @@ impl<'a> Study<'a> {
     {
         let windows = cut(logs, self.settings.fit.window_s);
         let shooting = Shooting::new(logs, windows, &self.shooting.noise);
-        let shooting = shooting.near(&self.declared.parameters);
+        let shooting = shooting.near(self.declared);
         Study {
             declared: self.declared,
             settings: self.settings,

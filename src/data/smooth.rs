@@ -7,6 +7,8 @@ use super::low_pass::LowPass;
 const CUTOFF_HZ: f64 = 10.0;
 /// Highest cutoff as a share of half the sampling rate.
 const HIGHEST: f64 = 0.2;
+/// Time between rows that are fitted, s: a fifth of the period of what just passes.
+const ROWS_S: f64 = 0.02;
 /// Time at either end of a log that is not used: the filter knows nothing beyond the ends, s.
 const ENDS_S: f64 = 0.5;
 
@@ -49,6 +51,22 @@ impl Smooth {
             q: each(&q, &|q, k| q[k]),
             tau: each(&tau, &|tau, k| tau[k]),
             time: used.iter().map(|row| time[*row]).collect(),
+        }
+    }
+
+    /// Every so many rows that what is left still holds all that the filter lets through.
+    #[must_use]
+    pub fn thinned(&self, step_s: f64) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, and small
+        let every = ((ROWS_S / step_s).floor() as usize).max(1);
+        let channel = |channel: &Vec<f64>| channel.iter().copied().step_by(every).collect();
+        let channels = |channels: &[Vec<f64>]| channels.iter().map(channel).collect();
+        Self {
+            time: channel(&self.time),
+            q: channels(&self.q),
+            qd: channels(&self.qd),
+            qdd: channels(&self.qdd),
+            tau: channels(&self.tau),
         }
     }
 

@@ -40,6 +40,11 @@ impl Formula {
         &self.text
     }
 
+    /// Whether the formula is this name and nothing else.
+    pub fn is_name(&self, name: &str) -> bool {
+        matches!(&self.root.kind, Kind::Name(own) if own == name)
+    }
+
     /// Every name that the formula mentions, in order, with repetitions.
     pub fn names(&self) -> Vec<&str> {
         let mut names = Vec::new();

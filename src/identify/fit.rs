@@ -1,6 +1,6 @@
 use super::levenberg_marquardt::Search;
 use super::outcome::{Fit, FitError, Termination};
-use super::sensitivity::{Local, Tangent};
+use super::sensitivity::Tangent;
 use super::shooting::Shooting;
 use super::values::Values;
 use crate::model::Dynamics;
@@ -25,12 +25,7 @@ pub fn fit(
     locals: Vec<Vec<f64>>,
     scale: Option<f64>,
 ) -> Result<(Values, Fit), FitError> {
-    let local = if locals.first().is_some_and(|l| l.len() > dynamics.states()) {
-        Local::StateAndForce
-    } else {
-        Local::State
-    };
-    let tangent = Tangent::new(dynamics, active, local);
+    let tangent = Tangent::new(dynamics, active, shooting.local(&locals));
     let mut search = Search::new(shooting, dynamics, &tangent, locals, scale)?;
     let mut termination = search.run(MOST_STEPS);
     // The scale is to be that of the final residuals; the smaller it is, the less they owe to the start states' estimates.
@@ -54,7 +49,7 @@ pub fn fit_below(
     locals: Vec<Vec<f64>>,
     (scale, below): (f64, f64),
 ) -> Result<Option<(Values, Fit)>, FitError> {
-    let tangent = Tangent::new(dynamics, active, Local::State);
+    let tangent = Tangent::new(dynamics, active, shooting.local(&locals));
     let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale))?;
     let mut search = search.only_below(below);
     let termination = search.run(MOST_STEPS);
@@ -73,7 +68,7 @@ pub fn as_it_stands(
     locals: Vec<Vec<f64>>,
     scale: f64,
 ) -> Result<Fit, FitError> {
-    let tangent = Tangent::new(dynamics, active, Local::State);
+    let tangent = Tangent::new(dynamics, active, shooting.local(&locals));
     let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale))?;
     let (_, fit) = search.finish(Termination::AsGiven);
     Ok(fit)
@@ -88,7 +83,7 @@ pub fn predicted_cost(
     locals: &[Vec<f64>],
     scale: f64,
 ) -> Option<f64> {
-    let tangent = Tangent::new(dynamics, active, Local::State);
+    let tangent = Tangent::new(dynamics, active, shooting.local(locals));
     let locals = locals.to_vec();
     let search = Search::new(shooting, dynamics, &tangent, locals, Some(scale)).ok()?;
     search.predicted_cost()

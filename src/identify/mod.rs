@@ -1,8 +1,12 @@
-//! Physical parameters from logs: least squares on trajectories in f64.
+//! Physical parameters from logs: least squares in f64, on trajectories or on torques.
 //!
-//! Measured data are never differentiated. Windows of a log are integrated open loop from free start states and compared
-//! with the logged positions. Logged velocities are not used, since most rigs filter or delay them.
+//! On trajectories measured data are never differentiated: windows of a log are integrated open loop from free start states
+//! and compared with the logged positions. On torques, for rigs that are moved as they are told, the smoothed motion is, and
+//! the torque that it needs is compared with the logged one. Logged velocities are not used, since most rigs filter or delay
+//! them.
 
+mod balance;
+mod declared_body;
 mod eigen;
 mod fit;
 mod identifiability;
@@ -17,6 +21,7 @@ mod sensitivity;
 mod shooting;
 mod start;
 mod sums;
+mod torques;
 mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
@@ -29,4 +34,5 @@ pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Termination};
 pub use sensitivity::Local;
 pub use shooting::Shooting;
+pub use torques::{TorqueFit, fit_torques};
 pub use values::{Column, Own, Values};

@@ -1,6 +1,7 @@
+use super::declared_body::{DeclaredBody, PARTS};
 use super::normal_equations::WindowTerms;
 use super::values::{Column, Values};
-use crate::model::Parameter;
+use crate::model::Model;
 
 /// What is known of a model's values beside the logs: that declared ones are of the right size. Of values with which a model
 /// explains the logs equally well, those nearest to the declared ones are found.
@@ -9,8 +10,9 @@ use crate::model::Parameter;
 /// they differ much, and stays finite where the value changes its sign.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Prior {
-    /// Declared values; none is zero.
+    /// Declared values that are no part of a body; none is zero.
     declared: Vec<Declared>,
+    bodies: Vec<DeclaredBody>,
 }
 
 #[derive(Debug, Clone)]
@@ -33,15 +35,40 @@ impl Declared {
 
 impl Prior {
     /// Values are near those declared.
-    pub fn near(declared: &[Parameter]) -> Self {
-        let known = declared.iter().enumerate().filter(|(_, p)| p.value != 0.0);
-        let declared = known.map(|(parameter, of)| Declared {
+    pub fn near(model: &Model) -> Self {
+        let value = |parameter: usize| model.parameters[parameter].value;
+        let body = |parts: [usize; PARTS]| DeclaredBody::new(parts, &parts.map(value));
+        let bodies: Vec<DeclaredBody> = model.inertias().into_iter().filter_map(body).collect();
+        let is_of_body = |parameter: &usize| {
+            let mut parts = bodies.iter().flat_map(|body| &body.parameters);
+            parts.any(|part| part == parameter)
+        };
+        let known = (0..model.parameters.len()).filter(|p| value(*p) != 0.0 && !is_of_body(p));
+        let declared = known.map(|parameter| Declared {
             parameter,
-            value: of.value,
+            value: value(parameter),
         });
         Self {
             declared: declared.collect(),
+            bodies,
         }
+    }
+
+    /// The bodies with their parts, where a fit may change one of them, and the places of the parts among its columns.
+    fn free_bodies<'a>(
+        &'a self,
+        columns: &'a [Column],
+        values: &'a Values,
+    ) -> impl Iterator<Item = (&'a DeclaredBody, [f64; PARTS], [Option<usize>; PARTS])> + 'a {
+        self.bodies.iter().filter_map(|body| {
+            let place = |parameter: usize| columns.iter().position(|c| c.parameter == parameter);
+            let places = body.parameters.map(place);
+            let parts = body.parameters.map(|parameter| values.common[parameter]);
+            places
+                .iter()
+                .any(Option::is_some)
+                .then_some((body, parts, places))
+        })
     }
 
     /// The departures of free values: which of `columns`, how far, and the slope.
@@ -61,7 +88,10 @@ impl Prior {
     /// The cost of free values where so many residuals say as much.
     pub fn cost(&self, columns: &[Column], values: &Values, residuals: f64) -> f64 {
         let departures = self.departures(columns, values);
-        0.5 * residuals * departures.map(|(_, d, _)| d * d).sum::<f64>()
+        let of_values = 0.5 * departures.map(|(_, d, _)| d * d).sum::<f64>();
+        let bodies = self.free_bodies(columns, values);
+        let of_bodies: f64 = bodies.map(|(body, parts, _)| body.cost(&parts)).sum();
+        residuals * (of_values + of_bodies)
     }
 
     /// Its gradient and Gauss-Newton matrix.
@@ -70,6 +100,18 @@ impl Prior {
         for (i, departure, slope) in self.departures(columns, values) {
             terms.gradient[i] = residuals * departure * slope;
             terms.hessian[(i, i)] = residuals * slope * slope;
+        }
+        for (body, parts, places) in self.free_bodies(columns, values) {
+            let Some((gradient, hessian)) = body.terms(&parts) else {
+                continue;
+            };
+            let free = || (0..PARTS).filter_map(|k| Some((k, places[k]?)));
+            for (k, row) in free() {
+                terms.gradient[row] += residuals * gradient[k];
+                for (l, column) in free() {
+                    terms.hessian[(row, column)] += residuals * hessian[(k, l)];
+                }
+            }
         }
         terms
     }
@@ -104,7 +146,7 @@ mod tests {
 
     #[test]
     fn a_value_costs_more_the_farther_it_is_from_the_declared_one() {
-        let prior = Prior::near(&pendulum().parameters);
+        let prior = Prior::near(&pendulum());
         let declared = pendulum().values();
         let at_ratio = |ratio: f64| at([declared[0] * ratio, declared[1]]);
         let cost = |ratio: f64| prior.cost(&columns(), &at_ratio(ratio), 2.0);
@@ -117,7 +159,7 @@ mod tests {
 
     #[test]
     fn its_gradient_is_that_of_the_cost() {
-        let prior = Prior::near(&pendulum().parameters);
+        let prior = Prior::near(&pendulum());
         let WindowTerms {
             gradient, hessian, ..
         } = prior.terms(&columns(), &at([7.0, -1.0]), 3.0);

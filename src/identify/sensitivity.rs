@@ -17,6 +17,8 @@ pub enum Local {
     State,
     /// The start state and a constant generalised force per joint, which stands for what the model lacks.
     StateAndForce,
+    /// None: the torques of a known motion.
+    Nothing,
 }
 
 /// The tangent-linear model: accelerations and their derivatives with respect to states, shared parameters and forces,
@@ -41,6 +43,9 @@ pub(super) struct Tangent {
 
 impl Tangent {
     pub fn new(dynamics: &Dynamics, active: &[usize], local: Local) -> Self {
+        if local == Local::Nothing {
+            return Self::of_torques(dynamics, active);
+        }
         let n = dynamics.joints;
         let mut graph = Graph::new();
         let (moving, held) = dynamics.program.inputs().split_at(3 * n + 1);
@@ -100,8 +105,13 @@ impl Tangent {
         }
     }
 
-    fn first_parameter(&self) -> usize {
-        3 * self.joints + 1 + self.filters
+    /// Index of the first parameter among the inputs.
+    pub fn first_parameter(&self) -> usize {
+        let moving = match self.local {
+            Local::Nothing => 4,
+            Local::State | Local::StateAndForce => 3,
+        };
+        moving * self.joints + 1 + self.filters
     }
 
     /// Number of free values of one window.
@@ -109,6 +119,40 @@ impl Tangent {
         match self.local {
             Local::State => 2 * self.joints,
             Local::StateAndForce => 3 * self.joints,
+            Local::Nothing => 0,
+        }
+    }
+
+    /// Of the balance of torques: outputs are the n differences, then for each of them its derivatives with respect to the
+    /// active parameters.
+    fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
+        let n = dynamics.joints;
+        let mut graph = Graph::new();
+        let (moving, held) = dynamics.program.inputs().split_at(4 * n + 1);
+        let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
+        let slopes = (dynamics.filters.iter())
+            .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
+            .collect::<Vec<_>>();
+        inputs.extend(held.iter().map(|name| graph.input(name)));
+        let differences = graph.append(&dynamics.program, &inputs);
+        let wrt: Vec<Node> = active.iter().map(|&k| inputs[4 * n + 1 + k]).collect();
+        let mut jacobian = graph.jacobian(&differences, &wrt);
+        for (filter, slope) in dynamics.filters.iter().zip(slopes) {
+            let Some(column) = active.iter().position(|&k| k == filter.parameter) else {
+                continue;
+            };
+            let by_torque = graph.jacobian(&differences, &[inputs[2 * n + filter.joint.index()]]);
+            for (row, by_torque) in jacobian.iter_mut().zip(by_torque) {
+                row[column] = graph.mul(by_torque[0], slope);
+            }
+        }
+        Self {
+            program: graph.finish(&[differences, jacobian.concat()].concat()),
+            reading: None,
+            joints: n,
+            filters: dynamics.filters.len(),
+            active: active.to_vec(),
+            local: Local::Nothing,
         }
     }
 }

@@ -1,24 +1,39 @@
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
+use super::balance::{Acting, Balance, Rows};
 use super::normal_equations::WindowTerms;
 use super::pack::Pack;
 use super::prior::Prior;
-use super::sensitivity::{LANES, Tangent};
+use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
-use crate::model::{Dynamics, Parameter};
+use crate::model::{Dynamics, Model};
 use crate::sim::{Commands, Point, Window, initial_state};
 
-/// Multiple shooting: least squares over windows of logs. In each window the model is integrated from a free start
-/// state and compared with the logged positions at every row; the start state is compared with what the rows around it
-/// tell.
+/// Least squares over windows of logs.
+///
+/// By multiple shooting: in each window the model is integrated from a free start state and compared with the logged
+/// positions at every row; the start state is compared with what the rows around it tell. Or by the torques that the
+/// logged motion needs, beside those logged.
 pub struct Shooting<'l> {
     pub logs: &'l [Log],
     pub windows: Vec<Window>,
-    /// Standard deviation of the position noise, per joint, in rad (or m).
+    /// Standard deviation per joint: of the position noise in rad (or m), or of the torque in N m (or N).
     pub noise: Vec<f64>,
-    packs: Vec<Pack>,
+    measure: Measure,
     prior: Prior,
+}
+
+/// What the model is compared with, window by window.
+enum Measure {
+    Motion(Vec<Pack>),
+    Torques {
+        /// One a log.
+        rows: Arc<Vec<Rows>>,
+        packs: Vec<Balance>,
+    },
 }
 
 impl<'l> Shooting<'l> {
@@ -37,7 +52,43 @@ impl<'l> Shooting<'l> {
             logs,
             windows,
             noise: noise.to_vec(),
-            packs,
+            measure: Measure::Motion(packs),
+            prior: Prior::default(),
+        }
+    }
+
+    /// The torques of the logged motion, for models compiled by
+    /// [`Model::torque_balance`](crate::model::Model::torque_balance). Windows in which no row is used are dropped.
+    ///
+    /// # Panics
+    /// When `noise` has not one entry a joint of the logs.
+    pub fn of_torques(logs: &'l [Log], windows: Vec<Window>, noise: &[f64]) -> Self {
+        let rows = logs.par_iter().map(Rows::of).collect();
+        Self::of_rows(logs, Arc::new(rows), windows, noise)
+    }
+
+    fn of_rows(
+        logs: &'l [Log],
+        rows: Arc<Vec<Rows>>,
+        mut windows: Vec<Window>,
+        noise: &[f64],
+    ) -> Self {
+        windows.retain(|window| {
+            !rows[window.log]
+                .within(&logs[window.log], window)
+                .is_empty()
+        });
+        let order: Vec<usize> = (0..windows.len()).collect();
+        let packs = order.chunks(LANES);
+        let packs = packs.map(|chunk| Balance::new(logs, &rows, &windows, chunk, noise));
+        Self {
+            logs,
+            noise: noise.to_vec(),
+            measure: Measure::Torques {
+                packs: packs.collect(),
+                rows,
+            },
+            windows,
             prior: Prior::default(),
         }
     }
@@ -45,21 +96,40 @@ impl<'l> Shooting<'l> {
     /// Other windows of the same logs, of the same rig.
     #[must_use]
     pub fn over(&self, windows: Vec<Window>) -> Self {
-        let mut other = Self::new(self.logs, windows, &self.noise);
+        let mut other = match &self.measure {
+            Measure::Motion(_) => Self::new(self.logs, windows, &self.noise),
+            Measure::Torques { rows, .. } => {
+                Self::of_rows(self.logs, Arc::clone(rows), windows, &self.noise)
+            }
+        };
         other.prior = self.prior.clone();
         other
+    }
+
+    /// What is free in each window, where these are its values.
+    pub(super) fn local(&self, locals: &[Vec<f64>]) -> Local {
+        let states = 2 * self.noise.len();
+        match &self.measure {
+            Measure::Torques { .. } => Local::Nothing,
+            Measure::Motion(_) if locals.first().is_some_and(|l| l.len() > states) => {
+                Local::StateAndForce
+            }
+            Measure::Motion(_) => Local::State,
+        }
     }
 
     /// The same windows, of whose start states nothing is known.
     #[must_use]
     pub fn with_free_starts(mut self) -> Self {
-        self.packs.iter_mut().for_each(Pack::free_starts);
+        if let Measure::Motion(packs) = &mut self.measure {
+            packs.iter_mut().for_each(Pack::free_starts);
+        }
         self
     }
 
     /// The same windows of a rig whose parameters are known to be of the size that is declared.
     #[must_use]
-    pub fn near(mut self, declared: &[Parameter]) -> Self {
+    pub fn near(mut self, declared: &Model) -> Self {
         self.prior = Prior::near(declared);
         self
     }
@@ -75,24 +145,33 @@ impl<'l> Shooting<'l> {
     }
 
     /// So many residuals say as much as the declared values do: they are correlated, and a few windows overrule what is
-    /// declared.
+    /// declared. In a motion the joints depend on each other; torques of joints are off one by one.
     #[allow(clippy::cast_precision_loss)] // some thousands
     fn residuals_of_a_window(&self) -> f64 {
-        let rows: usize = self.windows.iter().map(Window::rows).sum();
-        (rows * self.noise.len()) as f64 / self.windows.len().max(1) as f64
+        let residuals = match &self.measure {
+            Measure::Motion(_) => {
+                let rows: usize = self.windows.iter().map(Window::rows).sum();
+                rows * self.noise.len()
+            }
+            Measure::Torques { packs, .. } => packs.iter().map(Balance::rows).sum(),
+        };
+        residuals as f64 / self.windows.len().max(1) as f64
     }
 
     /// The same windows, integrated in substeps of at most `longest_s`.
     #[must_use]
     pub fn in_steps_of(mut self, longest_s: f64) -> Self {
-        for pack in &mut self.packs {
-            pack.cut(longest_s);
+        if let Measure::Motion(packs) = &mut self.measure {
+            packs.iter_mut().for_each(|pack| pack.cut(longest_s));
         }
         self
     }
 
     /// Initial guess of each window's start state, followed by `extra` zeros.
     pub fn initial_locals(&self, extra: usize) -> Vec<Vec<f64>> {
+        if let Measure::Torques { .. } = self.measure {
+            return vec![Vec::new(); self.windows.len()];
+        }
         let half_widths = half_widths(self.logs);
         let guess = |window: &Window| {
             let log = &self.logs[window.log];
@@ -112,27 +191,25 @@ impl<'l> Shooting<'l> {
         locals: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let n = dynamics.joints;
-        let commands = self.commands(dynamics, values);
-        let per_pack: Vec<Vec<(usize, Vec<f64>)>> = self
-            .packs
-            .par_iter()
-            .map(|pack| {
-                let mut all: Vec<(usize, Vec<f64>)> =
-                    pack.windows.iter().map(|&w| (w, Vec::new())).collect();
-                pack.roll(dynamics, values, &commands, locals, |row, q| {
-                    for (lane, (window, residuals)) in all.iter_mut().enumerate() {
-                        if row < self.windows[*window].rows() {
-                            residuals.extend((0..n).map(|j| {
-                                (q[j][lane] - pack.q[row][j][lane]) * pack.weight[row][j][lane]
-                            }));
-                        }
+        let of_motion = |pack: &Pack, commands: &[Commands<'_>]| {
+            let mut all: Vec<(usize, Vec<f64>)> =
+                pack.windows.iter().map(|&w| (w, Vec::new())).collect();
+            pack.roll(dynamics, values, commands, locals, |row, q| {
+                for (lane, (window, residuals)) in all.iter_mut().enumerate() {
+                    if row < self.windows[*window].rows() {
+                        residuals.extend((0..n).map(|j| {
+                            (q[j][lane] - pack.q[row][j][lane]) * pack.weight[row][j][lane]
+                        }));
                     }
-                });
-                all
-            })
-            .collect();
+                }
+            });
+            all
+        };
+        let per_pack = self.per_pack(dynamics, values, of_motion, |pack, data| {
+            pack.residuals(dynamics, values, data)
+        });
         let mut out = vec![Vec::new(); self.windows.len()];
-        for (window, residuals) in per_pack.into_iter().flatten() {
+        for (window, residuals) in per_pack {
             out[window] = residuals;
         }
         out
@@ -146,18 +223,42 @@ impl<'l> Shooting<'l> {
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<f64> {
-        let commands = self.commands(dynamics, values);
-        let per_pack: Vec<Vec<(usize, f64)>> = self
-            .packs
-            .par_iter()
-            .map(|pack| pack.costs(dynamics, values, &commands, locals, scale))
-            .collect();
+        let per_pack = self.per_pack(
+            dynamics,
+            values,
+            |pack, commands| pack.costs(dynamics, values, commands, locals, scale),
+            |pack, data| pack.costs(dynamics, values, data, scale),
+        );
         let mut out = vec![f64::INFINITY; self.windows.len()];
         let finite = |(_, cost): &(usize, f64)| cost.is_finite();
-        for (window, cost) in per_pack.into_iter().flatten().filter(finite) {
+        for (window, cost) in per_pack.into_iter().filter(finite) {
             out[window] = cost;
         }
         out
+    }
+
+    /// What each window gives, all packs at once.
+    fn per_pack<T: Send>(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        of_motion: impl Fn(&Pack, &[Commands<'_>]) -> Vec<(usize, T)> + Sync,
+        of_torques: impl Fn(&Balance, (&[Rows], &Acting)) -> Vec<(usize, T)> + Sync,
+    ) -> Vec<(usize, T)> {
+        match &self.measure {
+            Measure::Motion(packs) => {
+                let commands = self.commands(dynamics, values);
+                let packs = packs.par_iter();
+                packs.flat_map(|pack| of_motion(pack, &commands)).collect()
+            }
+            Measure::Torques { rows, packs } => {
+                let acting = Acting::of(dynamics, values, self.logs, rows);
+                let packs = packs.par_iter();
+                packs
+                    .flat_map(|pack| of_torques(pack, (rows.as_slice(), &acting)))
+                    .collect()
+            }
+        }
     }
 
     /// The torques of each log as filtered by the model's delays and lags.
@@ -178,13 +279,12 @@ impl<'l> Shooting<'l> {
         locals: &[Vec<f64>],
         scale: f64,
     ) -> Vec<WindowTerms> {
-        let commands = self.commands(dynamics, values);
-        let per_pack: Vec<Vec<(usize, WindowTerms)>> = self
-            .packs
-            .par_iter()
-            .map(|pack| pack.linearise(tangent, values, &commands, locals, scale))
-            .collect();
-        let mut all: Vec<_> = per_pack.into_iter().flatten().collect();
+        let mut all = self.per_pack(
+            dynamics,
+            values,
+            |pack, commands| pack.linearise(tangent, values, commands, locals, scale),
+            |pack, data| pack.linearise(tangent, values, data, scale),
+        );
         all.sort_by_key(|(window, _)| *window);
         all.into_iter().map(|(_, terms)| terms).collect()
     }
@@ -220,6 +320,54 @@ mod tests {
             leave_out: Vec::new(),
             notes: Vec::new(),
             time,
+        }
+    }
+
+    #[test]
+    fn gradients_of_torques_are_slopes_of_the_cost() {
+        let library = Library::built_in();
+        let effects = ["actuator_delay", "actuator_lag", "coulomb_friction"]
+            .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
+        let arm = library.model(Path::new("acrobot")).unwrap();
+        let model = arm.with_effects(effects.to_vec()).torque_balance().unwrap();
+        let mut log = log();
+        for channels in [&mut log.q, &mut log.qd, &mut log.tau] {
+            let second = channels[0].iter().map(|x| 0.7 * x + 0.1).collect();
+            channels.push(second);
+        }
+        log.masked.push(Vec::new());
+        let logs = [log];
+        let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2]);
+        let locals = shooting.initial_locals(0);
+        let free = |k: &usize| !model.parameters[*k].fixed;
+        let active: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
+        let tangent = Tangent::new(&model, &active, Local::Nothing);
+        let mut values = model.values();
+        let first = values.len() - 3;
+        values[first..].copy_from_slice(&[0.0073, 0.015, 0.1]);
+        let point = |values: &[f64]| Values {
+            common: values.to_vec(),
+            own: Vec::new(),
+        };
+        let cost = |values: &[f64]| -> f64 {
+            let costs = shooting.costs(&model, &point(values), &locals, 1.0);
+            costs.iter().sum()
+        };
+        let terms = shooting.linearise(&model, &tangent, &point(&values), &locals, 1.0);
+        assert!(terms.len() > 1);
+        for (column, k) in active.into_iter().enumerate() {
+            let found: f64 = terms.iter().map(|terms| terms.gradient[column]).sum();
+            let moved = |step: f64| {
+                let mut moved = values.clone();
+                moved[k] += step;
+                cost(&moved)
+            };
+            let wanted = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+            assert!(
+                (found - wanted).abs() < 1e-2 * wanted.abs().max(1e-6),
+                "{}: {found} {wanted}",
+                model.parameters[k].name
+            );
         }
     }
 

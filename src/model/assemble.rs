@@ -35,10 +35,11 @@ impl Model {
         }
     }
 
-    /// The torque (N m, or N) of each joint by which a motion needs more than acts, after all effects: zero where the model is
-    /// right. Inputs are those of [`Dynamics`], then the accelerations. `None` for a model that gives accelerations, which
-    /// has no torques.
-    pub fn inverse_dynamics(&self) -> Option<Program> {
+    /// The balance of torques, compiled like [`Model::dynamics`]: outputs of the program are the torques (N m, or N) of the
+    /// joints by which a motion needs more than acts, after all effects; zero where the model is right. Its inputs are those
+    /// of [`Dynamics`] with the accelerations `qdd1..qddn` before the parameters. `None` for a model that gives accelerations,
+    /// which has no torques.
+    pub fn torque_balance(&self) -> Option<Dynamics> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
         let joints = Joint::all(self.joints);
@@ -53,7 +54,16 @@ impl Model {
         let differences: Vec<Node> = both
             .map(|(needed, acting)| assembly.graph.sub(*needed, *acting))
             .collect();
-        Some(assembly.graph.finish(&differences))
+        let program = assembly.graph.finish(&differences);
+        Some(Dynamics {
+            name: self.name.clone(),
+            joints: self.joints,
+            parameters: assembly.parameters,
+            program: with_parameters_last(&program, self.joints),
+            filters: self.filters(),
+            reading: None,
+            own: self.own_values(),
+        })
     }
 
     /// Every parameter of the model: the declared ones, then those of the effects, in their order.
@@ -341,4 +351,16 @@ fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
     scope
         .lower(graph, &formula.value)
         .expect("formulas were checked when the file was read")
+}
+
+/// A program with its last `accelerations` inputs before the parameters.
+fn with_parameters_last(program: &Program, accelerations: usize) -> Program {
+    let (moving, rest) = program.inputs().split_at(3 * accelerations + 1);
+    let (parameters, qdd) = rest.split_at(rest.len() - accelerations);
+    let mut graph = Graph::new();
+    let mut inputs =
+        |names: &[String]| -> Vec<Node> { names.iter().map(|name| graph.input(name)).collect() };
+    let (moving, qdd, parameters) = (inputs(moving), inputs(qdd), inputs(parameters));
+    let outputs = graph.append(program, &[moving, parameters, qdd].concat());
+    graph.finish(&outputs)
 }

@@ -3,7 +3,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::bodies::Bodies;
-use super::chain::Recovered;
+use super::chain::{Body, Recovered};
 use super::dynamics::{Dynamics, OwnValue, Parameter};
 use super::effect::{Effect, Entry, Measure};
 use super::fitted::FittedEffect;
@@ -337,6 +337,23 @@ impl Model {
 }
 
 impl Model {
+    /// The parameters of each body of a chain whose ten parts are parameters as they are: mass, first moments, and xx, xy, xz,
+    /// yy, yz, zz of the tensor.
+    pub fn inertias(&self) -> Vec<[usize; 10]> {
+        let Motion::Chain(bodies) = &self.equations.motion else {
+            return Vec::new();
+        };
+        let place = |formula: &Located<Formula>| {
+            let mut parameters = self.parameters.iter();
+            parameters.position(|parameter| formula.value.is_name(&parameter.name))
+        };
+        let body = |body: &Body<Located<Formula>>| -> Option<[usize; 10]> {
+            let places: Option<Vec<usize>> = body.parts().map(place).collect();
+            places?.try_into().ok()
+        };
+        bodies.bodies.iter().filter_map(body).collect()
+    }
+
     /// The bodies that the file describes, where it describes a chain, at other values of the declared parameters.
     pub(crate) fn mechanism(&self, values: &[f64]) -> Option<Recovered> {
         let Motion::Chain(bodies) = &self.equations.motion else {

@@ -4,7 +4,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::data::{Log, Smooth};
-use crate::expr::Program;
 use crate::lanes::Row;
 use crate::model::{Dynamics, Model};
 use crate::sim::Commands;
@@ -24,11 +23,8 @@ pub struct TorqueError {
 /// The error of the torques on logs, each as [`Smooth`] reads it. `None` for a model that gives accelerations, and where no
 /// log is longer than a second.
 pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
-    let inverse = model.inverse_dynamics()?;
-    let dynamics = model.dynamics();
-    let differences = logs
-        .par_iter()
-        .map(|log| differences(&inverse, &dynamics, log));
+    let balance = model.torque_balance()?;
+    let differences = logs.par_iter().map(|log| differences(&balance, log));
     let mut sums = Sums::new(model.joints);
     for (smooth, differences) in differences.collect::<Vec<_>>() {
         sums.add(&smooth, &differences);
@@ -37,14 +33,14 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
 }
 
 /// Of a log, and the torques by which its motion needs more than acts, `[joint][row]`.
-fn differences(inverse: &Program, dynamics: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
-    let in_log = dynamics.in_log(log);
+fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
+    let in_log = balance.in_log(log);
     let acting = match in_log.filters.is_empty() {
         true => Smooth::of(log),
         false => Smooth::of(&Commands::of_log(&*in_log, log).acting_on(log)),
     };
     let values = in_log.values();
-    let mut tape = inverse.tape::<f64, LANES>();
+    let mut tape = in_log.program.tape::<f64, LANES>();
     let mut found = vec![vec![0.0; acting.rows()]; log.joints()];
     for first in (0..acting.rows()).step_by(LANES) {
         let rows: [usize; LANES] = std::array::from_fn(|k| (first + k).min(acting.rows() - 1));
@@ -60,11 +56,10 @@ fn differences(inverse: &Program, dynamics: &Dynamics, log: &Log) -> (Smooth, Ve
             .into_iter()
             .flatten()
             .map(|channel| of_rows(channel));
-        let held = values.iter().map(|value| Row::splat(*value));
         let inputs = moving
             .chain([of_rows(time)])
-            .chain(held)
-            .chain(qdd.iter().map(|channel| of_rows(channel)));
+            .chain(qdd.iter().map(|channel| of_rows(channel)))
+            .chain(values.iter().map(|value| Row::splat(*value)));
         for (slot, input) in tape.inputs().iter_mut().zip(inputs) {
             *slot = input;
         }

@@ -1,0 +1,241 @@
+//! The torques that logged motions need, beside those that act: windows of smoothed logs, one a lane.
+
+use super::normal_equations::WindowTerms;
+use super::sensitivity::{LANES, Lane, Tangent};
+use super::sums::{Sums, loss};
+use super::values::Values;
+use crate::data::{Log, Smooth};
+use crate::expr::Tape;
+use crate::lanes::Row;
+use crate::model::Dynamics;
+use crate::sim::{Commands, Point, Window};
+
+/// A delay or lag is varied by this many s for its derivative: small against what shows, large against rounding.
+const STEP_S: f64 = 1e-6;
+
+/// A log as the error of torques reads it, thinned out.
+pub(super) struct Rows {
+    smooth: Smooth,
+    step_s: f64,
+}
+
+impl Rows {
+    pub fn of(log: &Log) -> Self {
+        let step_s = log.median_step();
+        Self {
+            smooth: Smooth::of(log).thinned(step_s),
+            step_s,
+        }
+    }
+
+    /// The rows within a window.
+    pub fn within(&self, log: &Log, window: &Window) -> std::ops::Range<usize> {
+        let at = |row: usize| {
+            let time = log.time[row];
+            self.smooth.time.partition_point(|t| *t < time)
+        };
+        at(window.first)..at(window.last)
+    }
+}
+
+/// The torques that act in each log at its rows, `[log][joint][row]`, and their slopes by the model's filters,
+/// `[log][filter][row]`.
+pub(super) struct Acting {
+    tau: Vec<Vec<Vec<f64>>>,
+    slopes: Vec<Vec<Vec<f64>>>,
+}
+
+impl Acting {
+    pub fn of(dynamics: &Dynamics, values: &Values, logs: &[Log], rows: &[Rows]) -> Self {
+        let mut acting = Self {
+            tau: Vec::new(),
+            slopes: Vec::new(),
+        };
+        for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
+            let own = values.of_log(index);
+            let tau = filtered(dynamics, &own, log, rows);
+            let slope = |parameter: usize, joint: crate::data::Joint| {
+                let mut moved = own.clone();
+                moved[parameter] += STEP_S;
+                let moved = filtered(dynamics, &moved, log, rows);
+                let both = moved[joint].iter().zip(&tau[joint]);
+                both.map(|(after, before)| (after - before) / STEP_S)
+                    .collect::<Vec<f64>>()
+            };
+            let filters = dynamics.filters.iter();
+            let slopes = filters.map(|filter| slope(filter.parameter, filter.joint));
+            acting.slopes.push(slopes.collect());
+            acting.tau.push(tau);
+        }
+        acting
+    }
+}
+
+/// The torques of a log after the model's delays and lags, smoothed.
+fn filtered(dynamics: &Dynamics, values: &[f64], log: &Log, rows: &Rows) -> Vec<Vec<f64>> {
+    if dynamics.filters.is_empty() {
+        return rows.smooth.tau.clone();
+    }
+    let point = Point::new(dynamics, values);
+    let acting = Commands::of_log(&point, log).acting_on(log);
+    Smooth::of(&acting).thinned(rows.step_s).tau
+}
+
+/// Up to [`LANES`] windows side by side. Shorter ones are padded with rows of zero weight.
+pub(super) struct Balance {
+    pub windows: Vec<usize>,
+    /// The log of each lane.
+    logs: [usize; LANES],
+    /// `[row][lane]`: the row of the lane's smoothed log, if its window has one.
+    at: Vec<[Option<usize>; LANES]>,
+    /// 1 / noise of each joint.
+    weight: Vec<f64>,
+}
+
+impl Balance {
+    pub fn new(
+        logs: &[Log],
+        rows: &[Rows],
+        windows: &[Window],
+        members: &[usize],
+        noise: &[f64],
+    ) -> Self {
+        let lane = |lane: usize| members[lane.min(members.len() - 1)];
+        let ranges: Vec<_> = members
+            .iter()
+            .map(|&w| {
+                let window = &windows[w];
+                rows[window.log].within(&logs[window.log], window)
+            })
+            .collect();
+        let longest = ranges.iter().map(|range| range.len()).max().unwrap_or(0);
+        let at = |row: usize| {
+            std::array::from_fn(|lane| {
+                let range = ranges.get(lane)?;
+                (row < range.len()).then_some(range.start + row)
+            })
+        };
+        Self {
+            windows: members.to_vec(),
+            logs: std::array::from_fn(|l| windows[lane(l)].log),
+            at: (0..longest).map(at).collect(),
+            weight: noise.iter().map(|noise| 1.0 / noise).collect(),
+        }
+    }
+
+    /// Rows of all windows.
+    pub fn rows(&self) -> usize {
+        self.at.iter().flatten().flatten().count()
+    }
+
+    /// Evaluate a program at each row, calling `see(row, lanes, tape)`; `lanes` have such a row. `slopes` says whether
+    /// the program takes the slopes of the model's filters before the parameters.
+    fn over_rows<'t>(
+        &self,
+        mut tape: Tape<'t, f64, LANES>,
+        first_parameter: usize,
+        values: &Values,
+        (rows, acting): (&[Rows], &Acting),
+        mut see: impl FnMut(usize, &[Option<usize>; LANES], &Tape<'t, f64, LANES>),
+    ) {
+        for (slot, value) in tape.inputs()[first_parameter..]
+            .iter_mut()
+            .zip(&values.common)
+        {
+            *slot = Row::splat(*value);
+        }
+        for own in &values.own {
+            for lane in (0..LANES).filter(|&lane| self.logs[lane] == own.log) {
+                tape.inputs()[first_parameter + own.parameter][lane] = own.value;
+            }
+        }
+        for (row, lanes) in self.at.iter().enumerate() {
+            let of = |value: &dyn Fn(usize, usize) -> f64| {
+                Row(std::array::from_fn(|lane| {
+                    lanes[lane].map_or(0.0, |at| value(self.logs[lane], at))
+                }))
+            };
+            let joints = self.weight.len();
+            let filters = acting.slopes[0].len();
+            let moving = tape.moving();
+            for j in 0..joints {
+                moving[j] = of(&|log, at| rows[log].smooth.q[j][at]);
+                moving[joints + j] = of(&|log, at| rows[log].smooth.qd[j][at]);
+                moving[2 * joints + j] = of(&|log, at| acting.tau[log][j][at]);
+                moving[3 * joints + 1 + j] = of(&|log, at| rows[log].smooth.qdd[j][at]);
+            }
+            moving[3 * joints] = of(&|log, at| rows[log].smooth.time[at]);
+            if moving.len() > 4 * joints + 1 {
+                for f in 0..filters {
+                    moving[4 * joints + 1 + f] = of(&|log, at| acting.slopes[log][f][at]);
+                }
+            }
+            tape.run();
+            see(row, lanes, &tape);
+        }
+    }
+
+    /// Residuals over their noise, window by window: `[row * n + joint]`.
+    pub fn residuals(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        data: (&[Rows], &Acting),
+    ) -> Vec<(usize, Vec<f64>)> {
+        let mut all: Vec<(usize, Vec<f64>)> =
+            self.windows.iter().map(|&w| (w, Vec::new())).collect();
+        let first = 4 * dynamics.joints + 1;
+        let tape = dynamics.program.tape_with_held(first);
+        self.over_rows(tape, first, values, data, |_, lanes, tape| {
+            for (lane, (_, residuals)) in all.iter_mut().enumerate() {
+                if lanes[lane].is_some() {
+                    let of_joint = |(j, weight): (usize, &f64)| tape.output(j)[lane] * weight;
+                    residuals.extend(self.weight.iter().enumerate().map(of_joint));
+                }
+            }
+        });
+        all
+    }
+
+    /// The Huber loss of each window at residual scale `scale`.
+    pub fn costs(
+        &self,
+        dynamics: &Dynamics,
+        values: &Values,
+        data: (&[Rows], &Acting),
+        scale: f64,
+    ) -> Vec<(usize, f64)> {
+        let residuals = self.residuals(dynamics, values, data).into_iter();
+        let cost = |residuals: Vec<f64>| residuals.iter().map(|r| loss(r / scale).0).sum();
+        residuals
+            .map(|(w, of_window)| (w, cost(of_window)))
+            .collect()
+    }
+
+    pub fn linearise(
+        &self,
+        tangent: &Tangent,
+        values: &Values,
+        data: (&[Rows], &Acting),
+        scale: f64,
+    ) -> Vec<(usize, WindowTerms)> {
+        let columns = tangent.columns();
+        let mut sums = Sums::new(columns);
+        let first = tangent.first_parameter();
+        let tape = tangent.program.tape_with_held(first);
+        let mut slopes = vec![Row::splat(0.0); columns];
+        self.over_rows(tape, first, values, data, |_, lanes, tape| {
+            for (j, weight) in self.weight.iter().enumerate() {
+                let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));
+                let out = tape.output(j);
+                let residual = Row(std::array::from_fn(|l| out[l] * weight[l]));
+                for (k, slope) in slopes.iter_mut().enumerate() {
+                    *slope = *tape.output(tangent.joints + j * columns + k);
+                }
+                sums.add(&residual, &slopes, &weight);
+            }
+        });
+        let windows = self.windows.iter().enumerate();
+        windows.map(|(lane, &w)| (w, sums.lane(lane))).collect()
+    }
+}

@@ -1,0 +1,90 @@
+use super::declared_body::{PARTS, physical_parts};
+use super::fit::fit;
+use super::outcome::{Fit, FitError};
+use super::shooting::Shooting;
+use crate::data::Log;
+use crate::model::Model;
+use crate::sim::cut;
+
+/// Length of the windows that are left out or resampled as one, s.
+const WINDOW_S: f64 = 0.5;
+/// The noise of the joints is that of the residuals, which depend on it: it has settled after so many fits.
+const FITS: usize = 3;
+
+/// A model fitted by torques.
+pub struct TorqueFit<'l> {
+    pub model: Model,
+    pub fit: Fit,
+    /// What it was fitted to: its noise is that of each joint's torque.
+    pub shooting: Shooting<'l>,
+}
+
+/// Fit a model to the torques that the motion in the logs needs, near the values of `declared`. A joint counts by how well
+/// its torque can be told; bodies stay physical.
+///
+/// # Errors
+/// A model that gives accelerations or logs of less than two seconds, as [`FitError::NoWindow`], and those of [`fit`].
+pub fn fit_torques<'l>(
+    model: &Model,
+    declared: &Model,
+    logs: &'l [Log],
+) -> Result<TorqueFit<'l>, FitError> {
+    let mut model = with_physical_bodies(model);
+    let windows = cut(logs, WINDOW_S);
+    let mut noise = vec![1.0; model.joints];
+    let mut found = None;
+    for _ in 0..FITS {
+        let balance = model.torque_balance().ok_or(FitError::NoWindow)?;
+        let shooting = Shooting::of_torques(logs, windows.clone(), &noise).near(declared);
+        let parameters = balance.parameters.iter().enumerate();
+        let free = parameters.filter(|(_, parameter)| !parameter.fixed);
+        let active: Vec<usize> = free.map(|(k, _)| k).collect();
+        let locals = shooting.initial_locals(0);
+        let (values, fitted) = fit(&shooting, &balance, &active, locals, None)?;
+        let balance = values.put_into(&balance, logs);
+        let residuals = shooting.residuals(&balance, &values, &fitted.locals);
+        for (noise, share) in noise.iter_mut().zip(shares(&residuals, model.joints)) {
+            *noise *= share;
+        }
+        model = model.at(&balance);
+        found = Some((fitted, shooting));
+    }
+    let (fit, shooting) = found.expect("there is at least one fit");
+    Ok(TorqueFit {
+        model,
+        fit,
+        shooting,
+    })
+}
+
+/// Root mean square of each joint's residuals.
+fn shares(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0_f64); joints];
+    for row in residuals
+        .iter()
+        .flat_map(|window| window.chunks_exact(joints))
+    {
+        for (sum, residual) in sums.iter_mut().zip(row) {
+            *sum = (sum.0 + residual * residual, sum.1 + 1.0);
+        }
+    }
+    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt().max(1e-12);
+    sums.into_iter().map(root).collect()
+}
+
+/// The same model where bodies that none can be have the values of the nearest that one can.
+fn with_physical_bodies(model: &Model) -> Model {
+    let mut model = model.clone();
+    for body in model.inertias() {
+        let parts: [f64; PARTS] = body.map(|parameter| model.parameters[parameter].value);
+        let Some(physical) = physical_parts(&parts) else {
+            continue;
+        };
+        for (parameter, value) in body.into_iter().zip(physical) {
+            if !model.parameters[parameter].fixed {
+                model.parameters[parameter].value = value;
+            }
+        }
+    }
+    model
+}
