@@ -191,6 +191,36 @@ fn torques_of_measured_arms_are_off_by_what_others_find() {
     }
 }
 
+/// Both logs follow the same reference.
+#[test]
+fn the_same_motion_of_a_measured_arm_is_told() {
+    let Some(data) = measured("kuka_lwr4") else {
+        return;
+    };
+    let logs = ["measurements_1.csv", "measurements_2.csv"].map(|name| data.join(name));
+    let model = tempfile::tempdir().unwrap();
+    let file = model.path().join("model.toml");
+    let description = data.join("kuka_lwr4.urdf");
+    succeeds(&[
+        "new",
+        "--from-urdf",
+        text(&description),
+        "--out",
+        text(&file),
+    ]);
+    let said = crate::support::answers(&[
+        "audit",
+        "--model",
+        text(&file),
+        text(&logs[0]),
+        text(&logs[1]),
+    ]);
+    assert!(
+        said.contains("the motion is that of measurements_1.csv once more"),
+        "{said}"
+    );
+}
+
 #[test]
 fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
     let folder = tempfile::tempdir().unwrap();

@@ -8,13 +8,14 @@ use std::process::{Command, Stdio};
 use rand::RngExt;
 use residyn::formats::{ExportModel, Predictions, Samples, find};
 use residyn::lanes::Row;
+use residyn::model::chain::model_text;
 use residyn::model::{Library, Model};
 use residyn::sim::{Commands, Hold, Integrator, StepTorque};
 use serde_json::json;
 use tempfile::TempDir;
 
 use crate::common::rng;
-use crate::models;
+use crate::{mechanism, models};
 
 /// Every function of formulas, reserved names of C, and text that would end a comment.
 const ODD: &str = r#"
@@ -40,6 +41,14 @@ fn odd() -> ExportModel {
     let library = Library::built_in();
     let system = Model::from_text("rig.toml".as_ref(), ODD, library.effects()).unwrap();
     ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("*/ \\"))
+}
+
+/// A chain of five bodies with four joints.
+fn linkage() -> ExportModel {
+    let file = mechanism::fixture("linkage_4r.urdf");
+    let text = model_text(&mechanism::read_to(&file, Some("hand")));
+    let system = Model::from_text(&file, &text, Library::built_in().effects()).unwrap();
+    ExportModel::of_system(&system, Integrator::RK4, 0.005, json!({}))
 }
 
 /// A model's header in a folder of its own.
@@ -144,20 +153,20 @@ fn headers(tools: &[&str]) -> Vec<Header> {
     if !there_are(tools) {
         return Vec::new();
     }
-    let header = |(name, model)| {
-        let header = Header {
-            name,
-            model,
-            folder: tempfile::tempdir().unwrap(),
-        };
-        find("c")
-            .unwrap()
-            .write(&header.model, &header.path())
-            .unwrap();
-        header
-    };
     let odd = [("odd", odd())];
-    models::all().into_iter().chain(odd).map(header).collect()
+    let all = models::all().into_iter().chain(odd);
+    all.map(|(name, model)| written(name, model)).collect()
+}
+
+fn written(name: &'static str, model: ExportModel) -> Header {
+    let header = Header {
+        name,
+        model,
+        folder: tempfile::tempdir().unwrap(),
+    };
+    let format = find("c").unwrap();
+    format.write(&header.model, &header.path()).unwrap();
+    header
 }
 
 fn question(samples: &Samples) -> String {
@@ -297,6 +306,53 @@ fn no_compiler_warns() {
             }
         }
     }
+}
+
+#[test]
+fn exported_inverse_dynamics_needs_the_same_torques() {
+    if !there_are(&["cc"]) {
+        return;
+    }
+    let mut compared = 0;
+    let chain = written("linkage", linkage());
+    for header in headers(&["cc"]).into_iter().chain([chain]) {
+        let model = &header.model;
+        let balance = model.system.torque_balance();
+        let network = model.prior.is_some() || model.residual.is_some();
+        let Some(balance) = balance.filter(|_| !network) else {
+            continue;
+        };
+        let (mut random, n) = (rng(9), model.joints());
+        let mut draw = |count: usize, size: f64| -> Vec<f64> {
+            (0..count)
+                .map(|_| random.random_range(-size..size))
+                .collect()
+        };
+        let motions: Vec<[Vec<f64>; 3]> = (0..100)
+            .map(|_| [draw(2 * n, 3.0), draw(n, 10.0), draw(n, 5.0)])
+            .collect();
+        let mut question = format!("{}", motions.len());
+        for number in motions.iter().flatten().flatten() {
+            let _ = write!(question, " {number:?}");
+        }
+        let float = format!("-D{}_FLOAT", model.name().to_uppercase());
+        for (flags, tolerance) in [(&["-O2"][..], 1e-12), (&["-O2", &float], 1e-4)] {
+            let found = header.ask("tests/clients/inverse.c", flags, &question);
+            let wanted = motions.iter().map(|[state, acceleration, torque]| {
+                let (values, time) = (balance.values(), vec![0.0]);
+                let inputs = [state, torque, &time, acceleration, &values];
+                balance.program.eval(&inputs.map(Vec::as_slice).concat())
+            });
+            for (found, wanted) in found.iter().zip(wanted) {
+                let size = wanted.iter().map(|x| x.abs()).fold(1.0, f64::max);
+                for (found, wanted) in found.iter().zip(wanted) {
+                    assert!((found - wanted).abs() < tolerance * size, "{}", header.name);
+                }
+            }
+        }
+        compared += 1;
+    }
+    assert!(compared > 1, "{compared}");
 }
 
 #[test]

@@ -111,6 +111,19 @@ fn the_loop_closes_on_a_double_pendulum() {
     assert_eq!(report["joints"], 2);
     assert!(!names(&report).is_empty());
     assert!(ratio(&report, 1) < 1.0, "{}", ratio(&report, 1));
+    let of_torques = |model: &str| report["torque"][model]["relative"].as_f64().unwrap();
+    assert!(
+        of_torques("after") < of_torques("before"),
+        "{}",
+        report["torque"]
+    );
+    assert_eq!(
+        report["torque"]["as_declared"]["rms"]
+            .as_array()
+            .unwrap()
+            .len(),
+        2
+    );
 }
 
 /// Parameters of the lab's own identification, found on `pd_system_identification.csv`.

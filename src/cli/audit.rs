@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{Answer, Common, inputs};
-use crate::data::{Audit, Columns, Log, audit};
+use crate::data::{Audit, Columns, Log, audit, tell_repeats};
 use crate::model::Library;
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and what mends them
@@ -26,7 +26,8 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (logs, columns) = read(arguments)?;
     inputs::print_notes(&logs);
-    let audits: Vec<Audit> = logs.iter().map(|log| audit(log, &columns)).collect();
+    let mut audits: Vec<Audit> = logs.iter().map(|log| audit(log, &columns)).collect();
+    tell_repeats(&logs, &mut audits);
     if arguments.common.json {
         inputs::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
     } else {

@@ -46,7 +46,7 @@ pub use remainder::{
 };
 pub use request::{Reference, Request};
 pub use run::close_loop;
-pub use score::{Contradicted, Errors, Finding};
+pub use score::{Contradicted, Errors, Finding, TorqueErrors};
 pub use select::{Rival, Round, Tried};
 pub use settings::{
     CalibrateSettings, CurveSettings, DiscriminateSettings, EstablishSettings, FitSettings,

@@ -15,7 +15,7 @@ use super::score::{Scorer, contradicted, findings};
 use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
-use crate::data::{Audit, Log, audit};
+use crate::data::{Audit, Log, audit, tell_repeats};
 use crate::model::{Library, Status};
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
@@ -74,6 +74,8 @@ pub fn close_loop(
     if let Ok(forces) = residual_force(&test_study, &found.chosen.after) {
         tell_pushes(&test_study, &forces, &mut of_test);
     }
+    let mut audits = [of_train, of_test].concat();
+    tell_repeats(split.train.iter().chain(&split.test), &mut audits);
     let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
     let scorer = Scorer {
@@ -107,7 +109,7 @@ pub fn close_loop(
             train: split.train,
             test: split.test,
             split: split.method,
-            audits: [of_train, of_test].concat(),
+            audits,
             settings: settings.clone(),
             unscored_s,
             prismatic: model.prismatic.clone(),

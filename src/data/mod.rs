@@ -29,7 +29,7 @@ mod trajectory;
 
 pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Response, Severity, TorqueDemand,
-    TorqueLag, VelocityCheck, audit,
+    TorqueLag, VelocityCheck, audit, tell_repeats,
 };
 pub use column::{Column, Quantity};
 pub use columns::Columns;

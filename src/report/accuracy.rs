@@ -8,7 +8,7 @@ use super::wording::{
 };
 use crate::closeloop::Outcome;
 use crate::data::Joint;
-use crate::sim::metric::{Summary, summarise};
+use crate::sim::metric::{Summary, TorqueError, summarise};
 
 /// The unit of positions: that of all joints, or both.
 fn position_unit(outcome: &Outcome) -> &'static str {
@@ -98,6 +98,17 @@ pub(super) fn errors(outcome: &Outcome) -> String {
                 "\n{name}: {diverged} windows diverged; each counts with the error reached by then."
             );
         }
+    }
+    if let Some(torque) = &outcome.errors.torque {
+        let percent = |error: &TorqueError| 100.0 * error.relative;
+        let _ = writeln!(
+            out,
+            "\nThe torques that the logged motion needs, low-passed, differ from the logged ones by {:.2} % ({AS_WRITTEN}), \
+             {:.2} % ({FITTED}) and {:.2} % ({WITH_EFFECTS}), root mean square.",
+            percent(&torque.declared),
+            percent(&torque.before),
+            percent(&torque.after)
+        );
     }
     for horizon in &outcome.given.unscored_s {
         let _ = writeln!(

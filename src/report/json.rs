@@ -4,9 +4,11 @@ use super::calibration::CalibrationEntry;
 use super::schema::{
     AlternativeEntry, AuditEntry, ContenderEntry, ContradictedEntry, EffectEntry, EffectName,
     ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry, LogsEntry,
-    ModelError, NormEntry, ParameterEntry, Report, TriedEntry, UnexplainedEntry,
+    ModelError, NormEntry, ParameterEntry, Report, TorqueEntry, TriedEntry, UnexplainedEntry,
 };
-use crate::closeloop::{Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, Tried};
+use crate::closeloop::{
+    Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, TorqueErrors, Tried,
+};
 use crate::data::{Audit, Joint, Log};
 use crate::identify::{Fit, FitError};
 use crate::model::{FittedEffect, Model, Origin, OwnValue, Parameter};
@@ -58,6 +60,7 @@ impl Report {
                 after: ended(&outcome.models.after.fit),
             },
             error: errors(outcome),
+            torque: outcome.errors.torque.clone().map(TorqueEntry::from),
             residual_norm: NormEntry {
                 before: norm(&outcome.remainder.before),
                 after: norm(&outcome.remainder.after),
@@ -267,6 +270,16 @@ fn tried(outcome: &Outcome) -> Vec<Vec<TriedEntry>> {
     };
     let round = |round: &Round| round.tried.iter().map(entry).collect();
     outcome.effects.rounds.iter().map(round).collect()
+}
+
+impl From<TorqueErrors> for TorqueEntry {
+    fn from(errors: TorqueErrors) -> Self {
+        Self {
+            as_declared: errors.declared,
+            before: errors.before,
+            after: errors.after,
+        }
+    }
 }
 
 fn joint_names(model: &Model) -> Vec<String> {

@@ -12,6 +12,7 @@ use crate::closeloop::{
     Curve, NetworkCheck, Proposal, Separation, Settings, SplitMethod, Unexplained, Verdict,
 };
 use crate::data::{Finding as AuditFinding, Joint};
+use crate::sim::metric::TorqueError;
 
 /// The JSON schema (draft 2020-12) of [`Report`].
 pub fn schema() -> Value {
@@ -62,6 +63,8 @@ pub struct Report {
     /// how the fits ended that the errors and the verdict rest on
     pub(super) fits: FitsEntry,
     pub(super) error: ErrorEntry,
+    /// of the torques that the logged motion needs, low-passed; null for a model that gives accelerations
+    pub(super) torque: Option<TorqueEntry>,
     /// residual generalised force, root mean square over stretches of 0.15 s, N m or N
     pub(super) residual_norm: NormEntry,
     pub(super) logs: LogsEntry,
@@ -189,6 +192,14 @@ pub(super) struct IdentifiabilityEntry {
     pub undetermined: Vec<Vec<(String, f64)>>,
     /// parameters held for that reason
     pub held: Vec<String>,
+}
+
+/// error of the torques that the logged motion needs, on the test logs
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct TorqueEntry {
+    pub as_declared: TorqueError,
+    pub before: TorqueError,
+    pub after: TorqueError,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]

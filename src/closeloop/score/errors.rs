@@ -7,7 +7,7 @@ use crate::closeloop::settings::ScoreSettings;
 use crate::data::Log;
 use crate::identify::calibrate_first;
 use crate::model::{Dynamics, Model};
-use crate::sim::metric::{Assessment, assess};
+use crate::sim::metric::{Assessment, TorqueError, assess, torque_error};
 
 /// Open-loop errors on the test logs.
 pub struct Errors {
@@ -24,8 +24,19 @@ pub struct Errors {
     pub hybrid: Option<Assessment>,
     /// Other models as they are, by name.
     pub against: Vec<(String, Assessment)>,
+    /// Of the torques that the logged motion needs; where the model has torques.
+    pub torque: Option<TorqueErrors>,
     /// 95 % interval of the relative reduction of the position error, before to after.
     pub reduction_ci95: Option<[f64; 2]>,
+}
+
+/// Errors of the torques on the test logs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueErrors {
+    /// Of the declared model with the values in its file.
+    pub declared: TorqueError,
+    pub before: TorqueError,
+    pub after: TorqueError,
 }
 
 /// Scores models on the test logs.
@@ -46,6 +57,7 @@ impl Scorer<'_> {
     ) -> Errors {
         let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
         let zeroed = self.zeroed(after);
+        let torque = self.torques([declared, &before.model, &after.model]);
         let (before, after) = rayon::join(|| self.fitted(before), || self.fitted(after));
         Errors {
             declared: self.as_it_is(declared),
@@ -53,9 +65,19 @@ impl Scorer<'_> {
             against: against.iter().map(scored).collect(),
             reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
             zeroed,
+            torque,
             before,
             after,
         }
+    }
+
+    fn torques(&self, models: [&Model; 3]) -> Option<TorqueErrors> {
+        let [declared, before, after] = models.map(|model| torque_error(model, self.test));
+        Some(TorqueErrors {
+            declared: declared?,
+            before: before?,
+            after: after?,
+        })
     }
 
     fn zeroed(&self, after: &Fitted) -> Option<Assessment> {

@@ -9,5 +9,5 @@ pub use self::contradicted::Contradicted;
 pub(super) use self::contradicted::contradicted;
 pub use self::contribution::Finding;
 pub(super) use self::contribution::findings;
-pub use self::errors::Errors;
 pub(super) use self::errors::Scorer;
+pub use self::errors::{Errors, TorqueErrors};

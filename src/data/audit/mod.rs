@@ -12,6 +12,7 @@ mod misread;
 mod motion;
 mod quality;
 mod regressors;
+mod repeats;
 mod response;
 mod table;
 
@@ -20,6 +21,7 @@ pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
 pub use demand::TorqueDemand;
 pub use joint::JointAudit;
 pub use quality::{Audit, Finding, Remedy, Severity};
+pub use repeats::tell_repeats;
 pub use response::Response;
 
 use super::columns::Columns;

@@ -21,6 +21,21 @@ pub(super) fn derivative(model: &ExportModel, names: &Names) -> String {
         )
 }
 
+/// The function of the inverse dynamics, for equations of torques without a network.
+pub(super) fn inverse(model: &ExportModel, names: &Names) -> String {
+    if model.prior.is_some() || model.residual.is_some() {
+        return String::new();
+    }
+    let Some(balance) = model.system.torque_balance() else {
+        return String::new();
+    };
+    let needed: Vec<String> = (0..model.joints())
+        .map(|joint| format!("needed[{joint}]"))
+        .collect();
+    let assignments = assignments(&balance.program, &needed, names);
+    include_str!("inverse.h").replace("NEEDED\n", &assignments)
+}
+
 fn jacobian(model: &ExportModel, names: &Names) -> String {
     let n = model.joints();
     let program = &model.equations.program;

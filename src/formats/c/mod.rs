@@ -1,4 +1,4 @@
-//! One C99 header: derivative, step and both Jacobians, without allocation, in double or float.
+//! One C99 header: derivative, step and both Jacobians, and the inverse dynamics, without allocation, in double or float.
 
 mod client;
 mod compiler;
@@ -23,7 +23,7 @@ pub(super) const FORMAT: Format = Format {
     extension: "h",
     not_carried: ExportModel::sensors_not_carried,
     files: |model, path| {
-        let about = "derivative, step and Jacobians in C";
+        let about = "derivative, step, Jacobians and inverse dynamics in C";
         Ok(vec![File::new(path, header(model)?, about)])
     },
     client: Client::Own(client::predict),
@@ -44,6 +44,7 @@ pub(super) fn header(model: &ExportModel) -> Result<String, ExportError> {
         memory(model, &names),
         networks::tables(model, &names),
         equations::derivative(model, &names),
+        equations::inverse(model, &names),
         include_str!("flow.h").to_owned(),
         advance(model.integrator.scheme(), &names),
         include_str!("step.h").to_owned(),

@@ -17,11 +17,11 @@ pub(in crate::formats) struct Names {
 
 /// Reserved names: keywords of C and C++, names that the functions use, and macros.
 const TAKEN: &str = "\
-    HUGE_VAL INFINITY M_E M_PI NAN NULL alignas alignof and and_eq asm auto bitand bitor bool break \
+    HUGE_VAL INFINITY M_E M_PI NAN NULL acceleration alignas alignof and and_eq asm auto bitand bitor bool break \
     by_state by_torque case catch char class compl concept const const_cast consteval constexpr \
     constinit continue cos decltype default delete do double dynamic_cast else enum exp explicit \
     export extern fabs false float for friend goto if inline int linux log long mutable namespace \
-    new noexcept not not_eq nullptr operator or or_eq parameters pow private protected public rates \
+    needed new noexcept not not_eq nullptr operator or or_eq parameters pow private protected public rates \
     register reinterpret_cast requires restrict return short signed sin sizeof sqrt state static \
     static_assert static_cast struct switch tan tanh template this thread_local throw time torque \
     true try typedef typeid typename union unix unsigned using virtual void volatile wchar_t while \
@@ -39,6 +39,7 @@ impl Names {
         };
         let moving = of_joints("q", "state", 0)
             .chain(of_joints("qd", "state", n))
+            .chain(of_joints("qdd", "acceleration", 0))
             .chain(of_joints("tau", "torque", 0))
             .chain([("t".to_owned(), "time".to_owned())]);
         let held = model.equations.parameters.iter().map(|parameter| {

@@ -1,6 +1,7 @@
 //! Error of the torques: the model's inverse dynamics beside the logged torques.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::data::{Log, Smooth};
@@ -12,7 +13,7 @@ use crate::sim::Commands;
 const LANES: usize = 8;
 
 /// The difference between the torques that a motion needs and those that act, over all rows of all logs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct TorqueError {
     /// Root mean square of each joint, N m (or N).
     pub rms: Vec<f64>,

@@ -1,0 +1,107 @@
+use super::quality::{Audit, Finding, Severity};
+use super::table::short;
+use crate::data::log::Log;
+
+/// Logs repeat each other whose angles differ by less than this share of their motion, root mean square: what a controller
+/// leaves that follows the same reference twice.
+const SAME: f64 = 0.02;
+
+/// A log that is shorter than this share of another repeats no more than a part of it.
+const WHOLE: f64 = 0.8;
+
+/// Say of each log which one before it has the same motion: as a test of the other it tells how well torques repeat, and
+/// nothing of other motions.
+pub fn tell_repeats<'l>(logs: impl IntoIterator<Item = &'l Log>, audits: &mut [Audit]) {
+    let mut before: Vec<&Log> = Vec::new();
+    for (log, audit) in logs.into_iter().zip(audits) {
+        let differs = |other: &&Log| Some((other.name(), difference(log, other)?));
+        let mut alike = before.iter().filter_map(differs);
+        if let Some((name, share)) = alike.find(|(_, share)| *share < SAME) {
+            let text = format!(
+                "the motion is that of {name} once more (the angles differ by {} % of it): one of the two as a test of the \
+                 other tells how well torques repeat, and nothing of other motions",
+                short(100.0 * share)
+            );
+            audit.add(Finding::new(Severity::Warning, text));
+        }
+        before.push(log);
+    }
+}
+
+/// Difference of the angles of two logs, each in the time since its start, as a share of their motion; `None` where they
+/// differ in joints or in length, or nothing moves.
+fn difference(a: &Log, b: &Log) -> Option<f64> {
+    let (shorter, longer) = (
+        a.duration().min(b.duration()),
+        a.duration().max(b.duration()),
+    );
+    if a.joints() != b.joints() || a.rows() < 2 || b.rows() < 2 || shorter < WHOLE * longer {
+        return None;
+    }
+    let (mut differs, mut moves) = (0.0, 0.0);
+    for (a_q, b_q) in a.q.iter().zip(&b.q) {
+        let common = || (0..a.rows()).filter(|row| a.time[*row] - a.time[0] <= shorter);
+        let other = |row: usize| at(b, b_q, a.time[row] - a.time[0]);
+        let differences: Vec<f64> = common().map(|row| a_q[row] - other(row)).collect();
+        let middle = a_q.iter().sum::<f64>() / a_q.len() as f64;
+        let motion: Vec<f64> = a_q.iter().map(|q| q - middle).collect();
+        differs += mean_square(&differences);
+        moves += mean_square(&motion);
+    }
+    (moves > 0.0).then(|| (differs / moves).sqrt())
+}
+
+fn mean_square(numbers: &[f64]) -> f64 {
+    numbers.iter().map(|x| x * x).sum::<f64>() / numbers.len() as f64
+}
+
+/// A channel of a log at a time since its start, on straight lines between its rows.
+fn at(log: &Log, channel: &[f64], since_start: f64) -> f64 {
+    let time = log.time[0] + since_start;
+    let after = log.time.partition_point(|t| *t < time);
+    let after = after.clamp(1, log.rows() - 1);
+    let share = (time - log.time[after - 1]) / (log.time[after] - log.time[after - 1]);
+    channel[after - 1] + share.clamp(0.0, 1.0) * (channel[after] - channel[after - 1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::tell_repeats;
+    use crate::data::{Columns, Log, audit};
+
+    /// Two joints on sines of this frequency, from this time on.
+    fn log(name: &str, start: f64, frequency: f64, off: f64) -> Log {
+        let mut log = Log::empty(2);
+        log.path = name.into();
+        for row in 0..800 {
+            let t = 0.01 * f64::from(row);
+            log.time.push(start + t);
+            for (j, amplitude) in [1.0, 0.3].into_iter().enumerate() {
+                log.q[j].push(amplitude * (frequency * t).sin() + off * (9.0 * t).sin());
+                log.qd[j].push(0.0);
+                log.tau[j].push(amplitude * (frequency * t).cos());
+            }
+        }
+        log
+    }
+
+    #[test]
+    fn the_same_motion_once_more_is_told_with_the_log_that_it_repeats() {
+        let logs = [
+            log("a.csv", 0.0, 2.0, 0.0),
+            log("b.csv", 5.0, 2.0, 0.004),
+            log("c.csv", 0.0, 2.3, 0.0),
+            log("d.csv", 0.0, 2.0, 0.1),
+        ];
+        let mut audits: Vec<_> = logs
+            .iter()
+            .map(|log| audit(log, &Columns::default()))
+            .collect();
+        tell_repeats(&logs, &mut audits);
+        let told = audits.iter().map(|audit| {
+            let mut findings = audit.findings.iter();
+            findings.any(|finding| finding.text.contains("motion is that of a.csv once more"))
+        });
+        assert_eq!(told.collect::<Vec<_>>(), [false, true, false, false]);
+    }
+}
