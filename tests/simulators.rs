@@ -1,5 +1,6 @@
 //! Mechanisms exported for simulators of rigid bodies: simulated by MuJoCo, and read back.
 
+use std::fs;
 use std::path::Path;
 
 use residyn::formats::{ExportModel, FORMATS, find};
@@ -10,7 +11,7 @@ use serde_json::json;
 
 use crate::common::{assert_near, points, rng};
 use crate::export::{client_agrees, predictions};
-use crate::mechanism::{fixture, read};
+use crate::mechanism::{fixture, read, read_to};
 use crate::models;
 use crate::support::{refuses, residyn, text};
 
@@ -28,6 +29,19 @@ fn of_text(text: &str, integrator: Integrator) -> ExportModel {
     let library = Library::built_in();
     let system = Model::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
     ExportModel::of_system(&system, integrator, 0.01, json!({}))
+}
+
+/// Five bodies, each on the one before.
+fn chain() -> ExportModel {
+    let description = fs::read_to_string(fixture("linkage_4r.urdf")).unwrap();
+    let mimics = |line: &&str| line.contains("<mimic");
+    let lines: Vec<&str> = description.lines().filter(|line| !mimics(line)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("five.urdf");
+    fs::write(&file, lines.join("\n")).unwrap();
+    let text = model_text(&read_to(&file, Some("hand")));
+    let system = Model::from_text(&file, &text, Library::built_in().effects()).unwrap();
+    ExportModel::of_system(&system, Integrator::RK4, 0.002, json!({}))
 }
 
 /// Models that both formats carry.
@@ -53,6 +67,7 @@ fn plain() -> Vec<(&'static str, ExportModel)> {
             ),
         ),
         ("drive", portable("drive", Integrator::RK4, &[friction(1)])),
+        ("chain of five", chain()),
         ("acrobot", portable("acrobot", fine, &[])),
         (
             "acrobot with effects",
