@@ -204,6 +204,11 @@ fn written_mechanisms_read_back_with_the_same_accelerations() {
             let path = folder.path().join("model").with_extension(format.extension);
             format.write(&model, &path).unwrap();
             let mut chain = read(&path);
+            let names = chain.joints.iter().map(|joint| &joint.name);
+            assert!(
+                names.zip(&model.system.joint_names).all(|(a, b)| a == b),
+                "{name}"
+            );
             // URDF says nothing of gravity.
             let down = chain.gravity.normalize();
             let own = model.declared().parameters;
@@ -297,7 +302,7 @@ fn export_lists_losses_and_measures_the_difference() {
     ]);
     assert_eq!(run.status.code(), Some(0));
     assert!(
-        std::fs::read_to_string(&out)
+        fs::read_to_string(&out)
             .unwrap()
             .contains("<joint name=\"joint1\" type=\"slide\" axis=\"1 0 0\"/>")
     );

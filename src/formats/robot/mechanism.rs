@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::data;
+use crate::formats::xml::escaped;
 use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
 use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
 use crate::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
@@ -72,12 +73,15 @@ impl Mechanism {
         if model.depends_on_time() {
             return Err("its equations depend on time".into());
         }
-        let found = match model.system.mechanism(&model.equations.values()) {
+        let mut found = match model.system.mechanism(&model.equations.values()) {
             Some(chain) => chain,
             None => recover(&model.declared(), &model.system.prismatic)?,
         };
         if found.joints.iter().any(|joint| joint.follows.is_some()) {
             return Err("one of its links follows the joint of another".into());
+        }
+        for (joint, name) in found.joints.iter_mut().zip(&model.system.joint_names) {
+            joint.name = escaped(name);
         }
         let still = Drive {
             gain: 1.0,
