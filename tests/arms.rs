@@ -125,6 +125,17 @@ fn branches_are_welded_and_noted() {
     let slide = &whole.joints[3];
     assert!((slide.inertia.mass - 0.9).abs() < 1e-15);
     assert!(!whole.notes.iter().any(|n| n.contains("what acts on")));
+    // What a joint off the chain does is of no interest.
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("other.urdf");
+    let description = fs::read_to_string(&file).unwrap();
+    let odd = "<joint name=\"left\" type=\"planar\">";
+    fs::write(
+        &other,
+        description.replace("<joint name=\"left\" type=\"prismatic\">", odd),
+    )
+    .unwrap();
+    assert_eq!(read_to(&other, Some("hand")).joints, whole.joints);
     let short = read_to(&file, Some("slide"));
     assert_eq!(short.joints.len(), 4);
     assert!((short.joints[3].inertia.mass - 1.3).abs() < 1e-15);

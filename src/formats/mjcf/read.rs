@@ -198,13 +198,13 @@ impl<'s, 'x> Reader<'s, 'x> {
     fn hinge(&self, joint: &Element<'s, 'x>, fallback: &str) -> Result<Hinge, FileError> {
         let name = joint.text("name").unwrap_or(fallback).to_owned();
         let slides = match joint.text("type").unwrap_or("hinge") {
-            "hinge" => false,
-            "slide" => true,
+            "hinge" => Ok(false),
+            "slide" => Ok(true),
             other => {
                 let message = format!(
                     "joint `{name}` is of type `{other}`; known are hinge and slide: fix the joint, or describe it by several"
                 );
-                return Err(joint.error(message));
+                Err(joint.error(message))
             }
         };
         joint.refuse("springdamper", "give `stiffness` and `damping`")?;
@@ -213,7 +213,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             joint.note(format!("the range of `{name}` is not carried"));
         }
         let position = |key| {
-            if slides {
+            if slides == Ok(true) {
                 joint.number_or(key, 0.0)
             } else {
                 self.angles.angle(joint, key)

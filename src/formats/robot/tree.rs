@@ -15,7 +15,8 @@ pub(in crate::formats) struct Hinge {
     pub name: String,
     /// Position in the file, bytes.
     pub at: usize,
-    pub slides: bool,
+    /// Rather than turns; or why it does neither.
+    pub slides: Result<bool, FileError>,
     /// A unit vector.
     pub axis: Vector3<f64>,
     /// A point of the axis, m.
@@ -189,7 +190,7 @@ impl<'t> Growth<'t, '_, '_> {
                 origin: hinge.anchor,
             };
             self.hinges.push(hinge);
-            self.joints.push(joint(body, hinge, frame.then(&own)));
+            self.joints.push(joint(body, hinge, frame.then(&own))?);
             frame = own.inverse();
         }
         self.take(body, &frame)?;
@@ -260,11 +261,11 @@ impl<'t> Growth<'t, '_, '_> {
     }
 }
 
-fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Joint {
-    Joint {
+fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Result<Joint, FileError> {
+    Ok(Joint {
         name: hinge.name.clone(),
         body: body.name.clone(),
-        slides: hinge.slides,
+        slides: hinge.slides.clone()?,
         pose,
         reference: hinge.reference,
         across: with_z_along(hinge.axis).column(0).into(),
@@ -272,7 +273,7 @@ fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Joint {
         inertia: Inertia::none(),
         follows: None,
         drivetrain: hinge.drivetrain,
-    }
+    })
 }
 
 /// Refuse a mass (kg) or an inertia tensor (kg m^2, about the centre of mass) that no body can have; `at` is its position

@@ -174,13 +174,13 @@ impl<'s, 'x> Robot<'s, 'x> {
         let name = element.required_text("name")?;
         let slides = match element.required_text("type")? {
             "fixed" => return Ok(None),
-            "revolute" | "continuous" => false,
-            "prismatic" => true,
+            "revolute" | "continuous" => Ok(false),
+            "prismatic" => Ok(true),
             other => {
                 let message = format!(
                     "joint `{name}` is of type `{other}`; known are fixed, revolute, continuous and prismatic: fix the joint, or describe it by several"
                 );
-                return Err(element.attribute_error("type", message));
+                Err(element.attribute_error("type", message))
             }
         };
         let mimic = named(joint, "mimic").next().map(|mimic| {
