@@ -4,7 +4,7 @@ use super::normal_equations::WindowTerms;
 use super::sensitivity::{LANES, Lane, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
-use crate::data::{Log, Smooth};
+use crate::data::{Joint, Log, Smooth};
 use crate::expr::Tape;
 use crate::lanes::Row;
 use crate::model::Dynamics;
@@ -54,7 +54,7 @@ impl Acting {
         for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
             let own = values.of_log(index);
             let tau = filtered(dynamics, &own, log, rows);
-            let slope = |parameter: usize, joint: crate::data::Joint| {
+            let slope = |parameter: usize, joint: Joint| {
                 let mut moved = own.clone();
                 moved[parameter] += STEP_S;
                 let moved = filtered(dynamics, &moved, log, rows);
@@ -128,15 +128,15 @@ impl Balance {
         self.at.iter().flatten().flatten().count()
     }
 
-    /// Evaluate a program at each row, calling `see(row, lanes, tape)`; `lanes` have such a row. `slopes` says whether
-    /// the program takes the slopes of the model's filters before the parameters.
+    /// Evaluate a program at each row, calling `see(lanes, tape)`, where `lanes` are those that have such a row. A program may
+    /// take the slopes of the torques by the model's filters before its parameters.
     fn over_rows<'t>(
         &self,
         mut tape: Tape<'t, f64, LANES>,
         first_parameter: usize,
         values: &Values,
         (rows, acting): (&[Rows], &Acting),
-        mut see: impl FnMut(usize, &[Option<usize>; LANES], &Tape<'t, f64, LANES>),
+        mut see: impl FnMut(&[Option<usize>; LANES], &Tape<'t, f64, LANES>),
     ) {
         for (slot, value) in tape.inputs()[first_parameter..]
             .iter_mut()
@@ -149,7 +149,7 @@ impl Balance {
                 tape.inputs()[first_parameter + own.parameter][lane] = own.value;
             }
         }
-        for (row, lanes) in self.at.iter().enumerate() {
+        for lanes in &self.at {
             let of = |value: &dyn Fn(usize, usize) -> f64| {
                 Row(std::array::from_fn(|lane| {
                     lanes[lane].map_or(0.0, |at| value(self.logs[lane], at))
@@ -171,7 +171,7 @@ impl Balance {
                 }
             }
             tape.run();
-            see(row, lanes, &tape);
+            see(lanes, &tape);
         }
     }
 
@@ -186,7 +186,7 @@ impl Balance {
             self.windows.iter().map(|&w| (w, Vec::new())).collect();
         let first = 4 * dynamics.joints + 1;
         let tape = dynamics.program.tape_with_held(first);
-        self.over_rows(tape, first, values, data, |_, lanes, tape| {
+        self.over_rows(tape, first, values, data, |lanes, tape| {
             for (lane, (_, residuals)) in all.iter_mut().enumerate() {
                 if lanes[lane].is_some() {
                     let of_joint = |(j, weight): (usize, &f64)| tape.output(j)[lane] * weight;
@@ -224,7 +224,7 @@ impl Balance {
         let first = tangent.first_parameter();
         let tape = tangent.program.tape_with_held(first);
         let mut slopes = vec![Row::splat(0.0); columns];
-        self.over_rows(tape, first, values, data, |_, lanes, tape| {
+        self.over_rows(tape, first, values, data, |lanes, tape| {
             for (j, weight) in self.weight.iter().enumerate() {
                 let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));
                 let out = tape.output(j);
