@@ -8,7 +8,7 @@ use super::select::{Rival, Round, Search, Trial, candidates, left_out_losses, st
 use super::stage::{Observer, Stage};
 use super::study::Study;
 use crate::identify::{FitError, Identifiability};
-use crate::model::{Library, Model, Status};
+use crate::model::{Library, Status};
 
 /// The result of searching the logs for what the declared model lacks.
 pub struct Found {
@@ -43,7 +43,7 @@ impl Chosen {
     }
 
     /// Effects of which `is_meant` holds are not established, for this reason.
-    pub fn demote(&mut self, reason: &str, is_meant: impl Fn(&Standing) -> bool) {
+    fn demote(&mut self, reason: &str, is_meant: impl Fn(&Standing) -> bool) {
         let established = |standing: &&mut Standing| standing.status == Status::Established;
         for standing in self.standings.iter_mut().filter(established) {
             if is_meant(standing) {
@@ -53,8 +53,9 @@ impl Chosen {
         }
     }
 
-    /// Note in a model with these effects how each of them stands.
-    pub fn mark(&self, study: &Study<'_>, model: &mut Model) {
+    /// Note in the model how each of the effects stands.
+    fn mark(&mut self, study: &Study<'_>) {
+        let model = &mut self.after.model;
         let added = study.added(model);
         for (effect, standing) in model.effects[added].iter_mut().zip(&self.standings) {
             effect.status = Some(standing.status);
@@ -103,9 +104,7 @@ pub fn find(
             without.is_ok_and(|without| share(without) - with < least)
         });
     }
-    let mut marked = chosen.after.model.clone();
-    chosen.mark(study, &mut marked);
-    chosen.after.model = marked;
+    chosen.mark(study);
     if chosen.established() == 0 && !chosen.standings.is_empty() {
         // What is not established explains nothing.
         left = unexplained(study, library.probes(), &before, &before, rng);

@@ -33,7 +33,7 @@ impl Smooth {
         let cutoff = (CUTOFF_HZ * step_s).min(HIGHEST / 2.0);
         let filter = LowPass::new(cutoff);
         let time = even(log, step_s);
-        let channel = |channel: &Vec<f64>| filter.apply(&at(&time, &log.time, channel));
+        let channel = |channel: &Vec<f64>| filter.apply(&resampled(&time, &log.time, channel));
         let channels = |channels: &[Vec<f64>]| channels.iter().map(channel).collect::<Vec<_>>();
         let (q, tau) = (channels(&log.q), channels(&log.tau));
         let used: Vec<usize> = (1..time.len().saturating_sub(1))
@@ -87,8 +87,8 @@ fn even(log: &Log, step_s: f64) -> Vec<f64> {
     (0..=steps).map(|k| first + k as f64 * step_s).collect()
 }
 
-/// A channel at other times, on straight lines between its rows.
-fn at(times: &[f64], rows: &[f64], channel: &[f64]) -> Vec<f64> {
+/// A channel at other times that rise, on straight lines between its rows.
+pub(super) fn resampled(times: &[f64], rows: &[f64], channel: &[f64]) -> Vec<f64> {
     let mut row = 0;
     let value = |time: &f64| {
         while row + 2 < rows.len() && rows[row + 1] < *time {

@@ -347,7 +347,8 @@ impl<'a> Assembly<'a> {
     }
 }
 
-fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
+/// A formula that was checked when the file was read, in a graph.
+pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>) -> Node {
     scope
         .lower(graph, &formula.value)
         .expect("formulas were checked when the file was read")

@@ -1,5 +1,6 @@
 use nalgebra::Vector3;
 
+use super::assemble::lower;
 use super::chain::{Body, Inertia, Links, Place, Recovered};
 use super::reader::Located;
 use crate::data::Joint;
@@ -59,7 +60,7 @@ impl Bodies {
     pub fn constants(&self, graph: &mut Graph, scope: &Scope) -> Vec<Node> {
         let formulas = self.formulas();
         formulas
-            .map(|formula| lower(graph, scope, formula))
+            .map(|formula| lower(scope, graph, formula))
             .collect()
     }
 
@@ -73,16 +74,10 @@ impl Bodies {
 
     /// The links at the angles that `scope` calls `q1..qn`.
     pub fn links<'g>(&self, graph: &'g mut Graph, scope: &Scope) -> Links<'g> {
-        let gravity = std::array::from_fn(|a| lower(graph, scope, &self.gravity[a]));
-        let body = |body: &Body<Located<Formula>>| body.map(|formula| lower(graph, scope, formula));
+        let gravity = std::array::from_fn(|a| lower(scope, graph, &self.gravity[a]));
+        let body = |body: &Body<Located<Formula>>| body.map(|formula| lower(scope, graph, formula));
         let bodies: Vec<Body<Node>> = self.bodies.iter().map(body).collect();
         let q = self.named(scope, "q");
         Links::at(graph, &self.places, &bodies, gravity, &q)
     }
-}
-
-fn lower(graph: &mut Graph, scope: &Scope, formula: &Located<Formula>) -> Node {
-    scope
-        .lower(graph, &formula.value)
-        .expect("formulas were checked when the file was read")
 }

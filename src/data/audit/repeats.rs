@@ -1,6 +1,7 @@
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::log::Log;
+use crate::data::smooth::resampled;
 
 /// Logs repeat each other whose angles differ by less than this share of their motion, root mean square: what a controller
 /// leaves that follows the same reference twice.
@@ -38,11 +39,13 @@ fn difference(a: &Log, b: &Log) -> Option<f64> {
     if a.joints() != b.joints() || a.rows() < 2 || b.rows() < 2 || shorter < WHOLE * longer {
         return None;
     }
+    let since_start = a.time.iter().map(|time| time - a.time[0]);
+    let common = since_start.take_while(|time| *time <= shorter);
+    let times: Vec<f64> = common.map(|time| b.time[0] + time).collect();
     let (mut differs, mut moves) = (0.0, 0.0);
     for (a_q, b_q) in a.q.iter().zip(&b.q) {
-        let common = || (0..a.rows()).filter(|row| a.time[*row] - a.time[0] <= shorter);
-        let other = |row: usize| at(b, b_q, a.time[row] - a.time[0]);
-        let differences: Vec<f64> = common().map(|row| a_q[row] - other(row)).collect();
+        let other = resampled(&times, &b.time, b_q);
+        let differences: Vec<f64> = a_q.iter().zip(&other).map(|(a, b)| a - b).collect();
         let middle = a_q.iter().sum::<f64>() / a_q.len() as f64;
         let motion: Vec<f64> = a_q.iter().map(|q| q - middle).collect();
         differs += mean_square(&differences);
@@ -53,15 +56,6 @@ fn difference(a: &Log, b: &Log) -> Option<f64> {
 
 fn mean_square(numbers: &[f64]) -> f64 {
     numbers.iter().map(|x| x * x).sum::<f64>() / numbers.len() as f64
-}
-
-/// A channel of a log at a time since its start, on straight lines between its rows.
-fn at(log: &Log, channel: &[f64], since_start: f64) -> f64 {
-    let time = log.time[0] + since_start;
-    let after = log.time.partition_point(|t| *t < time);
-    let after = after.clamp(1, log.rows() - 1);
-    let share = (time - log.time[after - 1]) / (log.time[after] - log.time[after - 1]);
-    channel[after - 1] + share.clamp(0.0, 1.0) * (channel[after] - channel[after - 1])
 }
 
 #[cfg(test)]

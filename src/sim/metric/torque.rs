@@ -36,10 +36,10 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
 /// Of a log, and the torques by which its motion needs more than acts, `[joint][row]`.
 fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     let in_log = balance.in_log(log);
-    let acting = match in_log.filters.is_empty() {
-        true => Smooth::of(log),
-        false => Smooth::of(&Commands::of_log(&*in_log, log).acting_on(log)),
-    };
+    let logged = Smooth::of(log);
+    let filtered = (!in_log.filters.is_empty())
+        .then(|| Smooth::of(&Commands::of_log(&*in_log, log).acting_on(log)));
+    let acting = filtered.as_ref().unwrap_or(&logged);
     let values = in_log.values();
     let mut tape = in_log.program.tape::<f64, LANES>();
     let mut found = vec![vec![0.0; acting.rows()]; log.joints()];
@@ -52,7 +52,7 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
             qd,
             qdd,
             tau,
-        } = &acting;
+        } = acting;
         let moving = [q, qd, tau]
             .into_iter()
             .flatten()
@@ -71,7 +71,7 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
             }
         }
     }
-    (Smooth::of(log), found)
+    (logged, found)
 }
 
 /// Sums of squares.
