@@ -18,12 +18,15 @@ const ROUNDING: f64 = 1e-12;
 type Meaning = fn(&[f64], f64, f64, f64) -> f64;
 
 /// All effects of the force and of the torque.
-const MEANINGS: [(&str, Meaning); 12] = [
+const MEANINGS: [(&str, Meaning); 13] = [
     ("viscous_friction", |p, _, v, tau| tau - p[0] * v),
     ("coulomb_friction", |p, _, v, tau| tau - p[0] * sign(v)),
     ("stribeck_friction", |p, _, v, tau| {
         let [f_c, f_s, v_s] = p.try_into().unwrap();
         tau - (f_c + (f_s - f_c) * (-(v / v_s).powi(2)).exp()) * sign(v)
+    }),
+    ("degressive_friction", |p, _, v, tau| {
+        tau - p[0] * (v / p[1]).asinh()
     }),
     ("asymmetric_friction", |p, _, v, tau| {
         let [f_p, f_n, b_p, b_n] = p.try_into().unwrap();
@@ -120,6 +123,7 @@ fn friction_opposes_the_motion() {
         "viscous_friction",
         "coulomb_friction",
         "stribeck_friction",
+        "degressive_friction",
         "asymmetric_friction",
         "quadratic_drag",
         "load_friction",

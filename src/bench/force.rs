@@ -11,6 +11,11 @@ pub enum Force {
         b_p: f64,
         b_n: f64,
     },
+    /// Grows as the logarithm of the speed far above the bend.
+    Degressive {
+        rise: f64,
+        bend: f64,
+    },
     QuadraticDrag {
         c: f64,
     },
@@ -44,6 +49,7 @@ impl Force {
         match *self {
             Self::Viscous { b } => -b * v,
             Self::TwoSlopes { b_p, b_n } => -v * if v > 0.0 { b_p } else { b_n },
+            Self::Degressive { rise, bend } => -rise * (v / bend).asinh(),
             Self::QuadraticDrag { c } => -c * v * v.abs(),
             Self::CubicDamping { c } => -c * v * v * v,
             Self::Spring { k, q_0 } => -k * (q - q_0),

@@ -61,6 +61,10 @@ impl Numbers<'_> {
                 b_p: n("b_p")?,
                 b_n: n("b_n")?,
             },
+            "degressive_friction" => Force::Degressive {
+                rise: n("F_d")?,
+                bend: n("v_d")?,
+            },
             "quadratic_drag" => Force::QuadraticDrag { c: n("c")? },
             "cubic_damping" => Force::CubicDamping { c: n("c")? },
             "joint_spring" => Force::Spring {
@@ -247,6 +251,7 @@ mod tests {
                 "asymmetric_friction",
                 &[("F_p", 0.1), ("F_n", 0.2), ("b_p", 0.0), ("b_n", 0.0)],
             ),
+            hidden("degressive_friction", &[("F_d", 0.1), ("v_d", 0.2)]),
             hidden("quadratic_drag", &[("c", 0.1)]),
             hidden("load_friction", &[("k", 0.1)]),
             hidden("joint_spring", &[("k", 0.1), ("q_0", 0.0)]),
