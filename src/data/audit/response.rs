@@ -10,6 +10,10 @@ use crate::data::projection::{dot, explained_by, free_of, orthonormal};
 /// Fewer rows than this for each column of the regression say nothing.
 const ROWS_A_COLUMN: usize = 10;
 
+/// Of an acceleration of which the motion itself leaves a smaller share open, what is left does not tell how it answers to the
+/// torque: a smooth motion of many joints explains its own accelerations.
+const LEFT: f64 = 0.01;
+
 /// The acceleration of a joint against a linear regression on its torque, gravity, friction and the accelerations of
 /// the other joints.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -17,8 +21,8 @@ pub struct Response {
     /// Share of the acceleration's variance that they explain together.
     pub explained: f64,
     /// Correlation of the acceleration with the torque, after what the others explain is taken out of both: above zero in
-    /// every mechanism, since its mass matrix is positive definite. `None` for a torque that is constant or that
-    /// the others explain whole.
+    /// every mechanism, since its mass matrix is positive definite. `None` for a torque that is constant, and where
+    /// the others explain the torque or nearly all of the acceleration.
     pub to_torque: Option<f64>,
 }
 
@@ -36,7 +40,8 @@ pub(super) fn response(motions: &[Motion], fast_rad_s: &[f64], joint: Joint) -> 
     if varied == 0.0 {
         return None;
     }
-    let torque = free_of(&basis, &motion.tau);
+    let is_open = left(&basis, acceleration) > LEFT * varied;
+    let torque = free_of(&basis, &motion.tau).filter(|_| is_open);
     let rest = free_of(&basis, acceleration);
     let to_torque = torque
         .as_ref()
