@@ -27,12 +27,16 @@ struct Arm {
     samples: Vec<Value>,
 }
 
-fn model(chain: &Chain) -> Model {
+/// As `residyn new` writes it.
+pub fn described(chain: &Chain) -> Model {
     let library = Library::built_in();
     let path = Path::new(&chain.name);
-    let model = Model::from_text(path, &model_text(chain), library.effects()).unwrap();
-    // What acts on the joints is none of the rigid bodies'.
-    model.with_effects(Vec::new())
+    Model::from_text(path, &model_text(chain), library.effects()).unwrap()
+}
+
+/// Its bodies alone, without what acts on the joints.
+pub fn model(chain: &Chain) -> Model {
+    described(chain).with_effects(Vec::new())
 }
 
 fn numbers(sample: &Value, key: &str) -> Vec<f64> {
@@ -253,7 +257,7 @@ fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
 }
 
 /// A log of sines of several frequencies in each joint, with the torques that a model needs for them.
-fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
+pub fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
     let mut rng = crate::common::rng(seed);
     let mut waves = || -> Vec<[f64; 3]> {
         let wave = |f: usize| {
@@ -277,9 +281,13 @@ fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
         let q = sum(&|[a, w, p]| a * (w * t + p).sin());
         let qd = sum(&|[a, w, p]| a * w * (w * t + p).cos());
         let qdd = sum(&|[a, w, p]| -a * w * w * (w * t + p).sin());
-        let tau = balance
-            .program
-            .eval(&[&q, &qd, &vec![0.0; n], &vec![t][..], &qdd, &values].concat());
+        let mut tau = vec![0.0; n];
+        // What depends on the torque makes the difference one to first order.
+        for _ in 0..3 {
+            let inputs = [&q, &qd, &tau, &vec![t][..], &qdd, &values].concat();
+            let off = balance.program.eval(&inputs);
+            tau.iter_mut().zip(off).for_each(|(tau, off)| *tau += off);
+        }
         log.time.push(t);
         for j in 0..n {
             log.q[j].push(q[j]);

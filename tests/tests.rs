@@ -32,6 +32,7 @@ mod oracles;
 mod parity;
 mod per_log;
 mod physics;
+mod prescribed;
 mod printers;
 mod recipes;
 mod rigs;

@@ -3,13 +3,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Result, bail};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Answer, Common, inputs, progress};
 use crate::closeloop::{
-    Outcome, Reference, Request, Settings, Split, Stage, Verdict, calibrate, close_loop,
+    Outcome, Reference, Request, Settings, Space, Split, Stage, Verdict, calibrate, close_loop,
 };
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Model, Origin};
@@ -51,10 +51,30 @@ pub(super) struct Arguments {
     /// Time after which the search for effects stops where it stands, and the report says so: 90s, 10min, 2h
     #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
     budget: Duration,
+    /// Which errors to compare: of the open-loop motion, or of the torques that the logged motion needs. Without it, those
+    /// that say more about these logs
+    #[arg(long, value_enum)]
+    errors: Option<Errors>,
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
     common: Common,
+}
+
+/// What `--errors` names.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Errors {
+    Motion,
+    Torque,
+}
+
+impl From<Errors> for Space {
+    fn from(errors: Errors) -> Self {
+        match errors {
+            Errors::Motion => Self::Motion,
+            Errors::Torque => Self::Torque,
+        }
+    }
 }
 
 /// The demo rig: its plant file is embedded, so that the program needs nothing but itself.
@@ -80,6 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     request.against = against;
     request.learner = Some(&learner);
     request.budget = Some(arguments.budget);
+    request.space = arguments.errors.map(Space::from);
     let mut estimate = progress::Estimate::new();
     let mut outcome = close_loop(request, &mut rng, &mut |now| {
         bar.set_position(now.stage.number() as u64);
@@ -196,6 +217,7 @@ fn origin(arguments: &Arguments, declared: &Model) -> Origin {
             "leave_out": spans.collect::<Vec<_>>(),
             "effects": paths(&arguments.effects.folders),
             "calibrate": arguments.calibrate,
+            "errors": arguments.errors.map(Space::from),
             "budget": humantime::format_duration(arguments.budget).to_string(),
             "device": arguments.common.device.name(),
         }),

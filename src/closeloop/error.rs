@@ -12,6 +12,16 @@ pub enum StudyError {
          less of them{found}"
     )]
     NoTest { shortest_s: f64, found: String },
+    #[error(
+        "{model} gives accelerations, and no torques can be compared; give its equations as `mass` and `bias`, or compare the \
+         motion with --errors motion"
+    )]
+    NoTorques { model: String },
+    #[error(
+        "calibrating simulates motion, and here torques were compared: leave --calibrate out, or compare the motion with \
+         --errors motion"
+    )]
+    NotOfMotion,
     #[error(transparent)]
     Fit(#[from] FitError),
     #[error(transparent)]

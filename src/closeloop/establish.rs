@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::fitted::Fitted;
-use super::select::{Folds, Trial, gain, losses_by, p_of_gains, p_value};
+use super::select::{Folds, Losses, Trial, gain, p_of_gains, p_value};
 use super::settings::EstablishSettings;
 use super::study::Study;
 use crate::identify::FitError;
@@ -33,7 +33,7 @@ pub(super) fn establish(
     trials: usize,
 ) -> Vec<Standing> {
     let halves = Folds::of(study).in_halves();
-    let crossed = |trial: &Trial| losses_by(&halves, &trial.fitted.fit);
+    let crossed = |trial: &Trial| Losses::by(study, &halves, &trial.fitted);
     let with = crossed(chosen);
     let added = study.added(&chosen.fitted.model);
     let standing = |(k, less): (usize, &Result<Trial, FitError>)| {
@@ -51,9 +51,10 @@ pub(super) fn establish(
                 };
             }
         };
-        let crossed_less = crossed(less);
+        let of_joint = |losses: &Losses| losses.of_joint(effect.joint);
+        let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
         let evidence = Evidence {
-            gain: gain(&less.losses, &chosen.losses),
+            gain: gain(&of_joint(&less.losses), &of_joint(&chosen.losses)),
             p_of_values: p_value(study, &chosen.fitted, k),
             p_of_falls: p_of_gains(&crossed_less, &with),
             crossed_gain: gain(&crossed_less, &with),

@@ -4,9 +4,11 @@ use super::error::StudyError;
 use super::establish::{Standing, establish, without_each};
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
-use super::select::{Rival, Round, Search, Trial, candidates, left_out_losses, starts};
+use super::select::{Losses, Rival, Round, Search, Trial, candidates, starts};
+use super::space::Space;
 use super::stage::{Observer, Stage};
 use super::study::Study;
+use crate::data::Joint;
 use crate::identify::{FitError, Identifiability};
 use crate::model::{Library, Status};
 
@@ -40,6 +42,27 @@ impl Chosen {
         standings
             .filter(|s| s.status == Status::Established)
             .count()
+    }
+
+    /// Effects are not established beside a remainder that leaves most of what their joint lacks, or more than they explain.
+    fn doubt(&mut self, study: &Study<'_>, before: &Fitted, left: &Unexplained) {
+        let settings = &study.settings.establish;
+        let parts = study.declared.joints;
+        let with: Vec<f64> = Joint::all(parts)
+            .map(|joint| share_left(study, before, &self.after, joint))
+            .collect();
+        self.demote(MASKING, |standing| {
+            let joint = standing.effect.joint;
+            left.matters_on(study, joint) && with[joint] > settings.masking
+        });
+        self.demote(OUTWEIGHED, |standing| {
+            let joint = standing.effect.joint;
+            let least = settings.outweighed * left.fraction_on(study, joint);
+            let without = standing.without.as_ref();
+            without.is_ok_and(|without| {
+                share_left(study, before, without, joint) - with[joint] < least
+            })
+        });
     }
 
     /// Effects of which `is_meant` holds are not established, for this reason.
@@ -82,27 +105,17 @@ pub fn find(
     progress(Stage::Remainder.into());
     let mut left = unexplained(study, library.probes(), &before, &chosen.after, rng);
     if (left.is_significant() || chosen.failure.is_some())
+        && study.space == Space::Motion
         && study.has_time()
         && let Some((identifiability, other)) = second_search(study, library, &before, progress)
-        && share_left(study, &before, &other.after) < share_left(study, &before, &chosen.after)
+        && total_left(study, &before, &other.after) < total_left(study, &before, &chosen.after)
     {
         study.identifiability = identifiability;
         chosen = other;
         left = unexplained(study, library.probes(), &before, &chosen.after, rng);
     }
-    if left.is_significant()
-        && share_left(study, &before, &chosen.after) > study.settings.establish.masking
-    {
-        chosen.demote(MASKING, |_| true);
-    }
     if left.is_significant() {
-        let share = |model: &Fitted| share_left(study, &before, model);
-        let with = share(&chosen.after);
-        let least = study.settings.establish.outweighed * left.fraction;
-        chosen.demote(OUTWEIGHED, |standing| {
-            let without = standing.without.as_ref();
-            without.is_ok_and(|without| share(without) - with < least)
-        });
+        chosen.doubt(study, &before, &left);
     }
     chosen.mark(study);
     if chosen.established() == 0 && !chosen.standings.is_empty() {
@@ -186,10 +199,19 @@ fn choose(
 }
 
 /// Loss that the effects leave, as a share of the declared model's, on stretches left out of the fits.
-fn share_left(study: &Study<'_>, before: &Fitted, after: &Fitted) -> f64 {
-    // Losses are in units of each fit's own scale.
-    let loss = |model: &Fitted| {
-        left_out_losses(study, &model.fit).iter().sum::<f64>() * model.fit.scale.powi(2)
-    };
-    loss(after) / loss(before).max(f64::MIN_POSITIVE)
+fn total_left(study: &Study<'_>, before: &Fitted, after: &Fitted) -> f64 {
+    let [before, after] = [before, after].map(|model| losses(study, model, Losses::total));
+    after / before.max(f64::MIN_POSITIVE)
+}
+
+/// The same of what a joint is judged by.
+fn share_left(study: &Study<'_>, before: &Fitted, after: &Fitted, joint: Joint) -> f64 {
+    let of_joint = |losses: &Losses| losses.of_joint(joint).iter().sum();
+    let [before, after] = [before, after].map(|model| losses(study, model, of_joint));
+    after / before.max(f64::MIN_POSITIVE)
+}
+
+/// A sum of losses, which are in units of each fit's own scale.
+fn losses(study: &Study<'_>, model: &Fitted, sum: impl Fn(&Losses) -> f64) -> f64 {
+    sum(&Losses::of(study, model)) * model.fit.scale.powi(2)
 }

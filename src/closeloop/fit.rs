@@ -3,9 +3,12 @@
 use super::error::StudyError;
 use super::fitted::Fitted;
 use super::select::usual_friction;
+use super::space::Space;
 use super::start::around;
 use super::study::Study;
-use crate::identify::{FitError, Identifiability, Shooting, Values, fit, identifiability};
+use crate::identify::{
+    FitError, Identifiability, Shooting, Values, fit, fit_torques, identifiability,
+};
 use crate::model::{Effect, FittedEffect, Model};
 
 /// The declared model, fitted, and what the logs determine of it.
@@ -30,6 +33,9 @@ impl Study<'_> {
     /// No window, or a model that diverges even over short windows, from all starting values.
     pub fn fit_declared(&mut self, library: &[Effect]) -> Result<Fitted, StudyError> {
         let friction = usual_friction(self, library);
+        if self.space == Space::Torque {
+            return Ok(self.fitted_by_torques(friction)?);
+        }
         let found = match self.fitted_from(self.declared, &friction) {
             Err(FitError::Diverged { diverged, windows }) => {
                 let (start, found) = self
@@ -44,6 +50,47 @@ impl Study<'_> {
         let (fitted, identifiability) = found;
         self.identifiability = identifiability;
         Ok(fitted)
+    }
+
+    /// The declared model, fitted by torques, in which it is so nearly linear that no start is poor. What the usual friction
+    /// leaves beside it is the noise of each joint's torque.
+    fn fitted_by_torques(&mut self, friction: Vec<FittedEffect>) -> Result<Fitted, FitError> {
+        let own = &self.declared.effects;
+        let model = self
+            .declared
+            .with_effects([own, friction.as_slice()].concat());
+        self.choose_sign_widths(&model)?;
+        let beside = fit_torques(&self.smoothed(&model), self.declared, self.logs)?;
+        self.weigh_by(&beside.shooting.noise);
+        let alone = beside.model.effects[..own.len()].to_vec();
+        let fitted = self.fitted_over(&self.shooting, &beside.model.with_effects(alone))?;
+        self.identifiability = self.identifiability_of(&fitted);
+        Ok(fitted)
+    }
+
+    /// Unless the file gives them, smooth the friction of each joint over the speed with which a model's torques fit best.
+    fn choose_sign_widths(&mut self, model: &Model) -> Result<(), FitError> {
+        if self.declared.sign_width.is_some() {
+            return Ok(());
+        }
+        let fitted = |share: &f64| {
+            let widths: Vec<f64> = self
+                .top_speed
+                .iter()
+                .map(|top| share * top.max(1e-6))
+                .collect();
+            let model = model.with_sign_widths(widths.clone());
+            let found = fit_torques(&model, self.declared, self.logs)?;
+            Ok((found.shooting.noise, widths))
+        };
+        let shares = self.settings.fit.torque_sign_widths;
+        let tried: Vec<(Vec<f64>, Vec<f64>)> =
+            shares.iter().map(fitted).collect::<Result<_, FitError>>()?;
+        for (j, width) in self.sign_widths.iter_mut().enumerate() {
+            let best = tried.iter().min_by(|(a, _), (b, _)| a[j].total_cmp(&b[j]));
+            *width = best.map_or(*width, |(_, widths)| widths[j]);
+        }
+        Ok(())
     }
 
     /// The best of a few fits that begin at values around the declared ones, and where it began.
@@ -100,7 +147,7 @@ impl Study<'_> {
 
     fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
-        let dynamics = model.dynamics();
+        let dynamics = self.space.compile(&model);
         let locals = shooting.initial_locals(0);
         let found = fit(shooting, &dynamics, &self.active(&dynamics), locals, None)?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
@@ -109,15 +156,25 @@ impl Study<'_> {
     /// What the logs determine of the declared parameters and of the effects that the file carries, beside all that a fitted
     /// model has.
     pub(super) fn identifiability_of(&self, fitted: &Fitted) -> Identifiability {
-        let dynamics = self.smoothed(&fitted.model).dynamics();
+        let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
-        let effects = self.declared.parameters.len()..dynamics.parameters.len();
-        let mut verdict = identifiability(&dynamics, &effects, &values, &fitted.fit);
+        let declared = self.declared.parameters.len();
+        let bodies = self.declared.inertias().concat();
+        // What nothing tells of a body stays as it is declared, and so does the body.
+        let may_be_held = |parameter| parameter < declared && !bodies.contains(&parameter);
+        let mut verdict = identifiability(&dynamics, may_be_held, &values, &fitted.fit);
         let carried = self.declared.effects.len().checked_sub(1);
-        let end = carried.map_or(effects.start, |last| fitted.model.place_of(last).end);
+        let end = carried.map_or(declared, |last| fitted.model.place_of(last).end);
+        let known = verdict.hold.len() + verdict.determined;
+        // Combinations that nothing tells and nothing holds are of bodies, or else of effects.
+        let open = if bodies.is_empty() {
+            0
+        } else {
+            verdict.free - known
+        };
         let columns = fitted.fit.columns.iter();
         verdict.free = columns.filter(|column| column.parameter < end).count();
-        verdict.determined = verdict.free - verdict.hold.len();
+        verdict.determined = verdict.free.saturating_sub(verdict.hold.len() + open);
         verdict
     }
 }

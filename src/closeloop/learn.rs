@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::fitted::Fitted;
 use super::refine::Refined;
 use super::settings::LearnSettings;
+use super::space::Space;
 use super::split::between;
 use super::stage::{Observer, Progress, Stage};
 use super::study::Study;
@@ -113,7 +114,8 @@ pub(super) fn learn(
     rng: &mut impl Rng,
     progress: &mut Observer<'_>,
 ) -> Result<Option<Learned>, LearnError> {
-    let Some(learner) = learner else {
+    // A network is trained on motion.
+    let Some(learner) = learner.filter(|_| refined.study.space == Space::Motion) else {
         return Ok(None);
     };
     let (study, fitted) = (&refined.study, &refined.after);

@@ -5,6 +5,7 @@
 //! through all of them.
 
 mod calibrate;
+mod choose;
 mod discriminate;
 mod error;
 mod establish;
@@ -21,6 +22,7 @@ mod run;
 mod score;
 mod select;
 mod settings;
+mod space;
 mod split;
 mod stage;
 mod start;
@@ -53,6 +55,7 @@ pub use settings::{
     LearnSettings, ProposalSettings, RefineSettings, RemainderSettings, ScoreSettings,
     SelectSettings, Settings, SplitSettings, VerdictSettings,
 };
+pub use space::Space;
 pub(crate) use split::between;
 pub use split::{Split, SplitMethod};
 pub use stage::{Fits, Observer, Progress, Stage};

@@ -6,6 +6,7 @@ use super::remainder::{Proposal, ResidualForce, Unexplained};
 use super::score::{Contradicted, Errors, Finding};
 use super::select::Round;
 use super::settings::Settings;
+use super::space::Space;
 use super::split::SplitMethod;
 use super::stage::Stage;
 use super::study::Study;
@@ -17,6 +18,8 @@ use crate::model::{Model, Parameter};
 /// Everything that closing the loop found out.
 #[non_exhaustive]
 pub struct Outcome {
+    /// Which errors were compared.
+    pub space: Space,
     pub verdict: Verdict,
     /// Why, in a sentence.
     pub reason: String,
@@ -106,7 +109,7 @@ impl Outcome {
         let audits = audits[..studied.len()].to_vec();
         Study {
             identifiability: self.models.identifiability.clone(),
-            ..Study::audited(declared, studied, audits, settings)
+            ..Study::audited(declared, self.space, studied, audits, settings)
         }
     }
 }

@@ -2,8 +2,9 @@
 
 use super::fitted::Fitted;
 use super::settings::RefineSettings;
+use super::space::Space;
 use super::study::Study;
-use crate::identify::{FitError, uncertainty};
+use crate::identify::{FitError, Values, deviations, uncertainty};
 use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
@@ -19,9 +20,12 @@ pub(super) struct Refined<'a> {
     pub failure: Option<FitError>,
 }
 
-/// Estimate the declared and the chosen model in fine steps.
+/// Estimate the declared and the chosen model in fine steps, or with the noise of the torques that the chosen one leaves.
 pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) -> Refined<'a> {
-    let fine = study.refined();
+    let fine = match study.space {
+        Space::Motion => study.refined(),
+        Space::Torque => study.weighed_by(chosen),
+    };
     let (study, before, mut after, failure) =
         match rayon::join(|| fine.estimate(declared), || fine.estimate(chosen)) {
             (Ok(before), Ok(after)) => (fine, before, after, None),
@@ -54,6 +58,24 @@ impl Study<'_> {
             shooting: shooting.in_steps_of(step_s),
             ..self.again()
         }
+    }
+}
+
+impl Study<'_> {
+    /// The same study where the noise of each joint is what a model leaves.
+    fn weighed_by(&self, fitted: &Fitted) -> Self {
+        let dynamics = self.compiled(&fitted.model);
+        let values = Values::of(&dynamics, self.logs);
+        let residuals = self
+            .shooting
+            .residuals(&dynamics, &values, &fitted.fit.locals);
+        let shares = deviations(&residuals, self.declared.joints);
+        let noise: Vec<f64> = (self.shooting.noise.iter().zip(shares))
+            .map(|(noise, share)| noise * share)
+            .collect();
+        let mut study = self.again();
+        study.weigh_by(&noise);
+        study
     }
 }
 

@@ -3,6 +3,7 @@ use std::time::Duration;
 use super::error::StudyError;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
+use super::space::Space;
 use super::split::Split;
 use crate::data::{Finding, Log, audit};
 use crate::model::{Library, Model};
@@ -20,6 +21,8 @@ pub struct Request<'a> {
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
     pub settings: Settings,
+    /// Which errors to compare; without it, those that say more about these logs.
+    pub space: Option<Space>,
     /// Time after which the search for effects stops where it stands; without one it goes on to its end.
     pub budget: Option<Duration>,
     /// Trains the residual network; without it there is none.
@@ -44,6 +47,7 @@ impl<'a> Request<'a> {
             split,
             against: Vec::new(),
             settings: Settings::default(),
+            space: None,
             budget: None,
             learner: None,
         }

@@ -12,6 +12,7 @@ use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
 use super::score::{Scorer, contradicted, findings};
+use super::space::Space;
 use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
@@ -35,6 +36,7 @@ pub fn close_loop(
         split,
         against,
         settings,
+        space,
         budget,
         learner,
     } = request;
@@ -55,7 +57,15 @@ pub fn close_loop(
     };
     let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
     let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
-    let mut study = Study::audited(model, &studied, of_train.clone(), &settings);
+    let mut study = Study::audited(model, Space::Motion, &studied, of_train.clone(), &settings);
+    let space = space.unwrap_or_else(|| study.better_space(library.effects()));
+    if space == Space::Torque {
+        if model.torque_balance().is_none() {
+            let model = model.name.clone();
+            return Err(StudyError::NoTorques { model });
+        }
+        study = Study::audited(model, space, &studied, of_train.clone(), &settings);
+    }
     study.deadline = deadline;
     // Where nothing moves, anything could be found.
     let nothing = Library::empty();
@@ -86,10 +96,12 @@ pub fn close_loop(
     let models = [&refined.before, &refined.after];
     let errors = scorer.errors(model, models, hybrid, &against, rng);
     let (verdict, reason) = verdict(&study, &found, &refined, &errors);
-    let findings = findings(&study, &found.chosen, &refined, &scorer);
+    let mut findings = findings(&study, &found.chosen, &refined, &scorer);
+    findings.sort_by_key(|finding| finding.effect.joint.index());
     let (findings, supported) =
         (findings.into_iter()).partition(|finding| finding.status == Status::Established);
     Ok(Outcome {
+        space,
         verdict,
         reason,
         models: models_of(&study, refined),

@@ -38,6 +38,13 @@ impl ScoreSettings {
     }
 }
 
+impl SelectSettings {
+    /// Effects of one set at most, in a model of so many joints.
+    pub(super) fn most_effects_of(&self, joints: usize) -> usize {
+        self.most_effects.max(self.most_of_joint * joints)
+    }
+}
+
 /// How the loop is closed.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
 #[non_exhaustive]
@@ -87,14 +94,21 @@ settings! {
         /// most at such a speed, a milliradian in half a second on a lab rig. A share, so that the width means the
         /// same on a slow axis and on a fast arm.
         sign_width: f64 = 5e-4,
+        /// Torques are compared where so many times more of the motion than of them is left unexplained.
+        prescribed: f64 = 10.0,
+        /// Where torques are compared, which are smoothed like the motion, the share is that of these with which the usual
+        /// friction fits a joint best.
+        torque_sign_widths: [f64; 5] = [5e-4, 5e-3, 1e-2, 2e-2, 5e-2],
     }
 }
 
 settings! {
     /// Stage 4: which sets of effects are tried, and which one is chosen.
     SelectSettings {
-        /// Effects of one set at most.
+        /// Effects of one set at most,
         most_effects: usize = 12,
+        /// or so many for each joint, where that is more.
+        most_of_joint: usize = 4,
         /// Steps of the search over predicted losses, each of which adds or drops one effect.
         depth: usize = 12,
         /// Sets that lead from one of these steps to the next.
@@ -187,6 +201,8 @@ settings! {
         slow_waves: usize = 6,
         /// Draws of the sensor's noise that the residuals are compared with.
         noise_draws: usize = 999,
+        /// The same where torques are compared, each of which smooths the logs once more.
+        torque_draws: usize = 299,
         /// A start state is varied by this many rad (or m) and rad/s (or m/s) for its derivative: small against what a
         /// model's curvature shows, large against rounding.
         start_step: f64 = 1e-5,

@@ -17,7 +17,7 @@ pub(super) fn around(study: &Study<'_>) -> impl Iterator<Item = Model> {
     let short = study.windows_of(study.settings.fit.short_window_s);
     let sample = Sample::of(&short, study.settings.fit.sample_windows).shooting;
     spread(study.declared).filter(move |model| {
-        let dynamics = study.smoothed(model).dynamics();
+        let dynamics = study.compiled(model);
         let values = Values::of(&dynamics, study.logs);
         let costs = sample.costs(&dynamics, &values, &sample.initial_locals(0), 1.0);
         costs.iter().all(|cost| cost.is_finite())

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
+use super::space::Space;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
 use crate::model::{Dynamics, FittedEffect, Model, Parameter};
@@ -12,6 +13,7 @@ use crate::model::{Dynamics, FittedEffect, Model, Parameter};
 pub struct Study<'a> {
     /// With the values in its file.
     pub declared: &'a Model,
+    pub space: Space,
     pub settings: &'a Settings,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
@@ -60,15 +62,17 @@ impl<'a> Sample<'a> {
 }
 
 impl<'a> Study<'a> {
+    /// A study of the motion.
     pub fn new(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
         let audits = logs.iter().map(|log| audit(log, &declared.columns));
         let audits = audits.collect();
-        Self::audited(declared, logs, audits, settings)
+        Self::audited(declared, Space::Motion, logs, audits, settings)
     }
 
     /// A study of logs with their audits.
     pub(super) fn audited(
         declared: &'a Model,
+        space: Space,
         logs: &'a [Log],
         audits: Vec<Audit>,
         settings: &'a Settings,
@@ -106,10 +110,16 @@ impl<'a> Study<'a> {
                 .collect()
         };
         let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
-        let windows = cut(logs, window_s);
-        let shooting = Shooting::new(logs, windows, &noise).near(declared);
+        // What a joint's torque owes to other things than the model shows when it is fitted.
+        let noise = match space {
+            Space::Motion => noise,
+            Space::Torque => vec![1.0; declared.joints],
+        };
+        let shooting = space.shooting(logs, cut(logs, window_s), &noise, &sign_widths);
+        let shooting = shooting.near(declared);
         Self {
             declared,
+            space,
             settings,
             logs,
             audits: audits.into(),
@@ -125,6 +135,16 @@ impl<'a> Study<'a> {
         }
     }
 
+    /// In how many parts models are judged, see [`Space::parts`].
+    pub(super) fn parts(&self) -> usize {
+        self.space.parts(self.declared.joints)
+    }
+
+    /// A share of the loss of one part, as a share of the whole loss.
+    pub(super) fn of_whole(&self, share: f64) -> f64 {
+        share / self.parts() as f64
+    }
+
     /// Whether the search may go on.
     pub(super) fn has_time(&self) -> bool {
         self.deadline
@@ -137,10 +157,13 @@ impl<'a> Study<'a> {
         'a: 'b,
     {
         let windows = cut(logs, self.settings.fit.window_s);
-        let shooting = Shooting::new(logs, windows, &self.shooting.noise);
-        let shooting = shooting.near(self.declared);
+        let shooting = self
+            .space
+            .shooting(logs, windows, &self.shooting.noise, &self.sign_widths)
+            .near(self.declared);
         Study {
             declared: self.declared,
+            space: self.space,
             settings: self.settings,
             logs,
             audits: OnceLock::new(),
@@ -154,6 +177,19 @@ impl<'a> Study<'a> {
             identifiability: Identifiability::default(),
             held: Vec::new(),
         }
+    }
+
+    /// Take this as the noise of the joints.
+    pub(super) fn weigh_by(&mut self, noise: &[f64]) {
+        let FitSettings {
+            window_s,
+            sample_windows,
+            ..
+        } = self.settings.fit;
+        let windows = cut(self.logs, window_s);
+        let shooting = (self.space).shooting(self.logs, windows, noise, &self.sign_widths);
+        self.shooting = shooting.near(self.declared);
+        self.sample = Sample::of(&self.shooting, sample_windows);
     }
 
     /// Its logs, cut into windows of this length in s.
@@ -218,7 +254,7 @@ impl<'a> Study<'a> {
         scale: Option<f64>,
     ) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
-        let dynamics = model.dynamics();
+        let dynamics = self.space.compile(&model);
         let active = self.active(&dynamics);
         let found = fit(&self.shooting, &dynamics, &active, locals, scale)?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
@@ -255,7 +291,7 @@ impl<'a> Study<'a> {
         below: f64,
     ) -> Option<Fitted> {
         let model = self.smoothed(&fitted.model.with_effects(effects));
-        let dynamics = model.dynamics();
+        let dynamics = self.space.compile(&model);
         let (active, locals) = (self.active(&dynamics), fitted.fit.locals.clone());
         let aim = (fitted.fit.scale, below);
         let found = fit_below(&self.shooting, &dynamics, &active, locals, aim).ok()??;
@@ -282,7 +318,12 @@ impl<'a> Study<'a> {
     /// A fitted model with more effects, compiled with the study's smoothing of friction.
     pub(super) fn extended(&self, fitted: &Fitted, more: &[FittedEffect]) -> Dynamics {
         let model = fitted.model.with_effects(fitted.effects_and(more));
-        self.smoothed(&model).dynamics()
+        self.compiled(&model)
+    }
+
+    /// A model compiled for the errors that the study compares, with its smoothing of friction.
+    pub(super) fn compiled(&self, model: &Model) -> Dynamics {
+        self.space.compile(&self.smoothed(model))
     }
 
     /// Whether the logs determine a parameter: other values are not told from one that they do not.

@@ -296,6 +296,7 @@ fn without_effects_the_error_reduction_is_zero() {
     let (declared, library) = (pendulum(), Library::built_in());
     let mut request = Request::of(&declared, &library, logs());
     request.settings.select.most_effects = 0;
+    request.settings.select.most_of_joint = 0;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let outcome = close_loop(request, &mut rng, &mut |_| {}).unwrap();
     assert!(outcome.effects.findings.is_empty());
@@ -316,6 +317,7 @@ fn a_changed_setting_changes_the_search() {
     let mut settings = Settings::default();
     assert_eq!(named(&settings), 1);
     settings.select.most_effects = 0;
+    settings.select.most_of_joint = 0;
     assert_eq!(named(&settings), 0);
 }
 

@@ -30,8 +30,8 @@ pub(super) fn verdict(
 ) -> (Verdict, String) {
     let added = study.added(&found.chosen.after.model).len();
     let established = found.chosen.established();
-    let are_worse =
-        errors.after.position_rms() > study.settings.verdict.worse * errors.before.position_rms();
+    let [before, after] = errors.compared(study.space);
+    let are_worse = after > study.settings.verdict.worse * before;
     match at_rest(study)
         .or_else(|| failure(found, refined))
         .or_else(|| inconclusive(study))

@@ -23,12 +23,20 @@ pub struct Smooth {
     pub qdd: Vec<Vec<f64>>,
     /// N m or N
     pub tau: Vec<Vec<f64>>,
+    /// Signs of the velocities, smoothed over a width and filtered like the torques: what is left of friction that jumps.
+    /// Empty where no widths are given.
+    pub directions: Vec<Vec<f64>>,
 }
 
 impl Smooth {
     /// The log at its median step, without half a second at either end and without the intervals that are left out. Velocity
     /// and acceleration are central differences of the filtered angle.
     pub fn of(log: &Log) -> Self {
+        Self::with_directions(log, &[])
+    }
+
+    /// The same with the direction of each joint, which reverses over these speeds, rad/s or m/s.
+    pub fn with_directions(log: &Log, widths: &[f64]) -> Self {
         let step_s = log.median_step();
         let cutoff = (CUTOFF_HZ * step_s).min(HIGHEST / 2.0);
         let filter = LowPass::new(cutoff);
@@ -36,6 +44,17 @@ impl Smooth {
         let channel = |channel: &Vec<f64>| filter.apply(&resampled(&time, &log.time, channel));
         let channels = |channels: &[Vec<f64>]| channels.iter().map(channel).collect::<Vec<_>>();
         let (q, tau) = (channels(&log.q), channels(&log.tau));
+        let direction = |(q, width): (&Vec<f64>, &f64)| {
+            let speed = |pair: &[f64]| (pair[2] - pair[0]) / (2.0 * step_s);
+            let inner = q.windows(3).map(speed);
+            let signs: Vec<f64> = inner
+                .map(|speed| (speed / width.max(f64::MIN_POSITIVE)).tanh())
+                .collect();
+            // One more at either end, like the rows.
+            let ends = [signs.first(), signs.last()].map(|sign| sign.copied().unwrap_or(0.0));
+            filter.apply(&[&ends[..1], &signs, &ends[1..]].concat())
+        };
+        let directions: Vec<Vec<f64>> = q.iter().zip(widths).map(direction).collect();
         let used: Vec<usize> = (1..time.len().saturating_sub(1))
             .filter(|row| is_used(log, time[*row]))
             .collect();
@@ -50,6 +69,7 @@ impl Smooth {
             }),
             q: each(&q, &|q, k| q[k]),
             tau: each(&tau, &|tau, k| tau[k]),
+            directions: each(&directions, &|directions, k| directions[k]),
             time: used.iter().map(|row| time[*row]).collect(),
         }
     }
@@ -67,6 +87,7 @@ impl Smooth {
             qd: channels(&self.qd),
             qdd: channels(&self.qdd),
             tau: channels(&self.tau),
+            directions: channels(&self.directions),
         }
     }
 

@@ -21,6 +21,8 @@ pub enum SignForm {
 pub struct Scope {
     names: HashMap<String, Node>,
     sign: SignForm,
+    /// Nodes whose signs are nodes of their own.
+    signs: HashMap<Node, Node>,
 }
 
 impl Formula {
@@ -45,12 +47,18 @@ impl Scope {
         Self {
             names: HashMap::new(),
             sign,
+            signs: HashMap::new(),
         }
     }
 
     /// Bind a name to a node.
     pub fn bind(&mut self, name: &str, node: Node) {
         self.names.insert(name.to_owned(), node);
+    }
+
+    /// The sign of a node is this one.
+    pub fn give_sign(&mut self, of: Node, sign: Node) {
+        self.signs.insert(of, sign);
     }
 
     /// New inputs of a graph under their own names; `sign` is exact.
@@ -123,9 +131,10 @@ impl Scope {
             (Function::Where, [condition, then, otherwise]) => {
                 graph.select(*condition, *then, *otherwise)
             }
-            (Function::Sign, [x]) => match self.sign {
-                SignForm::Exact => graph.unary(Unary::Sign, *x),
-                SignForm::Smooth { width } => {
+            (Function::Sign, [x]) => match (self.signs.get(x), self.sign) {
+                (Some(sign), _) => *sign,
+                (None, SignForm::Exact) => graph.unary(Unary::Sign, *x),
+                (None, SignForm::Smooth { width }) => {
                     let width = graph.constant(width);
                     let scaled = graph.div(*x, width);
                     graph.unary(Unary::Tanh, scaled)

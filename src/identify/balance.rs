@@ -20,10 +20,11 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    pub fn of(log: &Log) -> Self {
+    /// Friction reverses over these speeds, one a joint.
+    pub fn of(log: &Log, sign_widths: &[f64]) -> Self {
         let step_s = log.median_step();
         Self {
-            smooth: Smooth::of(log).thinned(step_s),
+            smooth: Smooth::with_directions(log, sign_widths).thinned(step_s),
             step_s,
         }
     }
@@ -163,11 +164,12 @@ impl Balance {
                 moving[joints + j] = of(&|log, at| rows[log].smooth.qd[j][at]);
                 moving[2 * joints + j] = of(&|log, at| acting.tau[log][j][at]);
                 moving[3 * joints + 1 + j] = of(&|log, at| rows[log].smooth.qdd[j][at]);
+                moving[4 * joints + 1 + j] = of(&|log, at| rows[log].smooth.directions[j][at]);
             }
             moving[3 * joints] = of(&|log, at| rows[log].smooth.time[at]);
-            if moving.len() > 4 * joints + 1 {
+            if moving.len() > 5 * joints + 1 {
                 for f in 0..filters {
-                    moving[4 * joints + 1 + f] = of(&|log, at| acting.slopes[log][f][at]);
+                    moving[5 * joints + 1 + f] = of(&|log, at| acting.slopes[log][f][at]);
                 }
             }
             tape.run();
@@ -184,7 +186,7 @@ impl Balance {
     ) -> Vec<(usize, Vec<f64>)> {
         let mut all: Vec<(usize, Vec<f64>)> =
             self.windows.iter().map(|&w| (w, Vec::new())).collect();
-        let first = 4 * dynamics.joints + 1;
+        let first = 5 * dynamics.joints + 1;
         let tape = dynamics.program.tape_with_held(first);
         self.over_rows(tape, first, values, data, |lanes, tape| {
             for (lane, (_, residuals)) in all.iter_mut().enumerate() {

@@ -1,5 +1,3 @@
-use std::ops::Range;
-
 use nalgebra::DMatrix;
 
 use super::eigen::eigen;
@@ -33,10 +31,10 @@ const NEGLIGIBLE: f64 = 1e-3;
 const NAMED: f64 = 0.1;
 
 /// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in relative
-/// units. The parameters `free` are never held.
+/// units. Of the parameters, those of which `may_be_held` is true are.
 pub fn identifiability(
     dynamics: &Dynamics,
-    free: &Range<usize>,
+    may_be_held: impl Fn(usize) -> bool,
     found: &Values,
     fit: &Fit,
 ) -> Identifiability {
@@ -53,25 +51,30 @@ pub fn identifiability(
             parts.map(|(i, w)| (name(i), *w)).collect()
         })
         .collect();
+    let (hold, still_loose) = hold(&information, fit, may_be_held);
     Identifiability {
         free: fit.columns.len(),
-        determined: fit.columns.len() - loose.len(),
+        determined: fit.columns.len() - hold.len() - still_loose,
         undetermined,
-        hold: hold(&information, fit, free),
+        hold,
     }
 }
 
 /// Hold the parameter with the largest weight in the undetermined directions, one after the other, while that leaves fewer
-/// of them.
-fn hold(information: &DMatrix<f64>, fit: &Fit, free: &Range<usize>) -> Vec<usize> {
+/// of them; and how many are left.
+fn hold(
+    information: &DMatrix<f64>,
+    fit: &Fit,
+    may_be_held: impl Fn(usize) -> bool,
+) -> (Vec<usize>, usize) {
     let part = |of: &[usize]| loose_directions(&information.select_rows(of).select_columns(of));
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
     let mut loose = part(&left);
     let mut hold = Vec::new();
     loop {
         let share = |i: &usize| -> f64 { loose.iter().map(|v| v[*i].powi(2)).sum() };
-        let may_be_held = |i: &usize| !free.contains(&fit.columns[left[*i]].parameter);
-        let mut candidates: Vec<usize> = (0..left.len()).filter(may_be_held).collect();
+        let is_candidate = |i: &usize| may_be_held(fit.columns[left[*i]].parameter);
+        let mut candidates: Vec<usize> = (0..left.len()).filter(is_candidate).collect();
         candidates.retain(|i| share(i) > NEGLIGIBLE);
         // Of equal shares the later parameter is held: files name the leading ones first.
         candidates.sort_by(|a, b| share(b).total_cmp(&share(a)).then(b.cmp(a)));
@@ -81,7 +84,7 @@ fn hold(information: &DMatrix<f64>, fit: &Fit, free: &Range<usize>) -> Vec<usize
             (fewer.len() < loose.len()).then_some((left[i], others, fewer))
         };
         let Some((held, others, fewer)) = candidates.into_iter().find_map(without) else {
-            return hold;
+            return (hold, loose.len());
         };
         hold.push(fit.columns[held].parameter);
         (left, loose) = (others, fewer);

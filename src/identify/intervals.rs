@@ -55,7 +55,8 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let blocks = blocks(shooting);
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
-    let all = fit.equations();
+    // Bodies are declared within a spread, which adds to the variance what it takes from it elsewhere.
+    let all = fit.equations().hessian + &fit.bodies;
     let mut parts = fit.equations_by(&blocks);
     let count = parts.len();
     let alone: Vec<usize> = (0..size)
@@ -65,10 +66,10 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         // Without its only block a value is undetermined, so it stays.
         alone.iter().for_each(|&i| part.gradient[i] = 0.0);
     }
-    let (model, flat) = inverse(&all.hessian);
+    let (model, flat) = inverse(&all);
     let steps: Vec<DVector<f64>> = parts
         .iter()
-        .map(|part| inverse(&(&all.hessian - &part.hessian)).0 * &part.gradient)
+        .map(|part| inverse(&(&all - &part.hessian)).0 * &part.gradient)
         .collect();
     #[allow(clippy::cast_precision_loss)] // few blocks
     let share = 1.0 / count.max(1) as f64;
@@ -76,7 +77,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         .iter()
         .fold(DVector::zeros(size), |sum, step| sum + step)
         * share;
-    let mut spread = flat;
+    let mut spread = flat + &model * &fit.bodies * &model;
     for step in &steps {
         let off = step - &mean;
         spread += &off * off.transpose() * (1.0 - share);

@@ -294,6 +294,7 @@ impl<'a> Search<'a> {
             .map(|(terms, window)| Reduced::of(terms, self.layout.places(window)))
             .collect();
         let prior = self.departure_terms();
+        let bodies = (self.shooting).declared_bodies(&self.layout.columns, &self.values);
         let fit = Fit {
             active: self.tangent.active.clone(),
             cost: self.cost - self.departure(),
@@ -301,6 +302,7 @@ impl<'a> Search<'a> {
             locals: self.locals,
             scale: self.scale,
             prior,
+            bodies,
             reduced,
             steps: self.steps,
             trace: self.trace,

@@ -34,5 +34,6 @@ pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};
 pub use outcome::{Fit, FitError, Termination};
 pub use sensitivity::Local;
 pub use shooting::Shooting;
-pub use torques::{TorqueFit, fit_torques};
+pub use sums::huber;
+pub use torques::{TorqueFit, deviations, fit_torques};
 pub use values::{Column, Own, Values};

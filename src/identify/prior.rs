@@ -101,6 +101,20 @@ impl Prior {
             terms.gradient[i] = residuals * departure * slope;
             terms.hessian[(i, i)] = residuals * slope * slope;
         }
+        let bodies = self.terms_of_bodies(columns, values, residuals);
+        terms.gradient += bodies.gradient;
+        terms.hessian += bodies.hessian;
+        terms
+    }
+
+    /// What bodies add to them.
+    pub fn terms_of_bodies(
+        &self,
+        columns: &[Column],
+        values: &Values,
+        residuals: f64,
+    ) -> WindowTerms {
+        let mut terms = WindowTerms::zeros(columns.len());
         for (body, parts, places) in self.free_bodies(columns, values) {
             let Some((gradient, hessian)) = body.terms(&parts) else {
                 continue;

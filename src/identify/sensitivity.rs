@@ -108,7 +108,7 @@ impl Tangent {
     /// Index of the first parameter among the inputs.
     pub fn first_parameter(&self) -> usize {
         let moving = match self.local {
-            Local::Nothing => 4,
+            Local::Nothing => 5,
             Local::State | Local::StateAndForce => 3,
         };
         moving * self.joints + 1 + self.filters
@@ -128,14 +128,15 @@ impl Tangent {
     fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
         let n = dynamics.joints;
         let mut graph = Graph::new();
-        let (moving, held) = dynamics.program.inputs().split_at(4 * n + 1);
+        let (moving, held) = dynamics.program.inputs().split_at(5 * n + 1);
         let mut inputs: Vec<Node> = moving.iter().map(|name| graph.input(name)).collect();
         let slopes = (dynamics.filters.iter())
             .map(|filter| graph.input(&format!("slope of {}", filter.parameter)))
             .collect::<Vec<_>>();
         inputs.extend(held.iter().map(|name| graph.input(name)));
         let differences = graph.append(&dynamics.program, &inputs);
-        let wrt: Vec<Node> = active.iter().map(|&k| inputs[4 * n + 1 + k]).collect();
+        let given = inputs.len() - dynamics.parameters.len();
+        let wrt: Vec<Node> = active.iter().map(|&k| inputs[given + k]).collect();
         let mut jacobian = graph.jacobian(&differences, &wrt);
         for (filter, slope) in dynamics.filters.iter().zip(slopes) {
             let Some(column) = active.iter().position(|&k| k == filter.parameter) else {

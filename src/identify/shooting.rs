@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::balance::{Acting, Balance, Rows};
@@ -58,12 +59,19 @@ impl<'l> Shooting<'l> {
     }
 
     /// The torques of the logged motion, for models compiled by
-    /// [`Model::torque_balance`](crate::model::Model::torque_balance). Windows in which no row is used are dropped.
+    /// [`Model::smoothed_torque_balance`]. Windows in which no row is used are dropped. Friction reverses over the speeds
+    /// `sign_widths`.
     ///
     /// # Panics
-    /// When `noise` has not one entry a joint of the logs.
-    pub fn of_torques(logs: &'l [Log], windows: Vec<Window>, noise: &[f64]) -> Self {
-        let rows = logs.par_iter().map(Rows::of).collect();
+    /// When `noise` or `sign_widths` have not one entry a joint of the logs.
+    pub fn of_torques(
+        logs: &'l [Log],
+        windows: Vec<Window>,
+        noise: &[f64],
+        sign_widths: &[f64],
+    ) -> Self {
+        let rows = logs.par_iter().map(|log| Rows::of(log, sign_widths));
+        let rows = rows.collect();
         Self::of_rows(logs, Arc::new(rows), windows, noise)
     }
 
@@ -142,6 +150,13 @@ impl<'l> Shooting<'l> {
     /// Its gradient and Gauss-Newton matrix.
     pub(super) fn departure_terms(&self, columns: &[Column], values: &Values) -> WindowTerms {
         (self.prior).terms(columns, values, self.residuals_of_a_window())
+    }
+
+    /// What is declared of bodies, as information on the free values.
+    pub(super) fn declared_bodies(&self, columns: &[Column], values: &Values) -> DMatrix<f64> {
+        let residuals = self.residuals_of_a_window();
+        let terms = self.prior.terms_of_bodies(columns, values, residuals);
+        terms.hessian
     }
 
     /// So many residuals say as much as the declared values do: they are correlated, and a few windows overrule what is
@@ -329,7 +344,8 @@ mod tests {
         let effects = ["actuator_delay", "actuator_lag", "coulomb_friction"]
             .map(|name| FittedEffect::absent(library.effect(name).unwrap(), Joint::at(0)));
         let arm = library.model(Path::new("acrobot")).unwrap();
-        let model = arm.with_effects(effects.to_vec()).torque_balance().unwrap();
+        let model = arm.with_effects(effects.to_vec());
+        let model = model.smoothed_torque_balance().unwrap();
         let mut log = log();
         for channels in [&mut log.q, &mut log.qd, &mut log.tau] {
             let second = channels[0].iter().map(|x| 0.7 * x + 0.1).collect();
@@ -337,7 +353,7 @@ mod tests {
         }
         log.masked.push(Vec::new());
         let logs = [log];
-        let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2]);
+        let shooting = Shooting::of_torques(&logs, cut(&logs, 0.5), &[0.5, 0.2], &[0.01; 2]);
         let locals = shooting.initial_locals(0);
         let free = |k: &usize| !model.parameters[*k].fixed;
         let active: Vec<usize> = (0..model.parameters.len()).filter(free).collect();

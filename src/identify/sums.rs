@@ -20,6 +20,11 @@ pub(super) fn loss(residual: f64) -> (f64, f64) {
     }
 }
 
+/// Huber's loss of a residual in units of its scale.
+pub fn huber(residual: f64) -> f64 {
+    loss(residual).0
+}
+
 /// Running sums of the normal equations of all lanes. The matrix is stored as its upper triangle.
 pub(super) struct Sums {
     columns: usize,

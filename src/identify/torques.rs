@@ -34,8 +34,9 @@ pub fn fit_torques<'l>(
     let mut noise = vec![1.0; model.joints];
     let mut found = None;
     for _ in 0..FITS {
-        let balance = model.torque_balance().ok_or(FitError::NoWindow)?;
-        let shooting = Shooting::of_torques(logs, windows.clone(), &noise).near(declared);
+        let balance = model.smoothed_torque_balance().ok_or(FitError::NoWindow)?;
+        let shooting = Shooting::of_torques(logs, windows.clone(), &noise, &model.sign_widths());
+        let shooting = shooting.near(declared);
         let parameters = balance.parameters.iter().enumerate();
         let free = parameters.filter(|(_, parameter)| !parameter.fixed);
         let active: Vec<usize> = free.map(|(k, _)| k).collect();
@@ -43,7 +44,7 @@ pub fn fit_torques<'l>(
         let (values, fitted) = fit(&shooting, &balance, &active, locals, None)?;
         let balance = values.put_into(&balance, logs);
         let residuals = shooting.residuals(&balance, &values, &fitted.locals);
-        for (noise, share) in noise.iter_mut().zip(shares(&residuals, model.joints)) {
+        for (noise, share) in noise.iter_mut().zip(deviations(&residuals, model.joints)) {
             *noise *= share;
         }
         model = model.at(&balance);
@@ -57,8 +58,8 @@ pub fn fit_torques<'l>(
     })
 }
 
-/// Root mean square of each joint's residuals.
-fn shares(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
+/// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
+pub fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
     let mut sums = vec![(0.0, 0.0_f64); joints];
     for row in residuals
         .iter()

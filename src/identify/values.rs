@@ -1,3 +1,5 @@
+use nalgebra::DVector;
+
 use crate::data::Log;
 use crate::model::{Dynamics, OwnValue, Parameter};
 use crate::sim::Window;
@@ -69,7 +71,22 @@ impl Values {
         own.map_or(self.common[column.parameter], |own| own.value)
     }
 
-    pub(crate) fn set(&mut self, column: Column, value: f64) {
+    /// These values after a step of a fit's free ones, each within its bounds.
+    pub(crate) fn moved(
+        &self,
+        dynamics: &Dynamics,
+        columns: &[Column],
+        step: &DVector<f64>,
+    ) -> Self {
+        let mut moved = self.clone();
+        for (column, step) in columns.iter().zip(step) {
+            let [low, high] = dynamics.parameters[column.parameter].bounds;
+            moved.set(*column, (self.get(*column) + step).clamp(low, high));
+        }
+        moved
+    }
+
+    pub(super) fn set(&mut self, column: Column, value: f64) {
         let Some(log) = column.log else {
             self.common[column.parameter] = value;
             return;

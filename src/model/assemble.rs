@@ -36,30 +36,49 @@ impl Model {
     }
 
     /// The balance of torques, compiled like [`Model::dynamics`]: outputs of the program are the torques (N m, or N) of the
-    /// joints by which a motion needs more than acts, after all effects; zero where the model is right. Its inputs are those
+    /// joints by which a motion needs more than acts, after all effects; zero where the model is right. Where a command changes
+    /// the torque that acts by more or less than itself, the difference is that of the commands, to first order. Its inputs are those
     /// of [`Dynamics`] with the accelerations `qdd1..qddn` before the parameters. `None` for a model that gives accelerations,
     /// which has no torques.
     pub fn torque_balance(&self) -> Option<Dynamics> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
-        let joints = Joint::all(self.joints);
-        let qdd: Vec<Node> = joints
-            .map(|joint| assembly.graph.input(&joint.name("qdd")))
-            .collect();
+        let qdd = assembly.of_joints("qdd");
+        self.balanced(assembly, &qdd)
+    }
+
+    /// The same of low-passed torques, which do not jump where friction does: inputs after the accelerations are the directions
+    /// `direction1..directionn`, signs of the velocities low-passed like the torques.
+    pub fn smoothed_torque_balance(&self) -> Option<Dynamics> {
+        let sign = self.sign();
+        let mut assembly = Assembly::new(self, &self.effects, &sign);
+        let qdd = assembly.of_joints("qdd");
+        assembly.directions = assembly.of_joints("direction");
+        self.balanced(assembly, &qdd)
+    }
+
+    fn balanced(&self, mut assembly: Assembly<'_>, qdd: &[Node]) -> Option<Dynamics> {
         assembly.apply_sensors();
+        let commanded = assembly.tau.clone();
         assembly.apply_torque_effects();
         assembly.apply_forces();
-        let needed = assembly.torques(&qdd)?;
-        let both = needed.iter().zip(&assembly.tau);
-        let differences: Vec<Node> = both
-            .map(|(needed, acting)| assembly.graph.sub(*needed, *acting))
-            .collect();
-        let program = assembly.graph.finish(&differences);
+        let needed = assembly.torques(qdd)?;
+        let mut graph = assembly.graph;
+        let one = graph.constant(1.0);
+        let difference = |j: usize| {
+            let of_torques = graph.sub(needed[j], assembly.tau[j]);
+            let slope = graph.gradient(&assembly.tau[j..=j], &[one], &commanded[j..=j])[0];
+            // A command that changes nothing is not told.
+            let slope = graph.select(slope, slope, one);
+            graph.div(of_torques, slope)
+        };
+        let differences: Vec<Node> = (0..self.joints).map(difference).collect();
+        let program = graph.finish(&differences);
         Some(Dynamics {
             name: self.name.clone(),
             joints: self.joints,
+            program: with_parameters_last(&program, self.joints, assembly.parameters.len()),
             parameters: assembly.parameters,
-            program: with_parameters_last(&program, self.joints),
             filters: self.filters(),
             reading: None,
             own: self.own_values(),
@@ -117,6 +136,8 @@ struct Assembly<'a> {
     tau: Vec<Node>,
     time: Node,
     declared: Vec<Node>,
+    /// The signs of the velocities, where they are given.
+    directions: Vec<Node>,
 }
 
 impl<'a> Assembly<'a> {
@@ -154,6 +175,21 @@ impl<'a> Assembly<'a> {
             tau,
             time,
             declared,
+            directions: Vec::new(),
+        }
+    }
+
+    /// New inputs, one a joint.
+    fn of_joints(&mut self, stem: &str) -> Vec<Node> {
+        let joints = Joint::all(self.system.joints);
+        joints
+            .map(|joint| self.graph.input(&joint.name(stem)))
+            .collect()
+    }
+
+    fn give_directions(&self, scope: &mut Scope) {
+        for (qd, direction) in self.qd.iter().zip(&self.directions) {
+            scope.give_sign(*qd, *direction);
         }
     }
 
@@ -205,6 +241,7 @@ impl<'a> Assembly<'a> {
         scope.bind("tau", self.tau[joint]);
         scope.bind("load", self.tau[joint]);
         scope.bind("t", self.time);
+        self.give_directions(&mut scope);
         for (parameter, node) in effect.effect.parameters.iter().zip(nodes) {
             scope.bind(&parameter.name, *node);
         }
@@ -310,6 +347,7 @@ impl<'a> Assembly<'a> {
             scope.bind(&joint.name("tau"), self.tau[joint]);
         }
         scope.bind("t", self.time);
+        self.give_directions(&mut scope);
         for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
             scope.bind(&parameter.name, *node);
         }
@@ -355,13 +393,13 @@ pub(super) fn lower(scope: &Scope, graph: &mut Graph, formula: &Located<Formula>
 }
 
 /// A program with its last `accelerations` inputs before the parameters.
-fn with_parameters_last(program: &Program, accelerations: usize) -> Program {
-    let (moving, rest) = program.inputs().split_at(3 * accelerations + 1);
-    let (parameters, qdd) = rest.split_at(rest.len() - accelerations);
+fn with_parameters_last(program: &Program, joints: usize, parameters: usize) -> Program {
+    let (moving, rest) = program.inputs().split_at(3 * joints + 1);
+    let (parameters, more) = rest.split_at(parameters);
     let mut graph = Graph::new();
     let mut inputs =
         |names: &[String]| -> Vec<Node> { names.iter().map(|name| graph.input(name)).collect() };
-    let (moving, qdd, parameters) = (inputs(moving), inputs(qdd), inputs(parameters));
-    let outputs = graph.append(program, &[moving, parameters, qdd].concat());
+    let (moving, more, parameters) = (inputs(moving), inputs(more), inputs(parameters));
+    let outputs = graph.append(program, &[moving, parameters, more].concat());
     graph.finish(&outputs)
 }

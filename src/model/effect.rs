@@ -4,6 +4,11 @@ use crate::expr::{Formula, Graph, Scope, SignForm, suggestion};
 /// What a formula of an effect may mention besides its parameters.
 pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
 
+/// Commands (N m or N) at which torques that act are compared, on either side of zero, and the step between them: effects are
+/// typically of desktop rigs.
+const COMMANDS: i32 = 60;
+const COMMAND_STEP: f64 = 0.05;
+
 /// A physical effect that a model may lack: one file of `models/effects`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
@@ -144,15 +149,15 @@ impl Effect {
 
     /// Whether `valid_if` holds for these values of the parameters, in their order.
     pub fn is_valid(&self, values: &[f64]) -> bool {
-        let condition = |formula| self.evaluate(formula, values, 0.0) > 0.0;
+        let condition = |formula| self.evaluate(formula, values, |_| 0.0) > 0.0;
         self.valid_if.as_ref().is_none_or(condition)
     }
 
-    /// A formula in numbers, for a joint that rests at an angle.
-    fn evaluate(&self, formula: &Formula, values: &[f64], angle: f64) -> f64 {
+    /// A formula in numbers, where `of_joint` gives its joint's `q`, `qd`, `tau` and so on.
+    fn evaluate(&self, formula: &Formula, values: &[f64], of_joint: impl Fn(&str) -> f64) -> f64 {
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
-        let of_joint = EFFECT_NAMES.map(|name| (name, if name == "q" { angle } else { 0.0 }));
+        let of_joint = EFFECT_NAMES.map(|name| (name, of_joint(name)));
         let names = self.parameters.iter().map(|p| p.name.as_str());
         for (name, value) in of_joint
             .into_iter()
@@ -172,9 +177,31 @@ impl Effect {
         let Entry::Angle(formula) = &self.entry else {
             return angle;
         };
-        let step = |read: f64| read + angle - self.evaluate(formula, values, read);
+        let shown = |read: f64| {
+            let at = |name: &str| if name == "q" { read } else { 0.0 };
+            self.evaluate(formula, values, at)
+        };
+        let step = |read: f64| read + angle - shown(read);
         // One step is exact for an offset; a scale that is off by a tenth gains a digit a step.
         (0..16).fold(angle, |read, _| step(read))
+    }
+
+    /// Whether the torque that acts tells which one was commanded, with typical values: it grows with the command everywhere.
+    /// A force that depends on the command may cancel it.
+    pub fn tells_command(&self) -> bool {
+        let formula = match &self.entry {
+            Entry::Torque(formula) => formula,
+            Entry::Force(formula) => return !formula.names().contains(&"tau"),
+            _ => return true,
+        };
+        let values: Vec<f64> = self.parameters.iter().map(|p| p.typical).collect();
+        let acting = |tau: f64| {
+            let at = |name: &str| if name == "tau" { tau } else { 0.0 };
+            self.evaluate(formula, &values, at)
+        };
+        let commands = (-COMMANDS..=COMMANDS).map(|k| f64::from(k) * COMMAND_STEP);
+        let acting: Vec<f64> = commands.map(acting).collect();
+        acting.is_sorted_by(|less, more| less < more)
     }
 
     /// Whether the effect belongs to the sensor of an angle, not to the rig: its parameters change from log to log.

@@ -6,7 +6,7 @@ use super::text::label;
 use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
-use crate::closeloop::Outcome;
+use crate::closeloop::{Outcome, Space, TorqueErrors};
 use crate::data::Joint;
 use crate::sim::metric::{Summary, TorqueError, summarise};
 
@@ -46,6 +46,68 @@ fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
 
 const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zeros of each test log's sensors are estimated on \
                             its first second, and scored on the rest: what a rig gives that is zeroed before a run.";
+
+/// What was compared, as a sentence.
+pub(super) fn compared(outcome: &Outcome) -> &'static str {
+    match outcome.space {
+        Space::Motion => {
+            "Models are fitted to, selected and compared by the open-loop motion under the logged torques."
+        }
+        Space::Torque => {
+            "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller prescribes \
+             this motion, and what half a second of it under the logged torques would add up to says little. Values and names \
+             hold for motions like these; a good fit cannot tell what no log moves, holds or loads."
+        }
+    }
+}
+
+/// Errors of the torques joint by joint, where they were compared.
+pub(super) fn torques(outcome: &Outcome) -> String {
+    let Some(errors) = (outcome.errors.torque.as_ref()).filter(|_| outcome.space == Space::Torque)
+    else {
+        return String::new();
+    };
+    let mut out = format!(
+        "## Torque error on the test logs\n\nRoot mean square of the difference between the torques that the logged motion needs \
+         and those logged, both low-passed, in N m (N where a joint slides). \"Fitted\" is the declared model with its own \
+         parameters fitted to the training logs and no effect added.\n\n\
+         | joint | {AS_WRITTEN} | {FITTED} | {WITH_EFFECTS} | with effects / fitted |\n|---|---|---|---|---|\n"
+    );
+    let TorqueErrors {
+        declared,
+        before,
+        after,
+        reduction_ci95,
+    } = errors;
+    for joint in Joint::all(before.rms.len()) {
+        let [declared, before, after] = [declared, before, after].map(|error| error.rms[joint]);
+        let _ = writeln!(
+            out,
+            "| {} | {} | {} | {} | {:.2} |",
+            label(outcome, joint),
+            small(declared),
+            small(before),
+            small(after),
+            after / before.max(f64::MIN_POSITIVE)
+        );
+    }
+    let percent = |error: &TorqueError| 100.0 * error.relative;
+    let [declared, before, after] = [declared, before, after].map(percent);
+    let _ = writeln!(
+        out,
+        "| all, share of the logged torques | {declared:.2} % | {before:.2} % | {after:.2} % | {:.2} |",
+        after / before.max(f64::MIN_POSITIVE)
+    );
+    if let Some([low, high]) = reduction_ci95 {
+        let _ = writeln!(
+            out,
+            "\nThe effects remove {:.0} to {:.0} % of the fitted declared model's error (95 % interval, bootstrap over parts of the test logs).",
+            100.0 * low,
+            100.0 * high
+        );
+    }
+    out + "\n"
+}
 
 pub(super) fn errors(outcome: &Outcome) -> String {
     let models = scored(outcome);
@@ -99,7 +161,7 @@ pub(super) fn errors(outcome: &Outcome) -> String {
             );
         }
     }
-    if let Some(torque) = &outcome.errors.torque {
+    if let (Some(torque), Space::Motion) = (&outcome.errors.torque, outcome.space) {
         let percent = |error: &TorqueError| 100.0 * error.relative;
         let _ = writeln!(
             out,

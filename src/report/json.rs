@@ -59,6 +59,7 @@ impl Report {
                 before: ended(&outcome.models.before.fit),
                 after: ended(&outcome.models.after.fit),
             },
+            compared: outcome.space,
             error: errors(outcome),
             torque: outcome.errors.torque.clone().map(TorqueEntry::from),
             residual_norm: NormEntry {
@@ -278,6 +279,7 @@ impl From<TorqueErrors> for TorqueEntry {
             as_declared: errors.declared,
             before: errors.before,
             after: errors.after,
+            reduction_ci95: errors.reduction_ci95,
         }
     }
 }

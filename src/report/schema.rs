@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::calibration::CalibrationEntry;
 use crate::closeloop::{
-    Curve, NetworkCheck, Proposal, Separation, Settings, SplitMethod, Unexplained, Verdict,
+    Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, Unexplained, Verdict,
 };
 use crate::data::{Finding as AuditFinding, Joint};
 use crate::sim::metric::TorqueError;
@@ -62,6 +62,8 @@ pub struct Report {
     pub(super) identifiability: IdentifiabilityEntry,
     /// how the fits ended that the errors and the verdict rest on
     pub(super) fits: FitsEntry,
+    /// which errors fits lower, effects are selected by, and `error_reduction` is of
+    pub(super) compared: Space,
     pub(super) error: ErrorEntry,
     /// of the torques that the logged motion needs, low-passed; null for a model that gives accelerations
     pub(super) torque: Option<TorqueEntry>,
@@ -200,6 +202,8 @@ pub(super) struct TorqueEntry {
     pub as_declared: TorqueError,
     pub before: TorqueError,
     pub after: TorqueError,
+    /// 95 % interval of the relative reduction of the error, before to after
+    pub reduction_ci95: Option<[f64; 2]>,
 }
 
 #[derive(Debug, Serialize, JsonSchema)]

@@ -4,7 +4,7 @@ use super::calibration::line;
 use super::remainder::proposal_line;
 use super::text::{headline, label, serious};
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
-use crate::closeloop::Outcome;
+use crate::closeloop::{Outcome, Space, TorqueErrors};
 use crate::data::Joint;
 use crate::sim::metric::{Assessment, Summary, summarise};
 
@@ -36,6 +36,35 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
             "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
+    out += &match (outcome.space, &outcome.errors.torque) {
+        (Space::Torque, Some(torque)) => torques(torque),
+        _ => open_loop(outcome),
+    };
+    out += &outcome.calibration.as_ref().map_or_else(String::new, line);
+    let _ = writeln!(out, "  {}", took(outcome));
+    let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
+    out
+}
+
+/// The errors of the torques, one model a line.
+fn torques(errors: &TorqueErrors) -> String {
+    let mut out = String::from(
+        "  torques that the motion of the test logs needs, share of the logged ones that differs:\n",
+    );
+    let models = [
+        (AS_WRITTEN, &errors.declared),
+        (FITTED, &errors.before),
+        (WITH_EFFECTS, &errors.after),
+    ];
+    for (name, error) in models {
+        let _ = writeln!(out, "  {name}: {:.2} %", 100.0 * error.relative);
+    }
+    out
+}
+
+/// The open-loop errors, one joint and horizon a line, and those of models that were not fitted.
+fn open_loop(outcome: &Outcome) -> String {
+    let mut out = String::new();
     let joints = outcome.models.after.model.joints;
     let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
     let (before, after) = (
@@ -64,9 +93,6 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
     for (name, model) in as_they_are {
         let _ = writeln!(out, "  {name}, no fit: {}", errors(outcome, model));
     }
-    out += &outcome.calibration.as_ref().map_or_else(String::new, line);
-    let _ = writeln!(out, "  {}", took(outcome));
-    let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
     out
 }
 

@@ -1,10 +1,10 @@
 use std::fmt::Write;
 
-use super::accuracy::{contradicted, errors, parameters};
+use super::accuracy::{compared, contradicted, errors, parameters, torques};
 use super::calibration::section;
 use super::remainder::remainder;
 use super::wording::{capitalised, listed, probability, reduction, values};
-use crate::closeloop::{Outcome, SplitMethod, Verdict};
+use crate::closeloop::{Outcome, Space, SplitMethod, Verdict};
 use crate::data::{Audit, Joint, Severity};
 use crate::model::FittedEffect;
 
@@ -14,6 +14,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
         answer(outcome),
         effects(outcome),
         supported(outcome),
+        torques(outcome),
         errors(outcome),
         parameters(outcome),
         contradicted(outcome),
@@ -32,11 +33,12 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
 
 fn answer(outcome: &Outcome) -> String {
     format!(
-        "# {}: {}\n\n{}{}.\n\n",
+        "# {}: {}\n\n{}{}. {}\n\n",
         outcome.models.after.model.name,
         headline(outcome),
         serious(outcome),
-        capitalised(&outcome.reason)
+        capitalised(&outcome.reason),
+        compared(outcome)
     )
 }
 
@@ -57,13 +59,22 @@ pub(super) fn serious(outcome: &Outcome) -> String {
 }
 
 pub(super) fn headline(outcome: &Outcome) -> String {
-    let found: Vec<String> = outcome
-        .effects
-        .findings
-        .iter()
-        .map(|f| {
-            let joint = label(outcome, f.effect.joint);
-            format!("**{}** on joint {joint}", f.effect.title())
+    let mut titles: Vec<String> = Vec::new();
+    let mut joints: Vec<Vec<String>> = Vec::new();
+    for finding in &outcome.effects.findings {
+        let (title, joint) = (finding.effect.title(), label(outcome, finding.effect.joint));
+        match titles.iter().position(|known| *known == title) {
+            Some(known) => joints[known].push(joint),
+            None => {
+                titles.push(title);
+                joints.push(vec![joint]);
+            }
+        }
+    }
+    let found: Vec<String> = (titles.iter().zip(&joints))
+        .map(|(title, joints)| {
+            let plural = if joints.len() > 1 { "s" } else { "" };
+            format!("**{title}** on joint{plural} {}", listed(joints))
         })
         .collect();
     match (outcome.verdict, found.is_empty()) {
@@ -105,7 +116,13 @@ fn effects(outcome: &Outcome) -> String {
             }
         );
     }
-    out + "\nError reduction: by how much the position error on the test logs, at the middle horizon, is below that of a refit without this effect.\n\n"
+    let error = match outcome.space {
+        Space::Motion => "position error on the test logs, at the middle horizon,",
+        Space::Torque => "torque error on the test logs",
+    };
+    out + &format!(
+        "\nError reduction: by how much the {error} is below that of a refit without this effect.\n\n"
+    )
 }
 
 fn alternatives(outcome: &Outcome) -> String {

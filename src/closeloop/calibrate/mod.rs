@@ -15,6 +15,7 @@ use self::simulated_logs::SimulatedLogs;
 use super::error::StudyError;
 use super::find::{Found, find};
 use super::fitted::Fitted;
+use super::space::Space;
 use super::study::Study;
 use crate::data::Log;
 use crate::data::statistics::wilson;
@@ -85,7 +86,7 @@ pub struct Repetition<'s> {
 /// in them, and search each as the user's own.
 ///
 /// # Errors
-/// As [`Study::fit_declared`].
+/// A study of torques; and as [`Study::fit_declared`].
 pub fn calibrate(
     study: &Study<'_>,
     accepted: &Fitted,
@@ -94,6 +95,9 @@ pub fn calibrate(
     rng: &mut impl Rng,
     progress: &mut (dyn FnMut(Repetition<'_>) + Send),
 ) -> Result<Calibration, StudyError> {
+    if study.space == Space::Torque {
+        return Err(StudyError::NotOfMotion);
+    }
     let simulated = SimulatedLogs::new(study, accepted)?;
     let mut limits = detection_limits(study, accepted, library.effects())?;
     let multiple = study.settings.calibrate.hidden;

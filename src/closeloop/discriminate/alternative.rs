@@ -3,6 +3,7 @@ use thiserror::Error;
 use super::separation::{Separation, separation};
 use crate::closeloop::find::Found;
 use crate::closeloop::select::Rival;
+use crate::closeloop::space::Space;
 use crate::closeloop::stage::{Observer, Progress, Stage};
 use crate::closeloop::study::Study;
 use crate::model::FittedEffect;
@@ -26,6 +27,10 @@ pub enum NotSimulated {
     Rank,
     #[error("not simulated: a model diverges on the present motion")]
     Diverged,
+    #[error(
+        "not simulated: the torques were compared, and the motion is what the controller makes of it"
+    )]
+    Torques,
 }
 
 /// The sets of effects that explain the logs as well as the confirmed one, the best first; sets that replace a
@@ -45,6 +50,9 @@ pub(in crate::closeloop) fn discriminate(
         .collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let alternative = |(rank, rival): (usize, &Rival)| {
+        if study.space == Space::Torque {
+            return Alternative::of(rival, Err(NotSimulated::Torques));
+        }
         if rank >= study.settings.discriminate.alternatives {
             return Alternative::of(rival, Err(NotSimulated::Rank));
         }

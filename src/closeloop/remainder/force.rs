@@ -1,9 +1,10 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::space::Space;
 use crate::closeloop::study::Study;
 use crate::data::Log;
-use crate::identify::{FitError, Window, fit};
+use crate::identify::{FitError, Shooting, Values, Window, fit};
 
 /// The residual force of a model over one short stretch of a log: the constant generalised force that, added to
 /// the torque, makes the model follow the logged positions best.
@@ -20,8 +21,8 @@ pub struct ForceSample {
     pub force: Vec<f64>,
 }
 
-/// The residual generalised force along the logs, found on trajectories: no measurement is differentiated. Angles are
-/// within the turn where a joint makes more than one.
+/// The residual generalised force along the logs: found on trajectories, where no measurement is differentiated, or by the
+/// torques that the smoothed motion needs beside those that act. Angles are within the turn where a joint makes more than one.
 ///
 /// # Errors
 /// Logs without a stretch, or a model that diverges over one of them.
@@ -29,18 +30,49 @@ pub(in crate::closeloop) fn residual_force(
     study: &Study<'_>,
     fitted: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {
-    let joints = study.declared.joints;
     let shooting = study.windows_of(study.settings.remainder.stretch_s);
-    let locals = shooting.initial_locals(joints);
-    let (_, found) = fit(&shooting, &fitted.model.dynamics(), &[], locals, None)?;
-    let stretches = shooting.windows.iter().zip(&found.locals);
+    let forces = match study.space {
+        Space::Motion => forces_of_motion(&shooting, fitted)?,
+        Space::Torque => forces_of_torques(study, &shooting, fitted)?,
+    };
+    let stretches = shooting.windows.iter().zip(&forces);
     let mut samples: Vec<ForceSample> = stretches
-        .map(|(window, local)| {
-            ForceSample::over(window, &study.logs[window.log], &local[2 * joints..])
-        })
+        .map(|(window, force)| ForceSample::over(window, &study.logs[window.log], force))
         .collect();
     within_turn(&mut samples, &study.declared.prismatic);
     Ok(samples)
+}
+
+/// For each window the constant force that makes the model follow the log best.
+fn forces_of_motion(shooting: &Shooting<'_>, fitted: &Fitted) -> Result<Vec<Vec<f64>>, FitError> {
+    let dynamics = fitted.model.dynamics();
+    let locals = shooting.initial_locals(dynamics.joints);
+    let (_, found) = fit(shooting, &dynamics, &[], locals, None)?;
+    let force = |local: &Vec<f64>| local[2 * dynamics.joints..].to_vec();
+    Ok(found.locals.iter().map(force).collect())
+}
+
+/// For each window the mean of the torques by which its motion needs more than acts.
+fn forces_of_torques(
+    study: &Study<'_>,
+    shooting: &Shooting<'_>,
+    fitted: &Fitted,
+) -> Result<Vec<Vec<f64>>, FitError> {
+    let dynamics = study.compiled(&fitted.model);
+    let values = Values::of(&dynamics, study.logs);
+    let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
+    if residuals.is_empty() {
+        return Err(FitError::NoWindow);
+    }
+    let mean = |of_window: &Vec<f64>| {
+        let rows = (of_window.len() / dynamics.joints) as f64;
+        let of_joint = |(j, noise): (usize, &f64)| {
+            let own = of_window.iter().skip(j).step_by(dynamics.joints);
+            noise * own.sum::<f64>() / rows
+        };
+        shooting.noise.iter().enumerate().map(of_joint).collect()
+    };
+    Ok(residuals.iter().map(mean).collect())
 }
 
 impl ForceSample {

@@ -5,6 +5,7 @@ mod force;
 mod omnibus;
 mod proposal;
 mod residual;
+mod torque_noise;
 mod unexplained;
 
 pub use self::curve::Curve;

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::torque_noise::TorqueNoise;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::settings::RemainderSettings;
+use crate::closeloop::space::Space;
 use crate::closeloop::study::Study;
 use crate::data::statistics::{deviation, mean};
 use crate::data::{Audit, Joint};
@@ -31,6 +32,9 @@ pub struct Omnibus {
     /// Share of the declared model's residual variance above noise that remains.
     #[serde(skip)]
     pub fraction: f64,
+    /// The same of each joint.
+    #[serde(skip)]
+    pub fractions: Vec<f64>,
 }
 
 impl Omnibus {
@@ -44,50 +48,102 @@ impl Omnibus {
 }
 
 /// Compare, window by window, the share of the residuals' energy that is smooth in time with that of noise of the
-/// sensor, rounded as the sensor rounds, passed through the same fit of start states. The share of a window
-/// does not depend on how large the noise is, and one bad reading raises it no more than any noise does.
+/// sensors, passed through all that the residuals have passed through. The share of a window does not depend on how large the
+/// noise is, and one bad reading raises it no more than any noise does.
 pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
-    let of_residuals = |windows: &[Window]| Energies::of(windows, |window| window.residual.clone());
     let chosen = chosen(study);
-    let windows = windows(study, after, &chosen);
-    let joints = study.declared.joints;
-    let seeds: Vec<u64> = (0..study.settings.remainder.noise_draws)
-        .map(|_| rng.random())
-        .collect();
-    let declared = of_residuals(&self::windows(study, before, &chosen));
-    let found = of_residuals(&windows);
-    let simulated: Vec<Energies> = seeds
-        .into_par_iter()
-        .map(|seed| {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            Energies::of(&windows, |window| window.noise(&mut rng))
-        })
-        .collect();
-    let nulls: Vec<NoiseShare> = (0..joints).map(|j| NoiseShare::of(&simulated, j)).collect();
-    let excess = |energies: &Energies| {
-        let each = (0..joints).map(|j| nulls[j].excess(energies.shares[j]));
-        each.fold(f64::NEG_INFINITY, f64::max)
-    };
-    let bar = excess(&found);
-    #[allow(clippy::cast_precision_loss)] // a thousand
-    let as_smooth = simulated.iter().filter(|s| excess(s) >= bar).count() as f64;
-    #[allow(clippy::cast_precision_loss)]
-    let trials = simulated.len() as f64;
-    let noise: Vec<f64> = (0..joints).map(|j| nulls[j].noise(&found, j)).collect();
-    // In units of the sensors' noise, so that joints can be added.
-    let above = |energies: &Energies| -> f64 {
-        let of_joint = |j: usize| (energies.all[j] - noise[j]).max(0.0);
-        (0..joints)
-            .map(|j| of_joint(j) / study.shooting.noise[j].powi(2))
-            .sum()
-    };
-    Omnibus {
-        p_value: (1.0 + as_smooth) / (1.0 + trials),
-        windows: chosen.len(),
-        shares: (0..joints)
-            .map(|j| (1.0 - noise[j] / found.all[j].max(f64::MIN_POSITIVE)).max(0.0))
-            .collect(),
-        fraction: (above(&found) / above(&declared).max(f64::MIN_POSITIVE)).min(1.0),
+    let settings = &study.settings.remainder;
+    match study.space {
+        Space::Motion => {
+            let [declared, found] = [before, after].map(|fitted| windows(study, fitted, &chosen));
+            let residuals = |windows: &[Window]| -> Vec<DVector<f64>> {
+                windows.iter().map(|w| w.left(&w.residual)).collect()
+            };
+            let test = Test::new(study, &residuals(&declared), &residuals(&found));
+            test.against(settings.noise_draws, rng, |rng| {
+                found.iter().map(|w| w.left(&w.noise(rng))).collect()
+            })
+        }
+        Space::Torque => {
+            let [declared, found] =
+                [before, after].map(|fitted| TorqueNoise::new(study, &fitted.model, &chosen));
+            let test = Test::new(study, declared.residuals(), found.residuals());
+            test.against(settings.torque_draws, rng, |rng| found.draw(rng))
+        }
+    }
+}
+
+/// The energies of two models' residuals, to be compared with those of noise.
+struct Test {
+    /// Of the sensors, or of the torques: one a joint.
+    noise: Vec<f64>,
+    /// Smooth waves over the rows of each window: orthonormal columns.
+    waves: Vec<DMatrix<f64>>,
+    declared: Energies,
+    found: Energies,
+}
+
+impl Test {
+    /// Of the declared model and of one with effects, over the same windows, `[row * joints + joint]`.
+    fn new(study: &Study<'_>, declared: &[DVector<f64>], found: &[DVector<f64>]) -> Self {
+        let slow = study.settings.remainder.slow_waves;
+        let joints = study.declared.joints;
+        let of_window = |residual: &DVector<f64>| waves(residual.len() / joints, slow);
+        let waves: Vec<DMatrix<f64>> = found.iter().map(of_window).collect();
+        Self {
+            noise: study.shooting.noise.clone(),
+            declared: Energies::of(joints, declared, &waves),
+            found: Energies::of(joints, found, &waves),
+            waves,
+        }
+    }
+
+    /// `draw` gives what noise alone would leave in the windows.
+    fn against(
+        &self,
+        draws: usize,
+        rng: &mut impl Rng,
+        draw: impl Fn(&mut ChaCha8Rng) -> Vec<DVector<f64>> + Sync,
+    ) -> Omnibus {
+        let joints = self.noise.len();
+        let seeds: Vec<u64> = (0..draws).map(|_| rng.random()).collect();
+        let simulated: Vec<Energies> = seeds
+            .into_par_iter()
+            .map(|seed| {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                Energies::of(joints, &draw(&mut rng), &self.waves)
+            })
+            .collect();
+        let nulls: Vec<NoiseShare> = (0..joints).map(|j| NoiseShare::of(&simulated, j)).collect();
+        let excess = |energies: &Energies| {
+            let each = (0..joints).map(|j| nulls[j].excess(energies.shares[j]));
+            each.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let found = &self.found;
+        let bar = excess(found);
+        let as_smooth = simulated.iter().filter(|s| excess(s) >= bar).count() as f64;
+        let trials = simulated.len() as f64;
+        let noise: Vec<f64> = (0..joints).map(|j| nulls[j].noise(found, j)).collect();
+        // In units of the noise, so that joints can be added.
+        let above = |energies: &Energies| -> Vec<f64> {
+            let of_joint = |j: usize| (energies.all[j] - noise[j]).max(0.0) / self.noise[j].powi(2);
+            (0..joints).map(of_joint).collect()
+        };
+        let [left, declared] = [found, &self.declared].map(above);
+        let share = |left: f64, declared: f64| (left / declared.max(f64::MIN_POSITIVE)).min(1.0);
+        Omnibus {
+            p_value: (1.0 + as_smooth) / (1.0 + trials),
+            windows: self.waves.len(),
+            shares: (0..joints)
+                .map(|j| (1.0 - noise[j] / found.all[j].max(f64::MIN_POSITIVE)).max(0.0))
+                .collect(),
+            fraction: share(left.iter().sum(), declared.iter().sum()),
+            fractions: left
+                .iter()
+                .zip(&declared)
+                .map(|(l, d)| share(*l, *d))
+                .collect(),
+        }
     }
 }
 
@@ -98,8 +154,6 @@ struct Window {
     residual: DVector<f64>,
     /// Basis of the residual's changes with the start state: orthonormal columns.
     absorbed: DMatrix<f64>,
-    /// Smooth waves over the rows of the window: orthonormal columns.
-    waves: DMatrix<f64>,
     /// The model's positions, for what rounding does to them.
     positions: DVector<f64>,
     /// Deviation of the noise before rounding and the step of the rounding (0 for none), one each a joint.
@@ -123,11 +177,7 @@ fn chosen(study: &Study<'_>) -> Vec<usize> {
 }
 
 fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> {
-    let RemainderSettings {
-        slow_waves,
-        start_step,
-        ..
-    } = study.settings.remainder;
+    let start_step = study.settings.remainder.start_step;
     let joints = study.declared.joints;
     let shooting = &study.shooting;
     let dynamics = fitted.model.dynamics();
@@ -160,7 +210,6 @@ fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> 
                 positions: DVector::from_fn(size, |i, _| read(i) + residual[i]),
                 residual,
                 absorbed: slopes.qr().q(),
-                waves: waves(rows, slow_waves),
                 sensor: sensors[window.log].clone(),
             }
         })
@@ -219,17 +268,20 @@ impl Window {
         })
     }
 
-    /// Slow and total energy of what the fit of the start state leaves of `signal`, one each a joint.
-    fn energies(&self, signal: &DVector<f64>) -> Vec<[f64; 2]> {
-        let left = signal - &self.absorbed * (self.absorbed.tr_mul(signal));
-        (0..self.joints)
-            .map(|j| {
-                let own = left.iter().skip(j).step_by(self.joints).copied();
-                let own = DVector::from_vec(own.collect());
-                [self.waves.tr_mul(&own).norm_squared(), own.norm_squared()]
-            })
-            .collect()
+    /// What the fit of the start state leaves of `signal`.
+    fn left(&self, signal: &DVector<f64>) -> DVector<f64> {
+        signal - &self.absorbed * (self.absorbed.tr_mul(signal))
     }
+}
+
+/// Slow and total energy of a window's signal, one each a joint.
+fn energies(joints: usize, signal: &DVector<f64>, waves: &DMatrix<f64>) -> Vec<[f64; 2]> {
+    let of_joint = |j: usize| {
+        let own = signal.iter().skip(j).step_by(joints).copied();
+        let own = DVector::from_vec(own.collect());
+        [waves.tr_mul(&own).norm_squared(), own.norm_squared()]
+    };
+    (0..joints).map(of_joint).collect()
 }
 
 /// Energies of one set of residuals, one a joint.
@@ -242,18 +294,15 @@ struct Energies {
 }
 
 impl Energies {
-    fn of(windows: &[Window], mut signal: impl FnMut(&Window) -> DVector<f64>) -> Self {
-        let joints = windows.first().map_or(0, |window| window.joints);
+    fn of(joints: usize, windows: &[DVector<f64>], waves: &[DMatrix<f64>]) -> Self {
         let mut sums = Self {
             shares: vec![0.0; joints],
             smooth: vec![0.0; joints],
             all: vec![0.0; joints],
         };
-        #[allow(clippy::cast_precision_loss)] // few windows
         let count = windows.len() as f64;
-        for window in windows {
-            let energies = window.energies(&signal(window));
-            for (j, [smooth, all]) in energies.into_iter().enumerate() {
+        for (window, waves) in windows.iter().zip(waves) {
+            for (j, [smooth, all]) in energies(joints, window, waves).into_iter().enumerate() {
                 sums.shares[j] += smooth / all.max(f64::MIN_POSITIVE) / count;
                 sums.smooth[j] += smooth;
                 sums.all[j] += all;

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::{best_start, gain, left_out_losses};
+use crate::closeloop::select::{Losses, best_start, gain};
 use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
@@ -72,7 +72,7 @@ pub fn proposal(study: &Study<'_>, fitted: &Fitted, left: &Unexplained) -> Optio
         return None;
     }
     let noteworthy = study.settings.remainder.noteworthy;
-    let without = left_out_losses(study, &fitted.fit);
+    let without = Losses::of(study, fitted).of_joint(left.joint);
     let mut found: Option<Sum> = None;
     for _ in 0..study.settings.proposal.most_terms {
         let (terms, losses) = match &found {
@@ -109,7 +109,11 @@ fn longer(study: &Study<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Op
         .filter(|term| !terms.contains(term))
         .filter_map(|term| {
             let terms = [terms, &[*term]].concat();
-            let effect = FittedEffect::absent(&effect(&terms), joint);
+            let effect = effect(&terms);
+            if !study.space.shows(&effect) {
+                return None;
+            }
+            let effect = FittedEffect::absent(&effect, joint);
             let (start, cost) = best_start(study, model, &effect)?;
             Some((terms, start, cost))
         })
@@ -123,7 +127,7 @@ fn longer(study: &Study<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Op
             let fitted = study.with_effects(model, longer).ok()?;
             Some(Sum {
                 terms,
-                losses: left_out_losses(study, &fitted.fit),
+                losses: Losses::of(study, &fitted).of_joint(joint),
                 effect: fitted.model.effects.last()?.clone(),
             })
         })

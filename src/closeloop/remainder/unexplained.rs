@@ -5,8 +5,9 @@ use serde::Serialize;
 
 use super::omnibus::{Omnibus, omnibus};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::{Folds, acting, gain, losses_by, p_value};
+use crate::closeloop::select::{Folds, Losses, acting, gain, p_value};
 use crate::closeloop::settings::RemainderSettings;
+use crate::closeloop::space::Space;
 use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
@@ -57,6 +58,20 @@ impl Unexplained {
     pub fn is_significant(&self) -> bool {
         self.place != NONE
     }
+
+    /// Share of the declared model's residual variance above noise that remains of what a joint is judged by.
+    pub fn fraction_on(&self, study: &Study<'_>, joint: Joint) -> f64 {
+        match study.space {
+            Space::Motion => self.fraction,
+            Space::Torque => self.omnibus.fractions[joint],
+        }
+    }
+
+    /// Whether a significant remainder is one of what a joint is judged by.
+    pub fn matters_on(&self, study: &Study<'_>, joint: Joint) -> bool {
+        let least = study.settings.remainder.noteworthy;
+        study.space == Space::Motion || self.omnibus.shares[joint] > least
+    }
 }
 
 /// Test whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over each
@@ -69,7 +84,7 @@ pub fn unexplained(
     rng: &mut impl Rng,
 ) -> Unexplained {
     let omnibus = omnibus(study, before, after, rng);
-    let losses = losses_by(&Folds::of(study).alone(), &after.fit);
+    let losses = Losses::by(study, &Folds::of(study).alone(), after);
     let probed: Vec<Probed> = acting(study, probes)
         .into_par_iter()
         .filter_map(|probe| ask(study, after, probe, &losses))
@@ -91,16 +106,16 @@ pub fn unexplained(
     }
 }
 
-fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &[f64]) -> Option<Probed> {
+fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &Losses) -> Option<Probed> {
     let (place, joint) = (variables(&probe), probe.joint);
     let effects = model.effects_and(&[probe]);
     let fitted = study.with_effects(model, effects).ok()?;
-    let with = losses_by(&Folds::of(study).alone(), &fitted.fit);
+    let with = Losses::by(study, &Folds::of(study).alone(), &fitted);
     Some(Probed {
         place,
         joint,
         p_value: p_value(study, &fitted, fitted.model.effects.len() - 1)?,
-        gain: gain(losses, &with),
+        gain: gain(&losses.of_joint(joint), &with.of_joint(joint)),
     })
 }
 

@@ -14,7 +14,15 @@ pub fn reduction_interval(
     settings: &ScoreSettings,
     rng: &mut impl Rng,
 ) -> Option<[f64; 2]> {
-    let blocks = blocks(before, after, settings.whole_logs);
+    interval(&blocks(before, after, settings.whole_logs), settings, rng)
+}
+
+/// The same from the squared errors before and after of each block.
+pub fn interval(
+    blocks: &[(f64, f64)],
+    settings: &ScoreSettings,
+    rng: &mut impl Rng,
+) -> Option<[f64; 2]> {
     if blocks.len() < settings.fewest {
         return None;
     }

@@ -5,8 +5,9 @@ use crate::closeloop::establish::Standing;
 use crate::closeloop::find::Chosen;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::refine::Refined;
-use crate::closeloop::select::{left_out_losses, p_of_gains, p_value};
+use crate::closeloop::select::{Losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Model, OwnValue, Parameter, Status};
 
@@ -20,7 +21,7 @@ pub struct Finding {
     /// Of the parameters that switch the effect on; of an effect without such a parameter, of the fall of the loss on
     /// left-out stretches. 1 where the refit without the effect that this takes fails.
     pub p_value: f64,
-    /// Share of the position error on the test logs that this effect alone takes away, or why the refit without it
+    /// Share of the compared error on the test logs that this effect alone takes away, or why the refit without it
     /// failed.
     pub error_reduction: Result<f64, FitError>,
     pub status: Status,
@@ -60,20 +61,23 @@ pub(in crate::closeloop) fn findings(
     scorer: &Scorer<'_>,
 ) -> Vec<Finding> {
     let (chosen, standings) = (&chosen.after, &chosen.standings);
-    let with = scorer.fitted(chosen).position_rms();
+    let with = scorer.compared(study.space, chosen);
     let added = study.added(&refined.after.model);
     let finding = |(k, standing): (usize, &Standing)| {
         // Both as effects were selected, in coarse steps.
         let less = &standing.without;
-        let reduction =
-            |less: &Fitted| 1.0 - with / scorer.fitted(less).position_rms().max(f64::MIN_POSITIVE);
+        let error = |less: &Fitted| scorer.compared(study.space, less);
+        let reduction = |less: &Fitted| 1.0 - with / error(less).max(f64::MIN_POSITIVE);
         let (expression, parameters) = described(study.declared, &refined.after.model, k);
         Finding {
             effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
             p_value: p_value(&refined.study, &refined.after, k)
-                .or_else(|| Some(p_of_refit(study, chosen, less.as_ref().ok()?)))
+                .or_else(|| {
+                    let joint = standing.effect.joint;
+                    Some(p_of_refit(study, chosen, less.as_ref().ok()?, joint))
+                })
                 .unwrap_or(1.0),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
             status: standing.status,
@@ -84,8 +88,8 @@ pub(in crate::closeloop) fn findings(
 }
 
 /// The signed-rank p-value of a model beside the refit without one of its effects.
-fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted) -> f64 {
-    let losses = |model: &Fitted| left_out_losses(study, &model.fit);
+fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted, joint: Joint) -> f64 {
+    let losses = |model: &Fitted| Losses::of(study, model).of_joint(joint);
     p_of_gains(&losses(without), &losses(chosen))
 }
 

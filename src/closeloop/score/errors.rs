@@ -1,9 +1,10 @@
 use rand::Rng;
 
-use super::bootstrap::reduction_interval;
+use super::bootstrap::{interval, reduction_interval};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
+use crate::closeloop::space::Space;
 use crate::data::Log;
 use crate::identify::calibrate_first;
 use crate::model::{Dynamics, Model};
@@ -37,6 +38,18 @@ pub struct TorqueErrors {
     pub declared: TorqueError,
     pub before: TorqueError,
     pub after: TorqueError,
+    /// 95 % interval of the relative reduction, before to after.
+    pub reduction_ci95: Option<[f64; 2]>,
+}
+
+impl Errors {
+    /// The errors of the fitted declared model and of the one with effects, in one number each.
+    pub fn compared(&self, space: Space) -> [f64; 2] {
+        match (space, &self.torque) {
+            (Space::Torque, Some(torque)) => [torque.before.relative, torque.after.relative],
+            _ => [self.before.position_rms(), self.after.position_rms()],
+        }
+    }
 }
 
 /// Scores models on the test logs.
@@ -57,7 +70,7 @@ impl Scorer<'_> {
     ) -> Errors {
         let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
         let zeroed = self.zeroed(after);
-        let torque = self.torques([declared, &before.model, &after.model]);
+        let torque = self.torques([declared, &before.model, &after.model], rng);
         let (before, after) = rayon::join(|| self.fitted(before), || self.fitted(after));
         Errors {
             declared: self.as_it_is(declared),
@@ -71,13 +84,28 @@ impl Scorer<'_> {
         }
     }
 
-    fn torques(&self, models: [&Model; 3]) -> Option<TorqueErrors> {
+    fn torques(&self, models: [&Model; 3], rng: &mut impl Rng) -> Option<TorqueErrors> {
         let [declared, before, after] = models.map(|model| torque_error(model, self.test));
+        let (declared, before, after) = (declared?, before?, after?);
+        let stretches = before.stretches.iter().copied();
+        let blocks: Vec<(f64, f64)> = stretches.zip(after.stretches.iter().copied()).collect();
         Some(TorqueErrors {
-            declared: declared?,
-            before: before?,
-            after: after?,
+            reduction_ci95: interval(&blocks, self.settings, rng),
+            declared,
+            before,
+            after,
         })
+    }
+
+    /// The error of a fitted model, in one number.
+    pub fn compared(&self, space: Space, fitted: &Fitted) -> f64 {
+        match space {
+            Space::Motion => self.fitted(fitted).position_rms(),
+            Space::Torque => {
+                let error = torque_error(&fitted.model, self.test);
+                error.map_or(f64::NAN, |error| error.relative)
+            }
+        }
     }
 
     fn zeroed(&self, after: &Fitted) -> Option<Assessment> {

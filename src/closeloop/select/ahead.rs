@@ -1,56 +1,31 @@
+use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::folds::{Folds, steps_without};
+use super::losses::of_torques;
 use super::trial::{Trial, differences};
 use crate::closeloop::settings::SelectSettings;
+use crate::closeloop::space::Space;
 use crate::closeloop::study::Study;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::{Values, Window};
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, windows};
 
-/// The open-loop error of a set of effects, as a report gives it, on stretches left out of the fit: squares in rad^2 (or
-/// m^2), summed over the rows and joints of each stretch. Fits compare models by a robust loss over windows with free start
-/// states; this is what the user sees.
+/// The error of a set of effects, as a report gives it, on stretches left out of the fit: squares in rad^2 (or m^2) of the
+/// open-loop motion, or of the torques over their noise, summed over the rows and joints of each stretch (of torques, over the rows of each stretch and joint). Fits compare models
+/// by a robust loss, over windows with free start states where they are of the motion; this is what the user sees.
 pub struct Ahead {
     squares: Vec<f64>,
 }
 
 impl Ahead {
     pub fn of(study: &Study<'_>, trial: &Trial) -> Self {
-        let fit = &trial.fitted.fit;
         let folds = Folds::of(study);
-        let dynamics = study.smoothed(&trial.fitted.model).dynamics();
-        let values = Values::of(&dynamics, study.logs);
-        let steps = steps_without(&folds, fit);
-        let logs: Vec<Vec<(Window, usize)>> = (0..study.logs.len())
-            .map(|log| stretches_of(study, &folds, log))
-            .collect();
-        let of_group = |(group, step): (usize, &nalgebra::DVector<f64>)| {
-            let mut there = values.clone();
-            for (i, &column) in fit.columns.iter().enumerate() {
-                let [low, high] = dynamics.parameters[column.parameter].bounds;
-                there.set(column, (values.get(column) + step[i]).clamp(low, high));
-            }
-            let model = there.put_into(&dynamics, study.logs);
-            let of_log = |(log, all): (usize, &Vec<(Window, usize)>)| {
-                let own = all.iter().filter(|(_, s)| folds.groups[*s] == group);
-                let (own, stretches): (Vec<Window>, Vec<usize>) = own.copied().unzip();
-                if own.is_empty() {
-                    return Vec::new();
-                }
-                let errors = errors_in(&model, &study.logs[log..=log], &own, FIT_S);
-                let squares = errors.iter().map(|error| error.position.iter().sum());
-                stretches.into_iter().zip(squares).collect()
-            };
-            let all: Vec<(usize, f64)> = logs.iter().enumerate().flat_map(of_log).collect();
-            all
+        let squares = match study.space {
+            Space::Motion => of_motion(study, &folds, trial),
+            Space::Torque => of_torques(study, &folds, &trial.fitted, |r| r * r),
         };
-        let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
-        let mut squares = vec![0.0; folds.groups.len()];
-        for (stretch, square) in groups.into_iter().flatten() {
-            squares[stretch] += square;
-        }
         Self { squares }
     }
 
@@ -60,6 +35,39 @@ impl Ahead {
         let rise = rises.iter().sum::<f64>() / other.squares.iter().sum::<f64>();
         mean(&rises) > settings.worse_by * standard_error(&rises) && rise > settings.worse
     }
+}
+
+/// Squares of the open-loop error in each stretch, with the values that a fit without the stretch's group gives.
+fn of_motion(study: &Study<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
+    let fit = &trial.fitted.fit;
+    let dynamics = study.compiled(&trial.fitted.model);
+    let values = Values::of(&dynamics, study.logs);
+    let steps = steps_without(folds, fit);
+    let logs: Vec<Vec<(Window, usize)>> = (0..study.logs.len())
+        .map(|log| stretches_of(study, folds, log))
+        .collect();
+    let of_group = |(group, step): (usize, &DVector<f64>)| {
+        let there = values.moved(&dynamics, &fit.columns, step);
+        let model = there.put_into(&dynamics, study.logs);
+        let of_log = |(log, all): (usize, &Vec<(Window, usize)>)| {
+            let own = all.iter().filter(|(_, s)| folds.groups[*s] == group);
+            let (own, stretches): (Vec<Window>, Vec<usize>) = own.copied().unzip();
+            if own.is_empty() {
+                return Vec::new();
+            }
+            let errors = errors_in(&model, &study.logs[log..=log], &own, FIT_S);
+            let squares = errors.iter().map(|error| error.position.iter().sum());
+            stretches.into_iter().zip(squares).collect()
+        };
+        let all: Vec<(usize, f64)> = logs.iter().enumerate().flat_map(of_log).collect();
+        all
+    };
+    let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
+    let mut squares = vec![0.0; folds.groups.len()];
+    for (stretch, square) in groups.into_iter().flatten() {
+        squares[stretch] += square;
+    }
+    squares
 }
 
 /// The windows of a log over which its open-loop error is taken, as if it were the only log, and the stretch in which

@@ -29,6 +29,7 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     for effect in effects {
         for joint in Joint::all(study.declared.joints) {
             if is_driven_enough(study, effect, joint)
+                && study.space.shows(effect)
                 && study.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
@@ -153,8 +154,8 @@ fn best_by_switches(
         start
     });
     let numbered: Vec<FittedEffect> = numbered.collect();
-    let model = study.smoothed(&fitted.model.with_effects(fitted.effects_and(&numbered)));
-    let dynamics = model.dynamics();
+    let model = fitted.model.with_effects(fitted.effects_and(&numbered));
+    let dynamics = study.compiled(&model);
     let first = fitted.model.effects.len();
     let places: Vec<Range<usize>> = (first..model.effects.len())
         .map(|k| model.place_of(k))

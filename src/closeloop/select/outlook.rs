@@ -65,8 +65,7 @@ impl Outlook {
             })
             .collect();
         let model = fitted.model.with_effects(fitted.effects_and(&options));
-        let model = study.smoothed(&model);
-        let dynamics = model.dynamics();
+        let dynamics = study.compiled(&model);
         let added = study.declared.effects.len()..model.effects.len();
         let places: Vec<Range<usize>> = added.clone().map(|k| model.place_of(k)).collect();
         let present = study.added(&fitted.model).len();

@@ -1,12 +1,14 @@
 use rayon::prelude::*;
 
 use super::candidate::candidates;
+use super::evidence::gain;
 use super::outlook::Outlook;
 use super::search::Search;
 use super::trial::{Trial, differences};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::FitError;
 use crate::model::FittedEffect;
@@ -78,14 +80,16 @@ fn instead_of(
     options.sort_by(|a, b| a.0.total_cmp(&b.0));
     options.retain(|(loss, _)| *loss <= settings.slack * settings.as_little * chosen.loss());
     options.truncate(settings.rivals);
-    let gain = |trial: &Trial| 1.0 - trial.loss() / less.loss().max(f64::MIN_POSITIVE);
+    let of_joint = |trial: &Trial| trial.losses.of_joint(present.joint);
+    let gain = |trial: &Trial| gain(&of_joint(less), &of_joint(trial));
     let rival = |(_, effect): &(f64, &FittedEffect)| {
         let mut effects = chosen.fitted.model.effects.clone();
         effects[declared + k] = (*effect).clone();
         let below = settings.as_little * chosen.loss();
         let fitted = study.with_better_effects(&chosen.fitted, effects, below)?;
         let trial = Trial::of(study, fitted);
-        let as_good = trial.is_valid(study) && is_as_good(&trial, chosen, less, settings);
+        let is_as_good = is_as_good([&trial, chosen, less], present.joint, settings);
+        let as_good = trial.is_valid(study) && is_as_good;
         as_good.then(|| Rival {
             effect: trial.fitted.model.effects[declared + k].clone(),
             instead_of: present.clone(),
@@ -97,11 +101,13 @@ fn instead_of(
     options.iter().filter_map(rival).collect()
 }
 
-/// Whether the losses on left-out stretches do not tell a set from the chosen one.
-fn is_as_good(trial: &Trial, chosen: &Trial, less: &Trial, settings: &SelectSettings) -> bool {
-    let differences = differences(&trial.losses, &chosen.losses);
-    let saved = |trial: &Trial| less.loss() - trial.loss();
+/// Whether the losses of a joint on left-out stretches do not tell a set from the chosen one; `less` is without either effect.
+fn is_as_good([trial, chosen, less]: [&Trial; 3], joint: Joint, settings: &SelectSettings) -> bool {
+    let [trial, chosen, less] = [trial, chosen, less].map(|of| of.losses.of_joint(joint));
+    let sum = |losses: &[f64]| losses.iter().sum::<f64>();
+    let differences = differences(&trial, &chosen);
+    let saved = |losses: &[f64]| sum(&less) - sum(losses);
     mean(&differences) <= settings.as_good * standard_error(&differences)
-        && saved(trial) > settings.as_much * saved(chosen)
-        && trial.loss() <= settings.as_little * chosen.loss()
+        && saved(&trial) > settings.as_much * saved(&chosen)
+        && sum(&trial) <= settings.as_little * sum(&chosen)
 }

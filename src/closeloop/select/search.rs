@@ -164,7 +164,7 @@ impl<'a, 'p> Search<'a, 'p> {
         share: f64,
         round: impl FnOnce(&mut Self, &Trial) -> Vec<Trial>,
     ) -> Option<Better> {
-        let enough = from.loss() * (1.0 - share);
+        let enough = from.loss() * (1.0 - self.study.of_whole(share));
         let trials = round(self, from);
         let better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
         let mut better = better.peekable();
@@ -227,7 +227,7 @@ impl<'a, 'p> Search<'a, 'p> {
         let mut sets = Vec::new();
         let declared = study.declared.effects.len();
         if let Some(outlook) = Outlook::of(study, &from.fitted, &all) {
-            let promising = promising(&outlook, &study.settings.select);
+            let promising = promising(&outlook, study);
             sets = promising.iter().map(|set| outlook.effects(set)).collect();
         }
         // What no value switches off cannot be compared without a fit.
@@ -264,7 +264,8 @@ impl<'a, 'p> Search<'a, 'p> {
     fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>, below: f64) -> Vec<Trial> {
         let (study, library) = (self.study, self.library);
         sets.iter_mut().for_each(without_contained);
-        sets.retain(|set| set.len() <= study.settings.select.most_effects);
+        let most = (study.settings.select).most_effects_of(study.declared.joints);
+        sets.retain(|set| set.len() <= most);
         first_of_each(&mut sets, vec![from.added_key(study)], |set| key(set));
         let trial = |set: Vec<FittedEffect>| {
             let found = fitted_from(study, from, &set, below)?;

@@ -3,11 +3,14 @@ use std::collections::HashSet;
 use rayon::prelude::*;
 
 use super::outlook::{Outlook, Set};
-use crate::closeloop::settings::SelectSettings;
+use crate::closeloop::study::Study;
 
 /// Sets of an outlook's items that promise to lower the loss on left-out stretches, found by a beam search: from the
 /// items of the model, one is added or dropped at a time, and the best few sets of a step lead to the next.
-pub fn promising(outlook: &Outlook, settings: &SelectSettings) -> Vec<Set> {
+pub fn promising(outlook: &Outlook, study: &Study<'_>) -> Vec<Set> {
+    let settings = &study.settings.select;
+    let most = settings.most_effects_of(study.declared.joints);
+    let step = study.of_whole(settings.step);
     let start = outlook.present();
     let total = |set: &Set| Some(outlook.losses(set)?.iter().sum::<f64>());
     let Some(first) = total(&start) else {
@@ -20,7 +23,7 @@ pub fn promising(outlook: &Outlook, settings: &SelectSettings) -> Vec<Set> {
     for _ in 0..settings.depth {
         let mut next: Vec<Set> = beam
             .iter()
-            .flat_map(|set| neighbours(outlook, set, settings.most_effects))
+            .flat_map(|set| neighbours(outlook, set, most))
             .collect();
         next.retain(|set| seen.insert(set.clone()));
         let mut scored: Vec<(f64, Set)> = next
@@ -32,7 +35,7 @@ pub fn promising(outlook: &Outlook, settings: &SelectSettings) -> Vec<Set> {
         beam = scored.iter().map(|(_, set)| set.clone()).collect();
         let lowest = scored.first().map_or(f64::INFINITY, |(loss, _)| *loss);
         ranked.extend(scored);
-        if lowest > best * (1.0 - settings.step) {
+        if lowest > best * (1.0 - step) {
             break;
         }
         best = best.min(lowest);

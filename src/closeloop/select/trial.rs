@@ -1,8 +1,10 @@
-use super::folds::left_out_losses;
+use super::evidence::gain;
+use super::losses::Losses;
 use super::outlook::tells_apart;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
+use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
 use crate::model::{EffectParameter, FittedEffect};
 
@@ -10,20 +12,20 @@ use crate::model::{EffectParameter, FittedEffect};
 #[derive(Debug, Clone)]
 pub struct Trial {
     pub fitted: Fitted,
-    /// Loss on each stretch, with the parameters that a fit without it would give. Comparable among trials that were
-    /// fitted at the same scale.
-    pub losses: Vec<f64>,
+    /// On each stretch, with the parameters that a fit without it would give. Comparable among trials that were fitted at
+    /// the same scale.
+    pub losses: Losses,
 }
 
 impl Trial {
     pub fn of(study: &Study<'_>, fitted: Fitted) -> Self {
-        let losses = left_out_losses(study, &fitted.fit);
+        let losses = Losses::of(study, &fitted);
         Self { fitted, losses }
     }
 
     /// Loss over all stretches.
     pub fn loss(&self) -> f64 {
-        self.losses.iter().sum()
+        self.losses.total()
     }
 
     /// Number of free values, then of simpler effects that the added ones contain.
@@ -82,13 +84,30 @@ impl Trial {
         key(self.added(study))
     }
 
-    /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and
-    /// not significantly so.
+    /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and not
+    /// significantly so, altogether and on each joint where the two differ.
     pub fn is_as_good_as(&self, best: &Self, settings: &SelectSettings) -> bool {
-        let rise = self.loss() / best.loss().max(f64::MIN_POSITIVE) - 1.0;
-        let differences = differences(&self.losses, &best.losses);
-        let within = mean(&differences) <= settings.simplest * standard_error(&differences);
-        rise < settings.negligible || within && rise < settings.simpler
+        let is_as_good = |own: &[f64], best: &[f64]| {
+            let rise = -gain(best, own);
+            let differences = differences(own, best);
+            let within = mean(&differences) <= settings.simplest * standard_error(&differences);
+            rise < settings.negligible || within && rise < settings.simpler
+        };
+        let on_joint =
+            |joint: Joint| is_as_good(&self.losses.of_joint(joint), &best.losses.of_joint(joint));
+        is_as_good(&self.losses.values, &best.losses.values)
+            && self.differs_on(best).into_iter().all(on_joint)
+    }
+
+    /// The joints of effects that one of two trials has and the other has not.
+    fn differs_on(&self, other: &Self) -> Vec<Joint> {
+        let not_in = |a: &Self, b: &Self| -> Vec<Joint> {
+            let known = b.key();
+            let effects = a.fitted.model.effects.iter();
+            let other = effects.filter(|effect| !known.contains(&identity(effect)));
+            other.map(|effect| effect.joint).collect()
+        };
+        [not_in(self, other), not_in(other, self)].concat()
     }
 }
 

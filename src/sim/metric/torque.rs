@@ -19,7 +19,13 @@ pub struct TorqueError {
     pub rms: Vec<f64>,
     /// The norm of all differences over that of all logged torques.
     pub relative: f64,
+    /// Squares of the differences of all joints, summed over stretches of two seconds of each log.
+    #[serde(skip)]
+    pub stretches: Vec<f64>,
 }
+
+/// Errors are taken as independent beyond this time, s.
+const STRETCH_S: f64 = 2.0;
 
 /// The error of the torques on logs, each as [`Smooth`] reads it. `None` for a model that gives accelerations, and where no
 /// log is longer than a second.
@@ -52,6 +58,7 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
             qd,
             qdd,
             tau,
+            ..
         } = acting;
         let moving = [q, qd, tau]
             .into_iter()
@@ -76,6 +83,7 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
 
 /// Sums of squares.
 struct Sums {
+    stretches: Vec<f64>,
     differences: Vec<f64>,
     torques: f64,
     rows: usize,
@@ -84,6 +92,7 @@ struct Sums {
 impl Sums {
     fn new(joints: usize) -> Self {
         Self {
+            stretches: Vec::new(),
             differences: vec![0.0; joints],
             torques: 0.0,
             rows: 0,
@@ -95,11 +104,18 @@ impl Sums {
         for (sum, differences) in self.differences.iter_mut().zip(differences) {
             *sum += squares(differences);
         }
+        let start = logged.time.first().copied().unwrap_or(0.0);
+        let stretch = |row: &usize| ((logged.time[*row] - start) / STRETCH_S).floor();
+        let rows: Vec<usize> = (0..logged.rows()).collect();
+        for of_stretch in rows.chunk_by(|a, b| stretch(a) == stretch(b)) {
+            let square = |row: &usize| differences.iter().map(|of| of[*row].powi(2)).sum::<f64>();
+            self.stretches.push(of_stretch.iter().map(square).sum());
+        }
         self.torques += logged.tau.iter().map(squares).sum::<f64>();
         self.rows += logged.rows();
     }
 
-    fn error(&self) -> Option<TorqueError> {
+    fn error(self) -> Option<TorqueError> {
         let all: f64 = self.differences.iter().sum();
         (self.rows > 0).then(|| TorqueError {
             rms: self
@@ -108,6 +124,7 @@ impl Sums {
                 .map(|sum| (sum / self.rows as f64).sqrt())
                 .collect(),
             relative: (all / self.torques).sqrt(),
+            stretches: self.stretches,
         })
     }
 }

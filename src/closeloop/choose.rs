@@ -1,0 +1,82 @@
+//! Which errors say more about some logs.
+
+use super::select::usual_friction;
+use super::space::Space;
+use super::study::Study;
+use crate::data::Log;
+use crate::data::statistics::upper_median;
+use crate::identify::{Window, cut, fit_torques};
+use crate::model::{Effect, Model};
+use crate::sim::FIT_S;
+use crate::sim::metric::{errors_in, torque_error};
+
+/// A window in which a joint moves by less than this share of its farthest way (as squares) is one at rest.
+const AT_REST: f64 = 1e-2;
+
+/// With more joints than this a fit of the motion takes too long to try.
+const FITTED_JOINTS: usize = 3;
+
+impl Study<'_> {
+    /// The errors to compare: of the torques where a controller prescribes the motion, so that the declared model, with the
+    /// friction that most machines have, explains far more of the torques than of half a second of open-loop motion; of the
+    /// motion otherwise, which is not differentiated, and for a model that gives accelerations.
+    pub(super) fn better_space(&self, library: &[Effect]) -> Space {
+        match self.is_prescribed(library) {
+            Some(true) => Space::Torque,
+            Some(false) | None => Space::Motion,
+        }
+    }
+
+    /// `None` where there are no torques to tell.
+    fn is_prescribed(&self, library: &[Effect]) -> Option<bool> {
+        let own = &self.declared.effects;
+        let friction = usual_friction(self, library);
+        let model = self
+            .declared
+            .with_effects([own, friction.as_slice()].concat());
+        let fitted = fit_torques(&self.smoothed(&model), self.declared, self.logs).ok()?;
+        let torque = torque_error(&fitted.model, self.logs)?.relative;
+        let far = self.settings.fit.prescribed * torque;
+        if self.motion_error(&fitted.model) < far {
+            return Some(false);
+        }
+        if self.declared.joints > FITTED_JOINTS {
+            return Some(true);
+        }
+        // Torques may be fitted well by what cannot move like the rig.
+        let mut by_motion = Study {
+            declared: &model,
+            ..self.again()
+        };
+        let by_motion = by_motion.fit_declared(&[]).ok()?;
+        Some(self.motion_error(&by_motion.model) >= far)
+    }
+
+    /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them.
+    fn motion_error(&self, model: &Model) -> f64 {
+        let windows = cut(self.logs, self.settings.fit.window_s);
+        let every = windows.len().div_ceil(self.settings.fit.sample_windows);
+        let windows: Vec<Window> = windows.into_iter().step_by(every.max(1)).collect();
+        let errors = errors_in(&model.dynamics(), self.logs, &windows, FIT_S);
+        let share = |j: usize| {
+            let way = |window: &Window| way(&self.logs[window.log], window, j);
+            let ways: Vec<f64> = windows.iter().map(way).collect();
+            let farthest = ways.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+            let moving = errors
+                .iter()
+                .zip(&ways)
+                .filter(|(_, way)| **way > AT_REST * farthest);
+            let shares: Vec<f64> = moving.map(|(error, way)| error.position[j] / way).collect();
+            upper_median(&shares)
+        };
+        let joints = model.joints;
+        let mean = (0..joints).map(share).sum::<f64>() / joints as f64;
+        mean.sqrt()
+    }
+}
+
+/// Sum over the rows of a window of the squared way from its start.
+fn way(log: &Log, window: &Window, joint: usize) -> f64 {
+    let q = &log.q[joint][window.first..=window.last];
+    q.iter().map(|at| (at - q[0]).powi(2)).sum()
+}

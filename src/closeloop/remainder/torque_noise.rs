@@ -1,0 +1,84 @@
+//! What the sensors' noise does to the torques that a logged motion needs.
+
+use nalgebra::DVector;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::closeloop::study::Study;
+use crate::data::{Channel, JointAudit, Log};
+use crate::identify::Values;
+use crate::model::Model;
+
+/// The residuals of a model in some windows of a study of torques, and what noise adds to them.
+pub(super) struct TorqueNoise<'a> {
+    study: &'a Study<'a>,
+    model: &'a Model,
+    windows: &'a [usize],
+    residuals: Vec<DVector<f64>>,
+}
+
+impl<'a> TorqueNoise<'a> {
+    pub fn new(study: &'a Study<'a>, model: &'a Model, windows: &'a [usize]) -> Self {
+        Self {
+            residuals: residuals(study, model, windows, study.logs),
+            study,
+            model,
+            windows,
+        }
+    }
+
+    /// The residuals of each window, in N m (or N), `[row * joints + joint]`.
+    pub fn residuals(&self) -> &[DVector<f64>] {
+        &self.residuals
+    }
+
+    /// What a draw of the noise of all sensors changes of them.
+    pub fn draw(&self, rng: &mut impl Rng) -> Vec<DVector<f64>> {
+        let audits = self.study.audits().iter();
+        let logs: Vec<Log> = (self.study.logs.iter().zip(audits))
+            .map(|(log, audit)| noisier(log, &audit.joints, rng))
+            .collect();
+        let noisy = residuals(self.study, self.model, self.windows, &logs);
+        let both = noisy.into_iter().zip(&self.residuals);
+        both.map(|(noisy, residuals)| noisy - residuals).collect()
+    }
+}
+
+fn residuals(
+    study: &Study<'_>,
+    model: &Model,
+    windows: &[usize],
+    logs: &[Log],
+) -> Vec<DVector<f64>> {
+    let chosen = windows.iter().map(|&w| study.shooting.windows[w]).collect();
+    let noise = &study.shooting.noise;
+    let shooting = (study.space).shooting(logs, chosen, noise, &study.sign_widths);
+    let dynamics = study.compiled(model);
+    let values = Values::of(&dynamics, logs);
+    let all = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
+    let in_units = |residuals: Vec<f64>| {
+        let units = noise.iter().cycle();
+        DVector::from_iterator(
+            residuals.len(),
+            residuals.iter().zip(units).map(|(r, unit)| r * unit),
+        )
+    };
+    all.into_iter().map(in_units).collect()
+}
+
+/// A log whose positions and torques carry as much noise once more as they seem to.
+fn noisier(log: &Log, joints: &[JointAudit], rng: &mut impl Rng) -> Log {
+    let mut noisier = log.clone();
+    let mut add = |values: &mut [f64], channel: &Channel| {
+        let noise = channel.noise_std.max(channel.resolution / 12.0_f64.sqrt());
+        for value in values {
+            let drawn: f64 = StandardNormal.sample(rng);
+            *value += noise * drawn;
+        }
+    };
+    for (j, joint) in joints.iter().enumerate() {
+        add(&mut noisier.q[j], &joint.q);
+        add(&mut noisier.tau[j], &joint.tau);
+    }
+    noisier
+}

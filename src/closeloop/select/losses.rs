@@ -1,0 +1,96 @@
+use rayon::prelude::*;
+
+use super::folds::{Folds, left_out_losses, losses_by, steps_without};
+use crate::closeloop::fitted::Fitted;
+use crate::closeloop::space::Space;
+use crate::closeloop::study::Study;
+use crate::data::Joint;
+use crate::identify::{Values, Window, huber};
+
+/// The losses of a model on stretches left out of its fit: `[stretch * parts + part]`, where in a motion all joints are one
+/// part, since each moves the others, and of torques each joint is one. What an effect on one of many joints is worth shows on
+/// that joint.
+#[derive(Debug, Clone)]
+pub struct Losses {
+    parts: usize,
+    pub values: Vec<f64>,
+}
+
+impl Losses {
+    /// On stretches that are left out in the study's folds.
+    pub fn of(study: &Study<'_>, fitted: &Fitted) -> Self {
+        match study.space {
+            Space::Motion => Self {
+                parts: 1,
+                values: left_out_losses(study, &fitted.fit),
+            },
+            Space::Torque => Self::by(study, &Folds::of(study), fitted),
+        }
+    }
+
+    /// The same with given folds.
+    pub fn by(study: &Study<'_>, folds: &Folds, fitted: &Fitted) -> Self {
+        let parts = study.parts();
+        let values = match study.space {
+            Space::Motion => losses_by(folds, &fitted.fit),
+            Space::Torque => of_torques(study, folds, fitted, |r| huber(r / fitted.fit.scale)),
+        };
+        Self { parts, values }
+    }
+
+    pub fn total(&self) -> f64 {
+        self.values.iter().sum()
+    }
+
+    /// Of the part that a joint belongs to, one a stretch.
+    pub fn of_joint(&self, joint: Joint) -> Vec<f64> {
+        let part = joint.index().min(self.parts - 1);
+        let own = self.values.iter().skip(part).step_by(self.parts);
+        own.copied().collect()
+    }
+}
+
+/// A loss of the residuals of torques, summed over each stretch and joint, `[stretch * joints + joint]`, with the values that
+/// the linearised fit without the stretch's group gives.
+pub fn of_torques(
+    study: &Study<'_>,
+    folds: &Folds,
+    fitted: &Fitted,
+    loss: impl Fn(f64) -> f64 + Sync,
+) -> Vec<f64> {
+    let (fit, joints) = (&fitted.fit, study.declared.joints);
+    let dynamics = study.compiled(&fitted.model);
+    let values = Values::of(&dynamics, study.logs);
+    let of_group = |(group, step): (usize, &nalgebra::DVector<f64>)| {
+        let values = values.moved(&dynamics, &fit.columns, step);
+        let all = study.shooting.windows.iter().zip(&folds.stretches);
+        let own = all.filter(|(_, stretch)| folds.groups[**stretch] == group);
+        let (windows, stretches): (Vec<Window>, Vec<usize>) = own.unzip();
+        let shooting = study.shooting.over(windows);
+        let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
+        let of_window = |(residuals, stretch): (Vec<f64>, usize)| {
+            let sum = |j: usize| {
+                residuals
+                    .iter()
+                    .skip(j)
+                    .step_by(joints)
+                    .map(|r| loss(*r))
+                    .sum()
+            };
+            let losses: Vec<f64> = (0..joints).map(sum).collect();
+            (stretch, losses)
+        };
+        let windows = residuals.into_iter().zip(stretches);
+        windows.map(of_window).collect::<Vec<_>>()
+    };
+    let steps = steps_without(folds, fit);
+    let groups: Vec<_> = steps.par_iter().enumerate().map(of_group).collect();
+    let mut sums = vec![0.0; folds.groups.len() * joints];
+    for (stretch, losses) in groups.into_iter().flatten() {
+        let own = &mut sums[stretch * joints..][..joints];
+        own.iter_mut()
+            .zip(losses)
+            .for_each(|(sum, loss)| *sum += loss);
+    }
+    sums
+}
