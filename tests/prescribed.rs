@@ -54,9 +54,13 @@ fn recorded(rig: &Model, seconds: f64, seed: u64) -> Log {
 }
 
 fn closed(rig: &Model, space: Option<Space>) -> Outcome {
+    let [train, test] = [(30.0, 1), (10.0, 2)].map(|(seconds, seed)| recorded(rig, seconds, seed));
+    closed_on([train, test], space)
+}
+
+fn closed_on([train, test]: [Log; 2], space: Option<Space>) -> Outcome {
     let (declared, library) = (declared(), Library::built_in());
-    let train = vec![recorded(rig, 30.0, 1)];
-    let split = Split::given(train, vec![recorded(rig, 10.0, 2)]);
+    let split = Split::given(vec![train], vec![test]);
     let mut request = Request::new(&declared, &library, split);
     request.settings = Settings::default();
     request.space = space;
@@ -114,6 +118,41 @@ fn an_arm_that_is_as_declared_but_for_its_bodies_lacks_no_effect() {
     );
 }
 
+/// Whether an audit says that a log's torques hold another gravity.
+fn contradicts_gravity(outcome: &Outcome) -> bool {
+    let findings = outcome
+        .given
+        .audits
+        .iter()
+        .flat_map(|audit| &audit.findings);
+    let mut texts = findings.map(|finding| finding.text.as_str());
+    texts.any(|text| text.contains("of the gravity that the declared bodies need"))
+}
+
+#[test]
+fn torques_without_gravity_are_told() {
+    let rig = rig(&[(0, "viscous_friction", &[0.8])]);
+    let logs = [(20.0, 1), (10.0, 2)].map(|(seconds, seed)| recorded(&rig, seconds, seed));
+    assert!(!contradicts_gravity(&closed_on(
+        logs.clone(),
+        Some(Space::Torque)
+    )));
+    let balance = rig.torque_balance().unwrap();
+    let (values, zero) = (balance.values(), vec![0.0; rig.joints]);
+    let bare = logs.map(|mut log| {
+        for row in 0..log.rows() {
+            let q: Vec<f64> = log.q.iter().map(|q| q[row]).collect();
+            let inputs = [&q[..], &zero, &zero, &[0.0], &zero, &values].concat();
+            let gravity = balance.program.eval(&inputs);
+            for (tau, gravity) in log.tau.iter_mut().zip(gravity) {
+                tau[row] -= gravity;
+            }
+        }
+        log
+    });
+    assert!(contradicts_gravity(&closed_on(bare, Some(Space::Torque))));
+}
+
 /// Rows of a log from one time on and before another.
 fn part(log: &Log, start_s: f64, end_s: f64) -> Log {
     let kept: Vec<usize> = (0..log.rows())
@@ -148,6 +187,7 @@ fn of_measured(arm: &str, logs: [&str; 2], share: f64, most_percent: f64) -> Opt
     let request = Request::new(&declared, &library, Split::given(vec![train], vec![test]));
     let outcome = close_loop(request, &mut rng(0), &mut |_| {}).unwrap();
     assert_eq!(outcome.space, Space::Torque);
+    assert!(!contradicts_gravity(&outcome), "{arm}");
     let percent = 100.0 * outcome.errors.torque.as_ref().unwrap().after.relative;
     assert!(percent <= most_percent, "{arm}: {percent} %");
     Some(outcome)

@@ -12,6 +12,7 @@ mod establish;
 mod find;
 mod fit;
 mod fitted;
+mod gravity;
 mod learn;
 mod outcome;
 mod pushes;

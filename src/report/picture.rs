@@ -4,23 +4,32 @@ use super::plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
     ShapeSample, Track,
 };
+use super::text::label;
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
-use crate::closeloop::{ForceSample, Outcome, ResidualForce};
+use crate::closeloop::{ForceSample, Outcome, ResidualForce, Space};
 use crate::data::{Joint, Log};
 use crate::identify::FitError;
 use crate::model::Dynamics;
-use crate::sim::metric::{Assessment, Trace, summarise, traces};
+use crate::sim::metric::{Assessment, NeededTorques, Trace, needed_torques, summarise, traces};
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
 const SHOWN_S: f64 = 8.0;
 
-/// Measured motion and open-loop predictions on the beginning of the first test log.
+/// What was compared on the beginning of the first test log: open-loop predictions of its motion, or the torques that it needs.
 pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
     let Some(log) = outcome.given.test.first() else {
         return Err(PlotError::Empty {
             title: "predictions".into(),
         });
     };
+    match outcome.space {
+        Space::Motion => motion(outcome, log),
+        Space::Torque => torques(outcome, log),
+    }
+}
+
+/// Measured motion and open-loop predictions of it.
+fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
     let horizons = outcome.errors.before.horizons.iter().map(|h| h.horizon_s);
     // Differences between models grow with the horizon: the longest one shows them best.
     let horizon = horizons.fold(0.0, f64::max);
@@ -33,8 +42,9 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
         models.push((Role::Hybrid, WITH_NETWORK, learned.network.hybrid().clone()));
     }
     let panel = |joint: Joint| Panel {
-        joint,
-        kind: kind(outcome, joint),
+        label: label(outcome, joint),
+        quantity: format!("position q{joint}"),
+        unit: kind(outcome, joint).position_unit(),
         tracks: std::iter::once(measured(log, joint))
             .chain(models.iter().map(|(role, label, dynamics)| Track {
                 label: (*label).to_owned(),
@@ -50,6 +60,44 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
         "{}: predictions of {horizon} s, each started from the log",
         log.name()
     );
+    super::plot::predictions(&panels, &title)
+}
+
+/// Logged torques and those that the motion needs by the models, both low-passed.
+fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
+    let fitted = &outcome.models;
+    let models = [
+        (Role::Before, FITTED, &fitted.before.model),
+        (Role::After, WITH_EFFECTS, &fitted.after.model),
+    ];
+    let needed: Vec<(Role, &str, NeededTorques)> = models
+        .into_iter()
+        .filter_map(|(role, label, model)| Some((role, label, needed_torques(model, log)?)))
+        .collect();
+    let curve = |label: &str, role: Role, of: &NeededTorques, values: &[Vec<f64>], joint: Joint| {
+        let points = of.time.iter().copied().zip(values[joint].iter().copied());
+        Track {
+            label: label.to_owned(),
+            role,
+            segments: vec![points.take_while(|(t, _)| *t <= end(log)).collect()],
+        }
+    };
+    let panel = |joint: Joint| {
+        let kind = kind(outcome, joint);
+        let logged = needed.first();
+        let logged =
+            logged.map(|(_, _, of)| curve("measured", Role::Measured, of, &of.logged, joint));
+        let models = needed.iter();
+        let models = models.map(|(role, label, of)| curve(label, *role, of, &of.needed, joint));
+        Panel {
+            label: label(outcome, joint),
+            quantity: format!("{} tau{joint}", kind.force_name()),
+            unit: kind.force_unit(),
+            tracks: logged.into_iter().chain(models).collect(),
+        }
+    };
+    let panels: Vec<Panel> = Joint::all(fitted.after.model.joints).map(panel).collect();
+    let title = format!("{}: torques that its motion needs", log.name());
     super::plot::predictions(&panels, &title)
 }
 
@@ -88,6 +136,7 @@ pub(super) fn residual(outcome: &Outcome) -> Result<String, PlotError> {
     let (fitted, with_effects) = (&outcome.remainder.before, &outcome.remainder.after);
     let panel = |joint: Joint| ShapePanel {
         joint,
+        label: label(outcome, joint),
         kind: kind(outcome, joint),
         models: vec![
             shape(Role::Before, FITTED, joint, fitted),
@@ -152,6 +201,7 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
     let row = |joint: Joint, h: usize| ErrorRow {
         joint,
+        label: label(outcome, joint),
         kind: kind(outcome, joint),
         horizon_s: errors.before.horizons[h].horizon_s,
         bars: models

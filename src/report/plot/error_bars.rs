@@ -28,6 +28,8 @@ const QUANTITY: &str = "position error, RMS";
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorRow {
     pub joint: Joint,
+    /// The joint for people, as in `2 (elbow)`.
+    pub label: String,
     /// How the joint moves.
     pub kind: JointKind,
     /// How far ahead the models predict.
@@ -72,7 +74,7 @@ fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
 
 /// Draws the rows of one joint from `top` on, and says where their frame ends.
 fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
-    let Some(ErrorRow { joint, kind, .. }) = rows.first() else {
+    let Some(ErrorRow { label, kind, .. }) = rows.first() else {
         return top;
     };
     let bars: usize = rows.iter().map(|row| row.bars.len()).sum();
@@ -103,7 +105,7 @@ fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
     let frame = Frame { area, x: &x, y: &y };
     canvas.add(frame.grid());
     canvas.add(frame.x_labels());
-    canvas.add(heading(area, &format!("Joint {joint}")));
+    canvas.add(heading(area, &format!("Joint {label}")));
     let mut next = top + GROUP_GAP_PX;
     for row in rows {
         next = draw_group(canvas, &frame, row, factor, next) + GROUP_GAP_PX;
@@ -206,6 +208,7 @@ mod tests {
         let before = bar(Role::Before, "before", before);
         ErrorRow {
             joint: Joint::at(0),
+            label: "1".into(),
             kind: JointKind::Revolute,
             horizon_s: 0.5,
             bars: std::iter::once(before)

@@ -1,13 +1,12 @@
 //! Predictions of a model and the measured motion.
 
+use super::PlotError;
 use super::axes::{Axis, FOOT, Frame, HEAD, heading, no_data, remark};
 use super::canvas::{Area, Canvas, clipped, curves, marker};
 use super::decimate::{decimate, drawable_pieces};
 use super::legend::{Entry, Sample, begin};
 use super::scale::Range;
 use super::style::{INK, MARGIN, Role, START_MARK_PX, WIDTH};
-use super::{JointKind, PlotError};
-use crate::data::Joint;
 
 /// About two points for each column of pixels: more cannot be seen.
 const MAX_TRACK_POINTS: usize = 4000;
@@ -24,7 +23,7 @@ pub struct Track {
     pub label: String,
     /// What the curve shows.
     pub role: Role,
-    /// Time in s and position in rad or m, piece by piece. A prediction that is restarted from the log has a piece
+    /// Time in s and the panel's quantity, piece by piece. A prediction that is restarted from the log has a piece
     /// for each start.
     pub segments: Vec<Vec<(f64, f64)>>,
 }
@@ -32,9 +31,11 @@ pub struct Track {
 /// The curves of one joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    pub joint: Joint,
-    /// How the joint moves.
-    pub kind: JointKind,
+    /// The joint for people, as in `2 (elbow)`.
+    pub label: String,
+    /// What its curves show, as in `position q2`, and the unit.
+    pub quantity: String,
+    pub unit: &'static str,
     /// Its curves, in any order.
     pub tracks: Vec<Track>,
 }
@@ -103,7 +104,7 @@ fn entries(panels: &[Panel]) -> Vec<Entry> {
 }
 
 fn has_start_marks(track: &Track) -> bool {
-    track.role != Role::Measured && (1..=MAX_START_MARKS).contains(&track.segments.len())
+    track.role != Role::Measured && (2..=MAX_START_MARKS).contains(&track.segments.len())
 }
 
 fn y_axis(panel: &Panel, pixels: f64) -> Axis {
@@ -128,12 +129,11 @@ fn y_axis(panel: &Panel, pixels: f64) -> Axis {
         (Some(all), None) => all,
         (None, _) => Range { lo: -1.0, hi: 1.0 },
     };
-    let quantity = format!("position q{}", panel.joint);
     Axis::vertical(
         range.drawable().widened(0.04),
         pixels,
-        &quantity,
-        panel.kind.position_unit(),
+        &panel.quantity,
+        panel.unit,
     )
 }
 
@@ -141,7 +141,7 @@ fn draw_panel(canvas: &mut Canvas, frame: &Frame, panel: &Panel) {
     canvas.add(frame.grid());
     canvas.add(frame.y_numbers());
     canvas.add(frame.y_label());
-    canvas.add(heading(frame.area, &format!("Joint {}", panel.joint)));
+    canvas.add(heading(frame.area, &format!("Joint {}", panel.label)));
     let mut tracks: Vec<&Track> = panel.tracks.iter().collect();
     tracks.sort_by_key(|track| track.role);
     let mut inner = clipped(frame.area);
@@ -196,8 +196,7 @@ fn visible_lines(track: &Track, frame: &Frame) -> Vec<Vec<(f64, f64)>> {
 #[cfg(test)]
 mod tests {
     use super::{Panel, Track, predictions};
-    use crate::data::Joint;
-    use crate::report::plot::{JointKind, PlotError, Role};
+    use crate::report::plot::{PlotError, Role};
 
     fn panel(role: Role, points: Vec<(f64, f64)>) -> Panel {
         let label = format!("{role:?}");
@@ -208,8 +207,9 @@ mod tests {
             segments,
         }];
         Panel {
-            joint: Joint::at(0),
-            kind: JointKind::Revolute,
+            label: "1".into(),
+            quantity: "position q1".into(),
+            unit: "rad",
             tracks,
         }
     }

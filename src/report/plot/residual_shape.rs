@@ -52,6 +52,8 @@ pub struct ShapeModel {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShapePanel {
     pub joint: Joint,
+    /// The joint for people, as in `2 (elbow)`.
+    pub label: String,
     /// How the joint moves.
     pub kind: JointKind,
     /// The models, from the back to the front.
@@ -118,7 +120,7 @@ fn draw_row(canvas: &mut Canvas, panel: &ShapePanel, top: f64) {
         width,
         height: PANEL_HEIGHT,
     };
-    canvas.add(heading(area, &format!("Joint {}", panel.joint)));
+    canvas.add(heading(area, &format!("Joint {}", panel.label)));
     for (k, column) in columns(panel).into_iter().enumerate() {
         let shown = panel.models.iter().map(|model| Shown {
             role: model.role,
@@ -218,6 +220,7 @@ mod tests {
     fn panel(samples: Vec<ShapeSample>) -> ShapePanel {
         ShapePanel {
             joint: Joint::at(0),
+            label: "1".into(),
             kind: JointKind::Revolute,
             models: vec![ShapeModel {
                 role: Role::Before,

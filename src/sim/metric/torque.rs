@@ -39,6 +39,32 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
     sums.error()
 }
 
+/// The torques of a log and those that its motion needs, low-passed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NeededTorques {
+    /// s
+    pub time: Vec<f64>,
+    /// N m (or N), `[joint][row]`
+    pub logged: Vec<Vec<f64>>,
+    pub needed: Vec<Vec<f64>>,
+}
+
+/// What the motion of a log needs by a model; `None` for a model that gives accelerations.
+pub fn needed_torques(model: &Model, log: &Log) -> Option<NeededTorques> {
+    let (smooth, differences) = differences(&model.torque_balance()?, log);
+    let logged = smooth.tau.iter();
+    let sum = |(logged, difference): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+        let both = logged.iter().zip(difference);
+        both.map(|(logged, difference)| logged + difference)
+            .collect()
+    };
+    Some(NeededTorques {
+        needed: logged.zip(&differences).map(sum).collect(),
+        time: smooth.time,
+        logged: smooth.tau,
+    })
+}
+
 /// Of a log, and the torques by which its motion needs more than acts, `[joint][row]`.
 fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     let in_log = balance.in_log(log);

@@ -1,0 +1,83 @@
+//! Whether the logged torques hold the gravity that the declared bodies need.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::space::Space;
+use super::study::Study;
+use crate::data::{Audit, Finding, Severity, Smooth};
+use crate::model::Model;
+
+/// Gravity is contradicted where the torques hold less than this share of it, or more than its inverse: bodies from a drawing
+/// are off by a third, a torque without gravity by all.
+const LEAST: f64 = 0.5;
+
+/// A joint tells of gravity if it varies by this much of its torque, both as standard deviations.
+const TELLS: f64 = 0.3;
+
+/// Where torques are compared, add to the audits of the study's logs which of them hold another gravity than the declared
+/// bodies need: a torque column that is only a part of the torque, a moment of another unit, another base.
+pub(super) fn tell_gravity(study: &Study<'_>, audits: &mut [Audit]) {
+    if study.space != Space::Torque {
+        return;
+    }
+    let bodies = study.declared.with_effects(Vec::new());
+    for (log, audit) in study.logs.iter().zip(audits) {
+        let share = share(&bodies, &Smooth::of(log));
+        if let Some(share) = share.filter(|share| !(LEAST..1.0 / LEAST).contains(share)) {
+            let text = format!(
+                "the logged torques hold {:.0} % of the gravity that the declared bodies need: they are not all of the joints' \
+                 torques (a command without the controller's gravity term, say), or masses, gravity's direction or the unit of \
+                 the torques are others. What is fitted to them imitates that",
+                100.0 * share
+            );
+            audit.add(Finding::new(Severity::Serious, text));
+        }
+    }
+}
+
+/// The share of the declared gravity in the torques, by least squares beside acceleration, friction and an offset joint by
+/// joint, each weighing as much as its gravity varies; `None` where gravity hardly loads any.
+fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
+    let balance = bodies.torque_balance()?;
+    let (n, rows) = (bodies.joints, smooth.rows());
+    let values = balance.values();
+    let zero = vec![0.0; n];
+    let at = |channels: &[Vec<f64>], row: usize| -> Vec<f64> {
+        channels.iter().map(|channel| channel[row]).collect()
+    };
+    let needed = |q: &[f64], qd: &[f64], qdd: &[f64]| {
+        let inputs = [q, qd, &zero, &[0.0], qdd, &values].concat();
+        balance.program.eval(&inputs)
+    };
+    let (mut gravity, mut moving) = (Vec::new(), Vec::new());
+    for row in 0..rows {
+        let [q, qd, qdd] = [&smooth.q, &smooth.qd, &smooth.qdd].map(|of| at(of, row));
+        gravity.push(needed(&q, &zero, &zero));
+        moving.push(needed(&q, &qd, &qdd));
+    }
+    let of_joint = |j: usize| {
+        let column = |of: &dyn Fn(usize) -> f64| DVector::from_fn(rows, |row, _| of(row));
+        let weight = column(&|row| gravity[row][j]);
+        let torque = column(&|row| smooth.tau[j][row]);
+        let spread = |of: &DVector<f64>| of.variance().sqrt();
+        if spread(&weight) < TELLS * spread(&torque) {
+            return None;
+        }
+        let varies = weight.variance();
+        let columns = [
+            weight,
+            column(&|row| moving[row][j] - gravity[row][j]),
+            column(&|row| smooth.qd[j][row]),
+            column(&|row| smooth.qd[j][row].signum()),
+            column(&|_| 1.0),
+        ];
+        let solved = DMatrix::from_columns(&columns)
+            .svd(true, true)
+            .solve(&torque, 1e-9);
+        solved.ok().map(|found| (varies, found[0]))
+    };
+    let told: Vec<(f64, f64)> = (0..n).filter_map(of_joint).collect();
+    let all: f64 = told.iter().map(|(varies, _)| varies).sum();
+    let held: f64 = told.iter().map(|(varies, share)| varies * share).sum();
+    (all > 0.0).then(|| held / all)
+}
