@@ -118,15 +118,16 @@ fn an_arm_that_is_as_declared_but_for_its_bodies_lacks_no_effect() {
     );
 }
 
+/// Whether an audit says this of a log.
+fn is_told(outcome: &Outcome, what: &str) -> bool {
+    let audits = outcome.given.audits.iter();
+    let mut findings = audits.flat_map(|audit| &audit.findings);
+    findings.any(|finding| finding.text.contains(what))
+}
+
 /// Whether an audit says that a log's torques hold another gravity.
 fn contradicts_gravity(outcome: &Outcome) -> bool {
-    let findings = outcome
-        .given
-        .audits
-        .iter()
-        .flat_map(|audit| &audit.findings);
-    let mut texts = findings.map(|finding| finding.text.as_str());
-    texts.any(|text| text.contains("of the gravity that the declared bodies need"))
+    is_told(outcome, "of the gravity that the declared bodies need")
 }
 
 #[test]
@@ -205,13 +206,10 @@ fn a_measured_kuka_is_explained_and_its_test_is_told_as_a_repeat() {
     let Some(outcome) = of_measured("kuka_lwr4", logs, 1.0, 3.0) else {
         return;
     };
-    let findings = outcome
-        .given
-        .audits
-        .iter()
-        .flat_map(|audit| &audit.findings);
-    let mut texts = findings.map(|finding| finding.text.as_str());
-    assert!(texts.any(|text| text.contains("the motion is that of measurements_1.csv once more")));
+    assert!(is_told(
+        &outcome,
+        "the motion is that of measurements_1.csv once more"
+    ));
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Which errors say more about some logs.
 
 use super::select::usual_friction;
-use super::space::Space;
 use super::study::Study;
 use crate::data::Log;
 use crate::data::statistics::upper_median;
@@ -17,18 +16,14 @@ const AT_REST: f64 = 1e-2;
 const FITTED_JOINTS: usize = 3;
 
 impl Study<'_> {
-    /// The errors to compare: of the torques where a controller prescribes the motion, so that the declared model, with the
-    /// friction that most machines have, explains far more of the torques than of half a second of open-loop motion; of the
-    /// motion otherwise, which is not differentiated, and for a model that gives accelerations.
-    pub(super) fn better_space(&self, library: &[Effect]) -> Space {
-        match self.is_prescribed(library) {
-            Some(true) => Space::Torque,
-            Some(false) | None => Space::Motion,
-        }
+    /// Whether a controller prescribes the motion, so that the declared model, with the friction that most machines have,
+    /// explains far more of the torques than of half a second of open-loop motion. Never of a model that gives accelerations.
+    pub(super) fn is_prescribed(&self, library: &[Effect]) -> bool {
+        self.tells_more_of_torques(library).unwrap_or(false)
     }
 
     /// `None` where there are no torques to tell.
-    fn is_prescribed(&self, library: &[Effect]) -> Option<bool> {
+    fn tells_more_of_torques(&self, library: &[Effect]) -> Option<bool> {
         let own = &self.declared.effects;
         let friction = usual_friction(self, library);
         let model = self

@@ -45,23 +45,20 @@ impl Chosen {
     }
 
     /// Effects are not established beside a remainder that leaves most of what their joint lacks, or more than they explain.
-    fn doubt(&mut self, study: &Study<'_>, before: &Fitted, left: &Unexplained) {
+    fn doubt(&mut self, study: &Study<'_>, before: &Fitted, remainder: &Unexplained) {
         let settings = &study.settings.establish;
-        let parts = study.declared.joints;
-        let with: Vec<f64> = Joint::all(parts)
-            .map(|joint| share_left(study, before, &self.after, joint))
-            .collect();
+        let [declared, with] = [before, &self.after].map(|model| Loss::of(study, model));
+        let left = |of: &Loss, joint| of.on(joint) / declared.on(joint).max(f64::MIN_POSITIVE);
         self.demote(MASKING, |standing| {
             let joint = standing.effect.joint;
-            left.matters_on(study, joint) && with[joint] > settings.masking
+            remainder.matters_on(study, joint) && left(&with, joint) > settings.masking
         });
         self.demote(OUTWEIGHED, |standing| {
             let joint = standing.effect.joint;
-            let least = settings.outweighed * left.fraction_on(study, joint);
+            let least = settings.outweighed * remainder.fraction_on(study, joint);
             let without = standing.without.as_ref();
-            without.is_ok_and(|without| {
-                share_left(study, before, without, joint) - with[joint] < least
-            })
+            let without = without.map(|without| Loss::of(study, without));
+            without.is_ok_and(|without| left(&without, joint) - left(&with, joint) < least)
         });
     }
 
@@ -108,7 +105,7 @@ pub fn find(
         && study.space == Space::Motion
         && study.has_time()
         && let Some((identifiability, other)) = second_search(study, library, &before, progress)
-        && total_left(study, &before, &other.after) < total_left(study, &before, &chosen.after)
+        && Loss::of(study, &other.after).total() < Loss::of(study, &chosen.after).total()
     {
         study.identifiability = identifiability;
         chosen = other;
@@ -198,20 +195,26 @@ fn choose(
     }
 }
 
-/// Loss that the effects leave, as a share of the declared model's, on stretches left out of the fits.
-fn total_left(study: &Study<'_>, before: &Fitted, after: &Fitted) -> f64 {
-    let [before, after] = [before, after].map(|model| losses(study, model, Losses::total));
-    after / before.max(f64::MIN_POSITIVE)
+/// Losses of a model on stretches left out of its fit, in one unit for all models: a fit's own is its scale.
+struct Loss {
+    losses: Losses,
+    unit: f64,
 }
 
-/// The same of what a joint is judged by.
-fn share_left(study: &Study<'_>, before: &Fitted, after: &Fitted, joint: Joint) -> f64 {
-    let of_joint = |losses: &Losses| losses.of_joint(joint).iter().sum();
-    let [before, after] = [before, after].map(|model| losses(study, model, of_joint));
-    after / before.max(f64::MIN_POSITIVE)
-}
+impl Loss {
+    fn of(study: &Study<'_>, model: &Fitted) -> Self {
+        Self {
+            losses: Losses::of(study, model),
+            unit: model.fit.scale.powi(2),
+        }
+    }
 
-/// A sum of losses, which are in units of each fit's own scale.
-fn losses(study: &Study<'_>, model: &Fitted, sum: impl Fn(&Losses) -> f64) -> f64 {
-    sum(&Losses::of(study, model)) * model.fit.scale.powi(2)
+    fn total(&self) -> f64 {
+        self.losses.total() * self.unit
+    }
+
+    /// Of what a joint is judged by.
+    fn on(&self, joint: Joint) -> f64 {
+        self.losses.of_joint(joint).iter().sum::<f64>() * self.unit
+    }
 }

@@ -6,6 +6,7 @@ use super::space::Space;
 use super::study::Study;
 use crate::data::{Audit, Finding, Severity, Smooth};
 use crate::model::Model;
+use crate::sim::metric::balance_of;
 
 /// Gravity is contradicted where the torques hold less than this share of it, or more than its inverse: bodies from a drawing
 /// are off by a third, a torque without gravity by all.
@@ -40,24 +41,21 @@ pub(super) fn tell_gravity(study: &Study<'_>, audits: &mut [Audit]) {
 fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
     let balance = bodies.torque_balance()?;
     let (n, rows) = (bodies.joints, smooth.rows());
-    let values = balance.values();
-    let zero = vec![0.0; n];
-    let at = |channels: &[Vec<f64>], row: usize| -> Vec<f64> {
-        channels.iter().map(|channel| channel[row]).collect()
+    let none = vec![vec![0.0; rows]; n];
+    let unforced = Smooth {
+        tau: none.clone(),
+        ..smooth.clone()
     };
-    let needed = |q: &[f64], qd: &[f64], qdd: &[f64]| {
-        let inputs = [q, qd, &zero, &[0.0], qdd, &values].concat();
-        balance.program.eval(&inputs)
+    let moving = balance_of(&balance, &unforced);
+    let at_rest = Smooth {
+        qd: none.clone(),
+        qdd: none,
+        ..unforced
     };
-    let (mut gravity, mut moving) = (Vec::new(), Vec::new());
-    for row in 0..rows {
-        let [q, qd, qdd] = [&smooth.q, &smooth.qd, &smooth.qdd].map(|of| at(of, row));
-        gravity.push(needed(&q, &zero, &zero));
-        moving.push(needed(&q, &qd, &qdd));
-    }
+    let gravity = balance_of(&balance, &at_rest);
     let of_joint = |j: usize| {
         let column = |of: &dyn Fn(usize) -> f64| DVector::from_fn(rows, |row, _| of(row));
-        let weight = column(&|row| gravity[row][j]);
+        let weight = column(&|row| gravity[j][row]);
         let torque = column(&|row| smooth.tau[j][row]);
         let spread = |of: &DVector<f64>| of.variance().sqrt();
         if spread(&weight) < TELLS * spread(&torque) {
@@ -66,7 +64,7 @@ fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
         let varies = weight.variance();
         let columns = [
             weight,
-            column(&|row| moving[row][j] - gravity[row][j]),
+            column(&|row| moving[j][row] - gravity[j][row]),
             column(&|row| smooth.qd[j][row]),
             column(&|row| smooth.qd[j][row].signum()),
             column(&|_| 1.0),

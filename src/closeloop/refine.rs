@@ -4,7 +4,7 @@ use super::fitted::Fitted;
 use super::settings::RefineSettings;
 use super::space::Space;
 use super::study::Study;
-use crate::identify::{FitError, Values, deviations, uncertainty};
+use crate::identify::{FitError, Values, uncertainty};
 use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
@@ -66,13 +66,7 @@ impl Study<'_> {
     fn weighed_by(&self, fitted: &Fitted) -> Self {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
-        let residuals = self
-            .shooting
-            .residuals(&dynamics, &values, &fitted.fit.locals);
-        let shares = deviations(&residuals, self.declared.joints);
-        let noise: Vec<f64> = (self.shooting.noise.iter().zip(shares))
-            .map(|(noise, share)| noise * share)
-            .collect();
+        let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.locals);
         let mut study = self.again();
         study.weigh_by(&noise);
         study

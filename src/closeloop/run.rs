@@ -58,14 +58,14 @@ pub fn close_loop(
     };
     let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
     let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
-    let mut study = Study::audited(model, Space::Motion, &studied, of_train.clone(), &settings);
-    let space = space.unwrap_or_else(|| study.better_space(library.effects()));
-    if space == Space::Torque {
-        if model.torque_balance().is_none() {
-            let model = model.name.clone();
-            return Err(StudyError::NoTorques { model });
-        }
-        study = Study::audited(model, space, &studied, of_train.clone(), &settings);
+    if space == Some(Space::Torque) && model.torque_balance().is_none() {
+        let model = model.name.clone();
+        return Err(StudyError::NoTorques { model });
+    }
+    let study_in = |space| Study::audited(model, space, &studied, of_train.clone(), &settings);
+    let mut study = study_in(space.unwrap_or(Space::Motion));
+    if space.is_none() && study.is_prescribed(library.effects()) {
+        study = study_in(Space::Torque);
     }
     study.deadline = deadline;
     // Where nothing moves, anything could be found.
@@ -104,7 +104,7 @@ pub fn close_loop(
     let (findings, supported) =
         (findings.into_iter()).partition(|finding| finding.status == Status::Established);
     Ok(Outcome {
-        space,
+        space: study.space,
         verdict,
         reason,
         models: models_of(&study, refined),

@@ -236,15 +236,12 @@ impl<'a> Search<'a> {
     fn propose(&self, terms: &[WindowTerms]) -> Option<Step> {
         let normal = self.normal(terms);
         let step = self.bounded_solution(&normal)?;
-        let mut values = self.values.clone();
-        let mut taken = DVector::zeros(step.len());
-        for (i, &column) in self.layout.columns.iter().enumerate() {
-            let [low, high] = self.dynamics.parameters[column.parameter].bounds;
-            let before = self.values.get(column);
-            let after = (before + step[i]).clamp(low, high);
-            values.set(column, after);
-            taken[i] = after - before;
-        }
+        let columns = &self.layout.columns;
+        let values = self.values.moved(self.dynamics, columns, &step);
+        let taken = columns
+            .iter()
+            .map(|&column| values.get(column) - self.values.get(column));
+        let taken = DVector::from_iterator(step.len(), taken);
         let windows = normal.windows.iter().zip(&self.shooting.windows);
         let locals = windows.zip(&self.locals).map(|((part, window), local)| {
             let step = part.local_step(&taken.select_rows(self.layout.places(window)));

@@ -35,5 +35,5 @@ pub use outcome::{Fit, FitError, Termination};
 pub use sensitivity::Local;
 pub use shooting::Shooting;
 pub use sums::huber;
-pub use torques::{TorqueFit, deviations, fit_torques};
+pub use torques::{TorqueFit, fit_torques};
 pub use values::{Column, Own, Values};

@@ -230,6 +230,14 @@ impl<'l> Shooting<'l> {
         out
     }
 
+    /// Root mean square of what a model leaves on each joint, in the unit of the noise.
+    pub fn left_by(&self, dynamics: &Dynamics, values: &Values, locals: &[Vec<f64>]) -> Vec<f64> {
+        let residuals = self.residuals(dynamics, values, locals);
+        let shares = deviations(&residuals, dynamics.joints);
+        let noise = self.noise.iter().zip(shares);
+        noise.map(|(noise, share)| noise * share).collect()
+    }
+
     /// The Huber loss of each window at residual scale `scale`, and of its start state; infinite where the model diverges.
     pub fn costs(
         &self,
@@ -303,6 +311,21 @@ impl<'l> Shooting<'l> {
         all.sort_by_key(|(window, _)| *window);
         all.into_iter().map(|(_, terms)| terms).collect()
     }
+}
+
+/// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
+fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0.0_f64); joints];
+    for row in residuals
+        .iter()
+        .flat_map(|window| window.chunks_exact(joints))
+    {
+        for (sum, residual) in sums.iter_mut().zip(row) {
+            *sum = (sum.0 + residual * residual, sum.1 + 1.0);
+        }
+    }
+    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt().max(1e-12);
+    sums.into_iter().map(root).collect()
 }
 
 /// Half width of the cubics that tell start states, in s, one a log.

@@ -43,10 +43,7 @@ pub fn fit_torques<'l>(
         let locals = shooting.initial_locals(0);
         let (values, fitted) = fit(&shooting, &balance, &active, locals, None)?;
         let balance = values.put_into(&balance, logs);
-        let residuals = shooting.residuals(&balance, &values, &fitted.locals);
-        for (noise, share) in noise.iter_mut().zip(deviations(&residuals, model.joints)) {
-            *noise *= share;
-        }
+        noise = shooting.left_by(&balance, &values, &fitted.locals);
         model = model.at(&balance);
         found = Some((fitted, shooting));
     }
@@ -56,21 +53,6 @@ pub fn fit_torques<'l>(
         fit,
         shooting,
     })
-}
-
-/// Root mean square of each joint's residuals, `[window][row * joints + joint]`.
-pub fn deviations(residuals: &[Vec<f64>], joints: usize) -> Vec<f64> {
-    let mut sums = vec![(0.0, 0.0_f64); joints];
-    for row in residuals
-        .iter()
-        .flat_map(|window| window.chunks_exact(joints))
-    {
-        for (sum, residual) in sums.iter_mut().zip(row) {
-            *sum = (sum.0 + residual * residual, sum.1 + 1.0);
-        }
-    }
-    let root = |(squares, rows): (f64, f64)| (squares / rows.max(1.0)).sqrt().max(1e-12);
-    sums.into_iter().map(root).collect()
 }
 
 /// The same model where bodies that none can be have the values of the nearest that one can.

@@ -86,7 +86,7 @@ impl Values {
         moved
     }
 
-    pub(super) fn set(&mut self, column: Column, value: f64) {
+    fn set(&mut self, column: Column, value: f64) {
         let Some(log) = column.log else {
             self.common[column.parameter] = value;
             return;

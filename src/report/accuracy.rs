@@ -98,15 +98,19 @@ pub(super) fn torques(outcome: &Outcome) -> String {
         "| all, share of the logged torques | {declared:.2} % | {before:.2} % | {after:.2} % | {:.2} |",
         after / before.max(f64::MIN_POSITIVE)
     );
-    if let Some([low, high]) = reduction_ci95 {
-        let _ = writeln!(
-            out,
-            "\nThe effects remove {:.0} to {:.0} % of the fitted declared model's error (95 % interval, bootstrap over parts of the test logs).",
+    out += &removed(*reduction_ci95, "error");
+    out + "\n"
+}
+
+/// How much of an error of the fitted declared model the effects remove, where an interval is known.
+fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> String {
+    reduction_ci95.map_or_else(String::new, |[low, high]| {
+        format!(
+            "\nThe effects remove {:.0} to {:.0} % of the fitted declared model's {error} (95 % interval, bootstrap over parts of the test logs).\n",
             100.0 * low,
             100.0 * high
-        );
-    }
-    out + "\n"
+        )
+    })
 }
 
 pub(super) fn errors(outcome: &Outcome) -> String {
@@ -178,15 +182,9 @@ pub(super) fn errors(outcome: &Outcome) -> String {
             "\nNo test log holds a window of {horizon} s, so no error is given at that horizon."
         );
     }
-    if let Some([low, high]) = outcome.errors.reduction_ci95 {
-        let _ = writeln!(
-            out,
-            "\nThe effects remove {:.0} to {:.0} % of the fitted declared model's error at {} s (95 % interval, bootstrap over parts of the test logs).",
-            100.0 * low,
-            100.0 * high,
-            before.horizons_s[before.horizons_s.len() / 2]
-        );
-    }
+    let middle_s = before.horizons_s[before.horizons_s.len() / 2];
+    let error = format!("error at {middle_s} s");
+    out += &removed(outcome.errors.reduction_ci95, &error);
     out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
 }
 

@@ -74,14 +74,12 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
         .into_iter()
         .filter_map(|(role, label, model)| Some((role, label, needed_torques(model, log)?)))
         .collect();
-    let curve = |label: &str, role: Role, of: &NeededTorques, values: &[Vec<f64>], joint: Joint| {
-        let points = of.time.iter().copied().zip(values[joint].iter().copied());
-        Track {
+    let curve =
+        |label: &str, role: Role, of: &NeededTorques, values: &[Vec<f64>], joint: Joint| Track {
             label: label.to_owned(),
             role,
-            segments: vec![points.take_while(|(t, _)| *t <= end(log)).collect()],
-        }
-    };
+            segments: vec![beginning(log, &of.time, &values[joint])],
+        };
     let panel = |joint: Joint| {
         let kind = kind(outcome, joint);
         let logged = needed.first();
@@ -109,24 +107,23 @@ fn kind(outcome: &Outcome, joint: Joint) -> JointKind {
     }
 }
 
-fn end(log: &Log) -> f64 {
-    log.time.first().map_or(0.0, |start| start + SHOWN_S)
+/// The points of a curve along a log that are shown.
+fn beginning(log: &Log, time: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    let end = log.time.first().map_or(0.0, |start| start + SHOWN_S);
+    let points = time.iter().copied().zip(values.iter().copied());
+    points.take_while(|(t, _)| *t <= end).collect()
 }
 
 fn measured(log: &Log, joint: Joint) -> Track {
-    let points = log.time.iter().copied().zip(log.q[joint].iter().copied());
     Track {
         label: "measured".into(),
         role: Role::Measured,
-        segments: vec![points.take_while(|(t, _)| *t <= end(log)).collect()],
+        segments: vec![beginning(log, &log.time, &log.q[joint])],
     }
 }
 
 fn predicted(dynamics: &Dynamics, log: &Log, joint: Joint, horizon: f64) -> Vec<Vec<(f64, f64)>> {
-    let shown = |trace: Trace| -> Vec<(f64, f64)> {
-        let points = trace.time.into_iter().zip(trace.q[joint].iter().copied());
-        points.take_while(|(t, _)| *t <= end(log)).collect()
-    };
+    let shown = |trace: Trace| beginning(log, &trace.time, &trace.q[joint]);
     let pieces = traces(dynamics, log, horizon).into_iter().map(shown);
     pieces.filter(|piece| piece.len() > 1).collect()
 }

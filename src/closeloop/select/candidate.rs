@@ -26,10 +26,9 @@ pub fn candidates(
 /// These effects on every joint where each can act and be observed.
 pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    for effect in effects {
+    for effect in effects.iter().filter(|effect| study.space.shows(effect)) {
         for joint in Joint::all(study.declared.joints) {
             if is_driven_enough(study, effect, joint)
-                && study.space.shows(effect)
                 && study.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);

@@ -1,6 +1,7 @@
+use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::folds::{Folds, left_out_losses, losses_by, steps_without};
+use super::folds::{Folds, losses_by, steps_without};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::space::Space;
 use crate::closeloop::study::Study;
@@ -19,13 +20,7 @@ pub struct Losses {
 impl Losses {
     /// On stretches that are left out in the study's folds.
     pub fn of(study: &Study<'_>, fitted: &Fitted) -> Self {
-        match study.space {
-            Space::Motion => Self {
-                parts: 1,
-                values: left_out_losses(study, &fitted.fit),
-            },
-            Space::Torque => Self::by(study, &Folds::of(study), fitted),
-        }
+        Self::by(study, &Folds::of(study), fitted)
     }
 
     /// The same with given folds.
@@ -61,7 +56,7 @@ pub fn of_torques(
     let (fit, joints) = (&fitted.fit, study.declared.joints);
     let dynamics = study.compiled(&fitted.model);
     let values = Values::of(&dynamics, study.logs);
-    let of_group = |(group, step): (usize, &nalgebra::DVector<f64>)| {
+    let of_group = |(group, step): (usize, &DVector<f64>)| {
         let values = values.moved(&dynamics, &fit.columns, step);
         let all = study.shooting.windows.iter().zip(&folds.stretches);
         let own = all.filter(|(_, stretch)| folds.groups[**stretch] == group);

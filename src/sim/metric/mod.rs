@@ -11,5 +11,6 @@ pub use assessment::{Assessment, OpenLoop, WindowError};
 pub use open_loop::{assess, window_count};
 pub(crate) use open_loop::{errors_in, windows};
 pub use summary::{Summary, summarise};
+pub(crate) use torque::balance_of;
 pub use torque::{NeededTorques, TorqueError, needed_torques, torque_error};
 pub use trace::{Trace, traces};

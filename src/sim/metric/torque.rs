@@ -71,10 +71,15 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
     let logged = Smooth::of(log);
     let filtered = (!in_log.filters.is_empty())
         .then(|| Smooth::of(&Commands::of_log(&*in_log, log).acting_on(log)));
-    let acting = filtered.as_ref().unwrap_or(&logged);
-    let values = in_log.values();
-    let mut tape = in_log.program.tape::<f64, LANES>();
-    let mut found = vec![vec![0.0; acting.rows()]; log.joints()];
+    let found = balance_of(&in_log, filtered.as_ref().unwrap_or(&logged));
+    (logged, found)
+}
+
+/// What a balance of torques gives along a smoothed motion and its torques, `[joint][row]`.
+pub(crate) fn balance_of(balance: &Dynamics, acting: &Smooth) -> Vec<Vec<f64>> {
+    let values = balance.values();
+    let mut tape = balance.program.tape::<f64, LANES>();
+    let mut found = vec![vec![0.0; acting.rows()]; balance.joints];
     for first in (0..acting.rows()).step_by(LANES) {
         let rows: [usize; LANES] = std::array::from_fn(|k| (first + k).min(acting.rows() - 1));
         let of_rows = |channel: &[f64]| Row(rows.map(|row| channel[row]));
@@ -104,7 +109,7 @@ fn differences(balance: &Dynamics, log: &Log) -> (Smooth, Vec<Vec<f64>>) {
             }
         }
     }
-    (logged, found)
+    found
 }
 
 /// Sums of squares.
