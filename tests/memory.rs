@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use residyn::data::Log;
+use residyn::data::{Log, Quantity};
 use residyn::expr::SignForm;
 use residyn::identify::{Shooting, cut, fit, uncertainty};
 use residyn::lanes::Row;
@@ -310,7 +310,8 @@ fn an_invalid_filter_is_refused_with_its_line() {
 
 #[test]
 fn expressions_of_filters_state_what_they_do_to_the_command() {
-    let told = |name: &str, own: &str| effect(name, 0.01).expression(&[own.to_owned()]);
+    let told =
+        |name: &str, own: &str| effect(name, 0.01).expression(&[own.to_owned()], Quantity::Torque);
     assert_eq!(told("actuator_delay", "d1"), "tau1(t - d1)");
     assert_eq!(
         told("actuator_lag", "T1"),

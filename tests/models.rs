@@ -94,6 +94,11 @@ pub fn all() -> Vec<(&'static str, ExportModel)> {
         ),
         ("cartpole", physics(&system("cartpole", ""), rk4, 0.02)),
         (
+            "servo",
+            physics(&system("servo", PENDULUM_EFFECTS), rk4, 0.01),
+        ),
+        ("motor", physics(&system("motor", ""), rk4, 0.01)),
+        (
             "cartpole_hybrid",
             hybrid(&system("cartpole", ""), &residuals[1], rk4, 0.02),
         ),

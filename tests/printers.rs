@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use residyn::data::Joint;
+use residyn::data::{Joint, Quantity};
 use residyn::expr::{Graph, Node, Program, Scope, SignForm, parse};
 use residyn::model::{Dynamics, Library};
 
@@ -187,7 +187,7 @@ fn an_effects_expression_names_its_joint_and_reads_back() {
                 let fitted = fitted(effect, joint, &values);
                 let taken: Vec<&str> = system.parameters.iter().map(|p| p.name.as_str()).collect();
                 let own = fitted.parameter_names(&taken);
-                let formula = parse(&fitted.expression(&own)).unwrap();
+                let formula = parse(&fitted.expression(&own, Quantity::Torque)).unwrap();
                 for name in formula.names() {
                     let state = ["q", "qd", "tau", "load"].map(|s| Joint::at(joint).name(s));
                     let known = own.iter().chain(&state).any(|known| known == name);

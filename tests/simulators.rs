@@ -135,6 +135,10 @@ fn driven() -> Vec<(&'static str, ExportModel)> {
     let constant = |joint| effect("constant_torque", joint, "tau_0 = -0.4");
     vec![
         (
+            "servo with a gain",
+            portable("servo", Integrator::RK4, &[gain(1), spring(1)]),
+        ),
+        (
             "gain, then limit",
             portable(
                 "pendulum",

@@ -12,6 +12,7 @@ mod clients;
 mod common;
 mod control;
 mod demo;
+mod drives;
 mod effects;
 mod experiments;
 mod export;

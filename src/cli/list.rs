@@ -11,7 +11,7 @@ use crate::formats::FORMATS;
 use crate::model::{Effect, Library, Model};
 use crate::plant::Plant;
 
-/// List systems, effects, plants, tasks or formats
+/// List systems, effects, drives, plants, tasks or formats
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  residyn list effects")]
 pub(super) struct Arguments {
@@ -26,6 +26,7 @@ pub(super) struct Arguments {
 enum What {
     Systems,
     Effects,
+    Drives,
     Plants,
     Tasks,
     Formats,
@@ -49,6 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (text, value) = match arguments.what {
         What::Systems => systems(&library)?,
         What::Effects => effects(library.effects()),
+        What::Drives => drives(),
         What::Plants => plants(&library)?,
         What::Tasks => tasks()?,
         What::Formats => formats(),
@@ -93,6 +95,27 @@ fn effects(effects: &[Effect]) -> (String, serde_json::Value) {
             "parameters": effect.parameters.iter().map(parameter).collect::<Vec<_>>(),
             "contains": effect.contains, "confused_with": effect.confused_with, "shown_by": effect.shown_by,
         }));
+    }
+    (text, values.into())
+}
+
+fn drives() -> (String, serde_json::Value) {
+    let (mut text, mut values) = (String::new(), Vec::new());
+    for drive in Library::drives() {
+        let _ = writeln!(
+            text,
+            "{}: {}\n    {}",
+            drive.name,
+            drive.about,
+            drive.text()
+        );
+        for [name, unit, about] in drive.parameters() {
+            let _ = writeln!(text, "    {name} [{unit}] {about}");
+        }
+        let parameter =
+            |[name, unit, about]: [&str; 3]| json!({"name": name, "unit": unit, "about": about});
+        let parameters: Vec<_> = drive.parameters().map(parameter).collect();
+        values.push(json!({"name": drive.name, "about": drive.about, "torque": drive.text(), "parameters": parameters}));
     }
     (text, values.into())
 }

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use serde_json::json;
 
@@ -8,7 +8,7 @@ use super::{Answer, Common, inputs};
 use crate::files::write_whole;
 use crate::formats::{FORMATS, Format, RobotReader};
 use crate::model::chain::model_text;
-use crate::model::{Library, Model};
+use crate::model::{Library, Model, ReadyDrive};
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]
@@ -20,6 +20,9 @@ pub(super) struct Arguments {
     /// is held where the file draws it
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
+    /// What drives the joints, where their logs hold commands in place of torques: one of `residyn list drives`
+    #[arg(long, value_name = "NAME")]
+    drive: Option<String>,
     /// The model file to write; standard output if not given
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -80,7 +83,10 @@ impl FromArgMatches for Description {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Description { reader, file } = &arguments.description;
-    let chain = (reader.read)(file, arguments.tip.as_deref())?;
+    let mut chain = (reader.read)(file, arguments.tip.as_deref())?;
+    if let Some(name) = &arguments.drive {
+        chain.drive = Some(ReadyDrive::find(Library::drives(), name).map_err(|why| anyhow!(why))?);
+    }
     let text = model_text(&chain);
     let name = Path::new(&chain.name);
     let model = Model::from_text(name, &text, Library::built_in().effects())?;

@@ -1,7 +1,9 @@
 use thiserror::Error;
 
 use super::learn::LearnError;
+use crate::data::Quantity;
 use crate::identify::FitError;
+use crate::model::Model;
 
 /// Why the loop could not be closed at all.
 #[derive(Debug, Error)]
@@ -18,6 +20,11 @@ pub enum StudyError {
     )]
     NoTorques { model: String },
     #[error(
+        "{model} is driven by commands, and its logs show no torques that could be compared; compare the motion, with --errors \
+         motion or without --errors"
+    )]
+    Commanded { model: String },
+    #[error(
         "calibrating simulates motion, and here torques were compared: leave --calibrate out, or compare the motion with \
          --errors motion"
     )]
@@ -26,4 +33,15 @@ pub enum StudyError {
     Fit(#[from] FitError),
     #[error(transparent)]
     Learn(#[from] LearnError),
+}
+
+impl StudyError {
+    /// Why the torques of a model cannot be compared with those of logs.
+    pub(super) fn without_torques(model: &Model) -> Self {
+        let name = model.name.clone();
+        match model.driven_by() {
+            Quantity::Command => Self::Commanded { model: name },
+            _ => Self::NoTorques { model: name },
+        }
+    }
 }

@@ -95,10 +95,25 @@ pub fn find(
     progress: &mut Observer<'_>,
 ) -> Result<Found, StudyError> {
     progress(Stage::Fit.into());
-    let before = study.fit_declared(library.effects())?;
+    let mut before = study.fit_declared(library.effects())?;
     let mut chosen = choose(study, library, &before, progress, |search| {
         search.select(before.clone())
     });
+    if study.space == Space::Motion
+        && let Some(widths) = study.wider_reversal(&chosen.after)
+    {
+        let narrowest = Loss::of(study, &chosen.after).total();
+        let narrow = std::mem::replace(&mut study.sign_widths, widths);
+        let wide = study.fit_declared(library.effects())?;
+        let other = choose(study, library, &wide, progress, |search| {
+            search.select(wide.clone())
+        });
+        if Loss::of(study, &other.after).total() < narrowest {
+            (before, chosen) = (wide, other);
+        } else {
+            study.sign_widths = narrow;
+        }
+    }
     progress(Stage::Remainder.into());
     let mut left = unexplained(study, library.probes(), &before, &chosen.after, rng);
     if (left.is_significant() || chosen.failure.is_some())
@@ -196,20 +211,20 @@ fn choose(
 }
 
 /// Losses of a model on stretches left out of its fit, in one unit for all models: a fit's own is its scale.
-struct Loss {
+pub(super) struct Loss {
     losses: Losses,
     unit: f64,
 }
 
 impl Loss {
-    fn of(study: &Study<'_>, model: &Fitted) -> Self {
+    pub fn of(study: &Study<'_>, model: &Fitted) -> Self {
         Self {
             losses: Losses::of(study, model),
             unit: model.fit.scale.powi(2),
         }
     }
 
-    fn total(&self) -> f64 {
+    pub fn total(&self) -> f64 {
         self.losses.total() * self.unit
     }
 

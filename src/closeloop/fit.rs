@@ -7,7 +7,8 @@ use super::space::Space;
 use super::start::around;
 use super::study::Study;
 use crate::identify::{
-    FitError, Identifiability, Shooting, Values, fit, fit_torques, identifiability,
+    FitError, Identifiability, Open, Shooting, Values, fit, fit_torques, identifiability, open,
+    uncertainty,
 };
 use crate::model::{Effect, FittedEffect, Model};
 
@@ -83,7 +84,7 @@ impl Study<'_> {
             let found = fit_torques(&model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))
         };
-        let shares = self.settings.fit.torque_sign_widths;
+        let shares = self.settings.fit.sign_widths;
         let tried: Vec<(Vec<f64>, Vec<f64>)> =
             shares.iter().map(fitted).collect::<Result<_, FitError>>()?;
         for (j, width) in self.sign_widths.iter_mut().enumerate() {
@@ -158,13 +159,10 @@ impl Study<'_> {
     pub(super) fn identifiability_of(&self, fitted: &Fitted) -> Identifiability {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
-        let declared = self.declared.parameters.len();
+        let end = self.end_of_declared();
         let bodies = self.declared.inertias().concat();
-        // What nothing tells of a body stays as it is declared, and so does the body.
-        let may_be_held = |parameter| parameter < declared && !bodies.contains(&parameter);
-        let mut verdict = identifiability(&dynamics, may_be_held, &values, &fitted.fit);
-        let carried = self.declared.effects.len().checked_sub(1);
-        let end = carried.map_or(declared, |last| fitted.model.place_of(last).end);
+        let readiness = |parameter| self.readiness(parameter);
+        let mut verdict = identifiability(&dynamics, readiness, &values, &fitted.fit);
         let known = verdict.hold.len() + verdict.determined;
         // Combinations that nothing tells and nothing holds are of bodies, or else of effects.
         let open = if bodies.is_empty() {
@@ -176,5 +174,27 @@ impl Study<'_> {
         verdict.free = columns.filter(|column| column.parameter < end).count();
         verdict.determined = verdict.free.saturating_sub(verdict.hold.len() + open);
         verdict
+    }
+
+    /// What no stretch of the logs tells of declared parameters alike, of a fit in which others are held already.
+    pub(super) fn open_in(&self, fitted: &Fitted) -> Option<Open> {
+        let dynamics = self.compiled(&fitted.model);
+        let values = Values::of(&dynamics, self.logs);
+        let covariance = uncertainty(&self.shooting, &fitted.fit).covariance;
+        let readiness = |parameter| self.readiness(parameter);
+        open(&dynamics, readiness, &values, &fitted.fit, &covariance)
+    }
+
+    /// Index behind the parameters of the declared equations and of the effects that the file carries.
+    fn end_of_declared(&self) -> usize {
+        self.declared.all_parameters().len()
+    }
+
+    /// Parameters of the equations are held before those of effects that the file carries, and nothing else is. What nothing
+    /// tells of a body stays as it is declared, and so does the body.
+    fn readiness(&self, parameter: usize) -> Option<usize> {
+        let mut bodies = self.declared.inertias().into_iter().flatten();
+        let is_held = parameter < self.end_of_declared() && bodies.all(|part| part != parameter);
+        is_held.then(|| usize::from(parameter >= self.declared.parameters.len()))
     }
 }

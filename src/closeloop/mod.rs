@@ -19,6 +19,7 @@ mod pushes;
 mod refine;
 mod remainder;
 mod request;
+mod reversal;
 mod run;
 mod score;
 mod select;

@@ -4,7 +4,7 @@ use super::fitted::Fitted;
 use super::settings::RefineSettings;
 use super::space::Space;
 use super::study::Study;
-use crate::identify::{FitError, Values, uncertainty};
+use crate::identify::{FitError, Identifiability, Values, uncertainty};
 use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
@@ -16,28 +16,41 @@ pub(super) struct Refined<'a> {
     pub before: Fitted,
     /// The chosen model, with 95 % intervals.
     pub after: Fitted,
+    /// What the logs determine.
+    pub identifiability: Identifiability,
     /// Why the steps are not fine, if they are not.
     pub failure: Option<FitError>,
 }
 
 /// Estimate the declared and the chosen model in fine steps, or with the noise of the torques that the chosen one leaves.
 pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) -> Refined<'a> {
-    let fine = match study.space {
+    let mut fine = match study.space {
         Space::Motion => study.refined(),
         Space::Torque => study.weighed_by(chosen),
     };
-    let (study, before, mut after, failure) =
+    let mut identifiability = study.identifiability.clone();
+    let (study, before, mut after, failure) = loop {
         match rayon::join(|| fine.estimate(declared), || fine.estimate(chosen)) {
-            (Ok(before), Ok(after)) => (fine, before, after, None),
-            (Err(error), _) | (_, Err(error)) => {
-                (study.again(), declared.clone(), chosen.clone(), Some(error))
+            (Ok(before), Ok(after)) => {
+                // What a single stretch tells is not determined: another one might tell otherwise.
+                let Some(open) = fine.open_in(&after) else {
+                    break (fine, before, after, None);
+                };
+                fine.held.push(open.hold);
+                identifiability.leave(open);
             }
-        };
+            (Err(error), _) | (_, Err(error)) => {
+                let (before, after) = (declared.clone(), chosen.clone());
+                break (study.again(), before, after, Some(error));
+            }
+        }
+    };
     after.model = with_intervals(&study, &after, &chosen.model);
     Refined {
         study,
         before,
         after,
+        identifiability,
         failure,
     }
 }
@@ -49,7 +62,14 @@ impl Study<'_> {
     pub fn refined(&self) -> Self {
         let RefineSettings { step_s, narrower } = self.settings.refine;
         let narrower = self.declared.sign_width.as_ref().map_or(narrower, |_| 1.0);
-        let sign_widths: Vec<f64> = self.sign_widths.iter().map(|w| narrower * w).collect();
+        let of_joint =
+            |(width, top): (&f64, &f64)| match *width > self.settings.fit.sign_width * top {
+                // Friction of the rig reverses over it.
+                true => *width,
+                false => narrower * width,
+            };
+        let widths = self.sign_widths.iter().zip(&self.top_speed);
+        let sign_widths: Vec<f64> = widths.map(of_joint).collect();
         let windows = self.shooting.windows.clone();
         let shooting = self.shooting.over(windows);
         Self {

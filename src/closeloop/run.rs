@@ -59,8 +59,7 @@ pub fn close_loop(
     let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
     let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
     if space == Some(Space::Torque) && model.torque_balance().is_none() {
-        let model = model.name.clone();
-        return Err(StudyError::NoTorques { model });
+        return Err(StudyError::without_torques(model));
     }
     let study_in = |space| Study::audited(model, space, &studied, of_train.clone(), &settings);
     let mut study = study_in(space.unwrap_or(Space::Motion));
@@ -75,6 +74,7 @@ pub fn close_loop(
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
     let refined = refine(&study, &found.before, &found.chosen.after);
+    study.identifiability = refined.identifiability.clone();
     let remainder = remainder(&study, &found, &refined);
     let mut of_train = of_train;
     tell_gravity(&study, &mut of_train);

@@ -96,9 +96,9 @@ settings! {
         sign_width: f64 = 5e-4,
         /// Torques are compared where so many times more of the motion than of them is left unexplained.
         prescribed: f64 = 10.0,
-        /// Where torques are compared, which are smoothed like the motion, the share is that of these with which the usual
-        /// friction fits a joint best.
-        torque_sign_widths: [f64; 5] = [5e-4, 5e-3, 1e-2, 2e-2, 5e-2],
+        /// Wider ones that are tried: by the usual friction where torques are compared, which are smoothed like the motion, and by
+        /// the chosen effects where the motion is.
+        sign_widths: [f64; 5] = [5e-4, 5e-3, 1e-2, 2e-2, 5e-2],
     }
 }
 

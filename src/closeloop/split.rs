@@ -107,6 +107,7 @@ pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
         q: cut(&log.q),
         qd: cut(&log.qd),
         tau: cut(&log.tau),
+        driven_by: log.driven_by,
         masked: log.masked.iter().map(marked).collect(),
         filled: marked(&log.filled),
         leave_out: log.leave_out.clone(),

@@ -20,9 +20,10 @@ pub struct Study<'a> {
     pub(super) audits: OnceLock<Vec<Audit>>,
     /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
-    /// Top speed and top torque of each joint.
+    /// Top speed, top torque and largest torque or command in the logs of each joint.
     pub top_speed: Vec<f64>,
     pub top_torque: Vec<f64>,
+    pub top_driving: Vec<f64>,
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
@@ -89,12 +90,11 @@ impl<'a> Study<'a> {
                 .collect()
         };
         let top_speed = top(&|l, j| audits[l].joints[j].fast_rad_s);
-        let top_torque = top(&|l, j| {
-            audits[l].joints[j]
-                .tau
-                .max
-                .max(-audits[l].joints[j].tau.min)
-        });
+        let torques: Vec<Vec<Vec<f64>>> =
+            logs.iter().map(|log| declared.drive_torques(log)).collect();
+        let largest = |channel: &[f64]| channel.iter().fold(0.0, |top: f64, x| top.max(x.abs()));
+        let top_torque = top(&|l, j| largest(&torques[l][j]));
+        let top_driving = top(&|l, j| largest(&logs[l].tau[j]));
         // Encoders that are finer than their noise show it; coarse ones add the error of rounding.
         let noise = top(&|l, j| {
             let channel = &audits[l].joints[j].q;
@@ -128,6 +128,7 @@ impl<'a> Study<'a> {
             shooting,
             top_speed,
             top_torque,
+            top_driving,
             deadline: None,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
@@ -170,6 +171,7 @@ impl<'a> Study<'a> {
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
+            top_driving: self.top_driving.clone(),
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
             deadline: self.deadline,

@@ -35,7 +35,7 @@ pub fn drive(
     rng: &mut impl Rng,
 ) -> Result<Stretch, PlantError> {
     let mut stretch = Stretch {
-        log: Log::empty(rig.state().len() / 2),
+        log: rig.empty_log(),
         states: Vec::new(),
     };
     for _ in 0..steps {

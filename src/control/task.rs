@@ -29,7 +29,8 @@ pub struct Task {
     /// Half the width of a uniform distribution around each of them; none where not given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub start_spread: Vec<f64>,
-    /// Lowest and highest torque of each joint, in N m (or N).
+    /// Lowest and highest torque of each joint, in N m (or N), or command of its drive.
+    #[serde(alias = "command")]
     pub torque: Vec<[f64; 2]>,
     /// Steps of a plan that are executed before the next: the receding horizon RH.
     pub replan: usize,

@@ -3,13 +3,18 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
+use serde::Serialize;
+
 /// What a channel measures, and with it the units that its columns may have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Quantity {
     Time,
     Angle,
     Velocity,
     Torque,
+    /// Of a drive that makes a torque of it: a position target, volts, a duty cycle, amperes.
+    Command,
 }
 
 /// A unit and its size in the channel's own unit.
@@ -23,6 +28,7 @@ impl Quantity {
             Self::Angle => "q",
             Self::Velocity => "qd",
             Self::Torque => "tau",
+            Self::Command => "cmd",
         }
     }
 
@@ -46,6 +52,20 @@ impl Quantity {
                 ("mm/s", 1e-3),
             ],
             Self::Torque => &[("N m", 1.0), ("mN m", 1e-3), ("N", 1.0)],
+            Self::Command => &[
+                ("rad", 1.0),
+                ("deg", PI / 180.0),
+                ("rev", TAU),
+                ("m", 1.0),
+                ("mm", 1e-3),
+                ("rad/s", 1.0),
+                ("rpm", TAU / 60.0),
+                ("V", 1.0),
+                ("mV", 1e-3),
+                ("A", 1.0),
+                ("mA", 1e-3),
+                ("%", 1e-2),
+            ],
         }
     }
 

@@ -8,7 +8,7 @@ use super::error::LogError;
 /// Columns in which a log file holds time, angles, velocities and torques, and their units.
 ///
 /// This is the `[columns]` table of a model file. An empty list stands for the standard names
-/// (`q1..`, `qd1..`, `tau1..`) in standard units, so that a model file has to name only what differs.
+/// (`q1..`, `qd1..`, `tau1..` or `cmd1..`) in standard units, so that a model file has to name only what differs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     pub time: Column,
@@ -16,8 +16,10 @@ pub struct Columns {
     pub q: Vec<Column>,
     /// Joint velocities, joint 1 first; `None` where they are to come from the angles.
     pub qd: Option<Vec<Column>>,
-    /// Joint torques, joint 1 first.
+    /// Joint torques or commands of the drives, joint 1 first.
     pub tau: Vec<Column>,
+    /// Which of the two they are: [`Quantity::Torque`] or [`Quantity::Command`].
+    pub driven_by: Quantity,
     /// Names of the joints, if they have any. A standard column that a header lacks may be called by its joint's: `q_elbow`
     /// for `q2`.
     pub joint_names: Vec<String>,
@@ -31,18 +33,20 @@ impl Default for Columns {
             q: vec![],
             qd: Some(vec![]),
             tau: vec![],
+            driven_by: Quantity::Torque,
             joint_names: vec![],
         }
     }
 }
 
 impl Columns {
-    /// The standard columns `time`, `q1..`, `qd1..`, `tau1..` for a number of joints.
-    pub fn standard(joints: usize) -> Self {
+    /// The standard columns `time`, `q1..`, `qd1..`, and `tau1..` or `cmd1..`, for a number of joints.
+    pub fn standard(joints: usize, driven_by: Quantity) -> Self {
         Self {
             q: numbered("q", joints),
             qd: Some(numbered("qd", joints)),
-            tau: numbered("tau", joints),
+            tau: numbered(driven_by.key(), joints),
+            driven_by,
             ..Self::default()
         }
     }
@@ -65,7 +69,7 @@ impl Columns {
             Quantity::Time => self.time.to_string(),
             Quantity::Angle => list(&self.q),
             Quantity::Velocity => list(self.qd.as_deref().unwrap_or_default()),
-            Quantity::Torque => list(&self.tau),
+            Quantity::Torque | Quantity::Command => list(&self.tau),
         };
         format!("{} = {value}", quantity.key())
     }
@@ -91,7 +95,8 @@ impl Columns {
             time: self.time.clone(),
             q: list("q", &self.q)?,
             qd: self.qd.as_ref().map(|qd| list("qd", qd)).transpose()?,
-            tau: list("tau", &self.tau)?,
+            tau: list(self.driven_by.key(), &self.tau)?,
+            driven_by: self.driven_by,
             joint_names: self.joint_names.clone(),
         })
     }
@@ -102,7 +107,7 @@ impl Columns {
         let lists = [
             ("q", Some(&mut self.q)),
             ("qd", self.qd.as_mut()),
-            ("tau", Some(&mut self.tau)),
+            (self.driven_by.key(), Some(&mut self.tau)),
         ];
         for (stem, list) in lists {
             let named = list.into_iter().flatten().zip(&self.joint_names);
@@ -133,8 +138,8 @@ pub(super) struct Cell {
     pub wrapped: bool,
 }
 
-/// Words in the names of columns that hold torques, and of those that hold velocities.
-const LIKE_TORQUE: &[&str] = &["tau", "torque", "effort"];
+/// Words in the names of columns that hold torques or commands, and of those that hold velocities.
+const LIKE_DRIVEN: &[&str] = &["tau", "torque", "effort", "cmd", "command"];
 const LIKE_VELOCITY: &[&str] = &["qd", "dq", "vel", "speed", "omega", "rpm", "dot"];
 
 /// The header of a file, and its line.
@@ -164,12 +169,13 @@ impl Header<'_> {
         let columns = columns.completed(joints, self.path)?;
         let standard = Columns {
             joint_names: columns.joint_names.clone(),
-            ..Columns::standard(joints)
+            ..Columns::standard(joints, columns.driven_by)
         };
         if columns == standard {
             self.check_joint_count(joints)?;
         }
-        let passive = columns.tau == standard.tau && !self.has_one_like(LIKE_TORQUE);
+        let is_torque = columns.driven_by == Quantity::Torque;
+        let passive = is_torque && columns.tau == standard.tau && !self.has_one_like(LIKE_DRIVEN);
         let still = columns.qd == standard.qd && !self.has_one_like(LIKE_VELOCITY);
         let columns = columns.renamed_for(&self.names);
         let all = |list: &[Column], quantity| {
@@ -182,7 +188,7 @@ impl Header<'_> {
             time: self.find(&columns.time, Quantity::Time, &columns)?,
             q: all(&columns.q, Quantity::Angle)?,
             qd: qd.map(|qd| all(qd, Quantity::Velocity)).transpose()?,
-            tau: tau.map(|tau| all(tau, Quantity::Torque)).transpose()?,
+            tau: tau.map(|tau| all(tau, columns.driven_by)).transpose()?,
             ignored: self.others(&columns),
         })
     }
@@ -211,7 +217,8 @@ impl Header<'_> {
         let has = |name: String| self.names.contains(&name);
         let header = (1..).take_while(|joint| has(format!("q{joint}"))).count();
         let next = header + 1;
-        let next_is_absent = !has(format!("qd{next}")) && !has(format!("tau{next}"));
+        let driven = [Quantity::Torque, Quantity::Command].map(|q| format!("{}{next}", q.key()));
+        let next_is_absent = !has(format!("qd{next}")) && !driven.into_iter().any(has);
         if header > joints || (0 < header && header < joints && next_is_absent) {
             return Err(LogError::JointCount {
                 path: self.path.to_owned(),
@@ -272,6 +279,11 @@ impl Header<'_> {
             Quantity::Time => format!("time = {example:?}"),
             Quantity::Velocity => {
                 format!("qd = [{example:?}], or qd = [] to take velocities from the angles")
+            }
+            Quantity::Torque if self.names.iter().any(|name| name == "cmd1") => {
+                return "the log has commands, cmd1: say in [drive] of the model file what torque they make, \
+                        tau1 = \"kp*(cmd1 - q1) - kd*qd1\" for instance; `residyn list drives` shows ready ones"
+                    .to_owned();
             }
             list => format!("{} = [{example:?}]", list.key()),
         };

@@ -151,6 +151,7 @@ fn same_path(a: &Path, b: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Quantity;
 
     fn parse(text: &str) -> Result<(f64, f64), LeaveOutError> {
         let LeaveOut { interval, .. } = text.parse()?;
@@ -164,6 +165,7 @@ mod tests {
             q: vec![],
             qd: vec![],
             tau: vec![],
+            driven_by: Quantity::Torque,
             masked: vec![],
             filled: vec![],
             leave_out: vec![],

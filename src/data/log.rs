@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::column::Quantity;
 use super::columns::Columns;
 use super::error::{CellFault, LogError};
 use super::jumps::{bridge, rows_that_jump};
@@ -52,8 +53,10 @@ pub struct Log {
     pub q: Vec<Vec<f64>>,
     /// Joint velocities \[rad/s\] as the rig reports them.
     pub qd: Vec<Vec<f64>>,
-    /// Joint torques \[N m\]; row i acts from `time[i]` to `time[i + 1]`.
+    /// What drives the joints: torques \[N m\] or commands; row i acts from `time[i]` to `time[i + 1]`.
     pub tau: Vec<Vec<f64>>,
+    /// Which of the two: [`Quantity::Torque`] or [`Quantity::Command`].
+    pub driven_by: Quantity,
     /// Rows whose angle jumps and is not to be fitted, `[joint]`, in rising order. The angle there is what the rows around
     /// tell. May be empty: none in a log as it is read.
     pub masked: Vec<Vec<usize>>,
@@ -67,7 +70,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// A log with this number of joints and no row, for recording.
+    /// A log with this number of joints and no row, for recording torques.
     pub fn empty(joints: usize) -> Self {
         Self {
             path: PathBuf::new(),
@@ -75,6 +78,7 @@ impl Log {
             q: vec![Vec::new(); joints],
             qd: vec![Vec::new(); joints],
             tau: vec![Vec::new(); joints],
+            driven_by: Quantity::Torque,
             masked: vec![Vec::new(); joints],
             filled: Vec::new(),
             leave_out: Vec::new(),
@@ -149,7 +153,7 @@ impl Log {
         log
     }
 
-    /// Writes the log as CSV with the standard header `time,q1..,qd1..,tau1..`.
+    /// Writes the log as CSV with the standard header `time,q1..,qd1..,tau1..`, or `cmd1..`.
     ///
     /// Every number is the shortest text that reads back as the same number. The text goes to a
     /// temporary name in the same folder that is renamed when complete, so `path` never holds half a
@@ -173,7 +177,7 @@ impl Log {
     }
 
     fn check_finite(&self, path: &Path) -> Result<(), LogError> {
-        let names = Columns::standard(self.joints());
+        let names = Columns::standard(self.joints(), self.driven_by);
         for (column, values) in names.in_file_order().zip(self.columns()) {
             if let Some(row) = values.iter().position(|value| !value.is_finite()) {
                 return Err(LogError::Cell {
@@ -189,7 +193,7 @@ impl Log {
     }
 
     fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {
-        let names = Columns::standard(self.joints());
+        let names = Columns::standard(self.joints(), self.driven_by);
         let header: Vec<&str> = names.in_file_order().map(|column| &*column.name).collect();
         writeln!(out, "{}", header.join(","))?;
         for row in 0..self.rows() {
@@ -218,6 +222,7 @@ mod tests {
             q: vec![vec![1.0, -1e-300, 3.5], vec![0.1, 0.2, 1.0 / 3.0]],
             qd: vec![vec![0.0; 3], vec![1e22, 0.0, -7.25]],
             tau: vec![vec![0.0; 3], vec![0.5; 3]],
+            driven_by: Quantity::Torque,
             masked: vec![vec![]; 2],
             filled: vec![],
             leave_out: vec![],

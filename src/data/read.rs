@@ -107,6 +107,7 @@ impl Table<'_> {
                 Some(tau) => channel(tau)?,
                 None => vec![vec![0.0; time.len()]; joints],
             },
+            driven_by: columns.driven_by,
             masked: vec![vec![]; joints],
             filled: vec![],
             q,

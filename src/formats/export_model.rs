@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::ExportError;
 use super::verify::{Predictions, ReferenceModel, Samples, draw};
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 use crate::expr::Op;
 use crate::model::{
     CommandFilter, Dynamics, MlpWeights, Model, ModelWeights, NetworkError, Parameter, nothing_but,
@@ -91,9 +91,10 @@ impl ExportModel {
         Self::new(system, numbers, integrator, step_s, origin)
     }
 
-    /// The equations without effects.
+    /// The equations without drives and effects.
     pub fn declared(&self) -> Dynamics {
-        let declared = self.system.with_effects(Vec::new()).dynamics();
+        let bare = self.system.without_drive().with_effects(Vec::new());
+        let declared = bare.dynamics();
         declared.with_values(self.equations.values())
     }
 
@@ -137,12 +138,23 @@ impl ExportModel {
         }
     }
 
-    /// Units of position and torque of a joint.
+    /// Units of position and of torque or command of a joint; nothing is known of a command's.
     pub(super) fn units(&self, joint: Joint) -> [&'static str; 2] {
-        if self.system.prismatic[joint] {
-            ["m", "N"]
-        } else {
-            ["rad", "N m"]
+        let [position, torque] = match self.system.prismatic[joint] {
+            true => ["m", "N"],
+            false => ["rad", "N m"],
+        };
+        match self.equations.driven_by() {
+            Quantity::Command => [position, ""],
+            _ => [position, torque],
+        }
+    }
+
+    /// What drives the joints, in plural.
+    pub(super) fn driving(&self) -> &'static str {
+        match self.equations.driven_by() {
+            Quantity::Command => "commands of the drives",
+            _ => "torques",
         }
     }
 
@@ -275,7 +287,7 @@ fn exported_effects(system: &Model, equations: &Dynamics) -> Vec<ExportedEffect>
         ExportedEffect {
             name: effect.effect.name.clone(),
             joint: effect.joint,
-            expression: effect.expression(&names),
+            expression: effect.expression(&names, system.driven_by()),
             parameters: names,
         }
     });

@@ -101,7 +101,7 @@ fn effects(out: &mut String, model: &ExportModel) {
             sentence(&carried.name.replace('_', " ")),
             carried.joint,
             place(effect),
-            effect.latex(&carried.parameters)
+            effect.latex(&carried.parameters, model.system.driven_by())
         );
     }
     *out += "\\end{itemize}\n\n";

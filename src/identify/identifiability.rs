@@ -19,6 +19,24 @@ pub struct Identifiability {
     pub hold: Vec<usize>,
 }
 
+/// A combination of free parameters that is undetermined, and one of them to hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Open {
+    /// As in [`Identifiability::undetermined`].
+    pub combination: Vec<(String, f64)>,
+    /// Index among all parameters of the model.
+    pub hold: usize,
+}
+
+impl Identifiability {
+    /// Take over a combination that was found open later.
+    pub fn leave(&mut self, open: Open) {
+        self.determined = self.determined.saturating_sub(1);
+        self.undetermined.push(open.combination);
+        self.hold.push(open.hold);
+    }
+}
+
 /// A combination is undetermined if its standard deviation, relative to the parameters' magnitudes, is larger than this:
 /// its 95 % interval then extends to seven times its value.
 const LOOSE: f64 = 3.0;
@@ -31,27 +49,20 @@ const NEGLIGIBLE: f64 = 1e-3;
 const NAMED: f64 = 0.1;
 
 /// The verdict on a fit's free parameters at the values found, from the eigenvalues of its information matrix in relative
-/// units. Of the parameters, those of which `may_be_held` is true are.
+/// units. Those that `readiness` gives a number may be held, the lowest numbers first.
 pub fn identifiability(
     dynamics: &Dynamics,
-    may_be_held: impl Fn(usize) -> bool,
+    readiness: impl Fn(usize) -> Option<usize>,
     found: &Values,
     fit: &Fit,
 ) -> Identifiability {
     let information = relative_information(dynamics, found, fit);
     let loose = loose_directions(&information);
-    let name = |i: usize| dynamics.parameters[fit.columns[i].parameter].name.clone();
     let undetermined = loose
         .iter()
-        .map(|direction| {
-            let parts = direction
-                .iter()
-                .enumerate()
-                .filter(|(_, w)| w.abs() > NAMED);
-            parts.map(|(i, w)| (name(i), *w)).collect()
-        })
+        .map(|direction| named(dynamics, fit, direction))
         .collect();
-    let (hold, still_loose) = hold(&information, fit, may_be_held);
+    let (hold, still_loose) = hold(&information, fit, readiness);
     Identifiability {
         free: fit.columns.len(),
         determined: fit.columns.len() - hold.len() - still_loose,
@@ -60,12 +71,55 @@ pub fn identifiability(
     }
 }
 
+/// The parameters of a direction and their weights.
+fn named(dynamics: &Dynamics, fit: &Fit, direction: &[f64]) -> Vec<(String, f64)> {
+    let name = |i: usize| dynamics.parameters[fit.columns[i].parameter].name.clone();
+    let parts = direction.iter().enumerate();
+    let large = parts.filter(|(_, weight)| weight.abs() > NAMED);
+    large.map(|(i, weight)| (name(i), *weight)).collect()
+}
+
+/// The combination of a fit's free parameters that varies most with the stretch of the logs that is left out, where that is too
+/// much to call it determined; of its parameters one with the lowest `readiness` is to be held, among
+/// these the one with the largest weight.
+pub fn open(
+    dynamics: &Dynamics,
+    readiness: impl Fn(usize) -> Option<usize>,
+    found: &Values,
+    fit: &Fit,
+    covariance: &DMatrix<f64>,
+) -> Option<Open> {
+    let size = fit.columns.len();
+    let magnitude = |i: usize| magnitude(dynamics, found, fit, i);
+    let relative = DMatrix::from_fn(size, size, |i, j| {
+        covariance[(i, j)] / (magnitude(i) * magnitude(j))
+    });
+    let eigen = eigen(relative)?;
+    let widest = eigen.eigenvalues.imax();
+    if eigen.eigenvalues[widest] <= LOOSE * LOOSE {
+        return None;
+    }
+    let direction: Vec<f64> = eigen.eigenvectors.column(widest).iter().copied().collect();
+    let held = (0..size)
+        .filter(|i| direction[*i].powi(2) > NEGLIGIBLE)
+        .filter_map(|i| Some((readiness(fit.columns[i].parameter)?, i)))
+        .min_by(|(a, i), (b, j)| {
+            let by_weight = direction[*j].abs().total_cmp(&direction[*i].abs());
+            a.cmp(b).then(by_weight)
+        })
+        .map(|(_, i)| i)?;
+    Some(Open {
+        combination: named(dynamics, fit, &direction),
+        hold: fit.columns[held].parameter,
+    })
+}
+
 /// Hold the parameter with the largest weight in the undetermined directions, one after the other, while that leaves fewer
 /// of them; and how many are left.
 fn hold(
     information: &DMatrix<f64>,
     fit: &Fit,
-    may_be_held: impl Fn(usize) -> bool,
+    readiness: impl Fn(usize) -> Option<usize>,
 ) -> (Vec<usize>, usize) {
     let part = |of: &[usize]| loose_directions(&information.select_rows(of).select_columns(of));
     let mut left: Vec<usize> = (0..fit.columns.len()).collect();
@@ -73,11 +127,13 @@ fn hold(
     let mut hold = Vec::new();
     loop {
         let share = |i: &usize| -> f64 { loose.iter().map(|v| v[*i].powi(2)).sum() };
-        let is_candidate = |i: &usize| may_be_held(fit.columns[left[*i]].parameter);
-        let mut candidates: Vec<usize> = (0..left.len()).filter(is_candidate).collect();
-        candidates.retain(|i| share(i) > NEGLIGIBLE);
+        let readiness = |i: &usize| readiness(fit.columns[left[*i]].parameter);
+        let mut candidates: Vec<usize> = (0..left.len())
+            .filter(|i| readiness(i).is_some() && share(i) > NEGLIGIBLE)
+            .collect();
         // Of equal shares the later parameter is held: files name the leading ones first.
         candidates.sort_by(|a, b| share(b).total_cmp(&share(a)).then(b.cmp(a)));
+        candidates.sort_by_key(readiness);
         let without = |i: usize| {
             let others: Vec<usize> = [&left[..i], &left[i + 1..]].concat();
             let fewer = part(&others);
@@ -91,12 +147,15 @@ fn hold(
     }
 }
 
+/// Of the i-th free value, in the parameter's unit.
+fn magnitude(dynamics: &Dynamics, found: &Values, fit: &Fit, i: usize) -> f64 {
+    let scale = dynamics.parameters[fit.columns[i].parameter].scale;
+    found.get(fit.columns[i]).abs().max(1e-3 * scale)
+}
+
 fn relative_information(dynamics: &Dynamics, found: &Values, fit: &Fit) -> DMatrix<f64> {
     let all = fit.equations();
-    let magnitude = |i: usize| {
-        let scale = dynamics.parameters[fit.columns[i].parameter].scale;
-        found.get(fit.columns[i]).abs().max(1e-3 * scale)
-    };
+    let magnitude = |i: usize| magnitude(dynamics, found, fit, i);
     let size = fit.columns.len();
     DMatrix::from_fn(size, size, |i, j| {
         all.hessian[(i, j)] * magnitude(i) * magnitude(j)

@@ -27,7 +27,7 @@ mod values;
 pub use crate::sim::{Window, cut, initial_state};
 pub use eigen::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
-pub use identifiability::{Identifiability, identifiability};
+pub use identifiability::{Identifiability, Open, identifiability, open};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};
 pub use normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 pub use offsets::{CalibrateError, Offsets, calibrate, calibrate_first};

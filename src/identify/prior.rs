@@ -36,14 +36,17 @@ impl Declared {
 impl Prior {
     /// Values are near those declared.
     pub fn near(model: &Model) -> Self {
-        let value = |parameter: usize| model.parameters[parameter].value;
+        // Effects that the file carries are declared as well, but for what each log has of its own.
+        let all = model.all_parameters();
+        let value = |parameter: usize| all[parameter].value;
         let body = |parts: [usize; PARTS]| DeclaredBody::new(parts, &parts.map(value));
         let bodies: Vec<DeclaredBody> = model.inertias().into_iter().filter_map(body).collect();
         let is_of_body = |parameter: &usize| {
             let mut parts = bodies.iter().flat_map(|body| &body.parameters);
             parts.any(|part| part == parameter)
         };
-        let known = (0..model.parameters.len()).filter(|p| value(*p) != 0.0 && !is_of_body(p));
+        let is_known = |p: &usize| value(*p) != 0.0 && !all[*p].per_log && !is_of_body(p);
+        let known = (0..all.len()).filter(is_known);
         let declared = known.map(|parameter| Declared {
             parameter,
             value: value(parameter),

@@ -339,7 +339,7 @@ mod tests {
     use std::path::Path;
 
     use super::{Shooting, Values};
-    use crate::data::{Joint, Log};
+    use crate::data::{Joint, Log, Quantity};
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
     use crate::model::{FittedEffect, Library};
@@ -353,6 +353,7 @@ mod tests {
             q: column(|t| 0.01 * (3.0 * t).sin()),
             qd: column(|t| 0.03 * (3.0 * t).cos()),
             tau: column(|t| (20.0 * t).sin() + (31.0 * t).cos()),
+            driven_by: Quantity::Torque,
             masked: vec![Vec::new()],
             filled: Vec::new(),
             leave_out: Vec::new(),

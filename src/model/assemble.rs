@@ -6,17 +6,18 @@ use super::filter::Filter;
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm};
 
 impl Model {
     /// The equations and effects compiled into one program, with the model's own values and smoothing.
     ///
-    /// Filters of the command act first, then other effects of the torque, in their order, then forces are added.
+    /// Filters of the command act first, then the drive makes a torque of it, then come other effects of the torque, in their order, then forces are added.
     /// `load` is the torque before the latter.
     pub fn dynamics(&self) -> Dynamics {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
+        assembly.apply_drive();
         let reading = assembly.reading();
         assembly.apply_sensors();
         assembly.apply_torque_effects();
@@ -39,7 +40,7 @@ impl Model {
     /// joints by which a motion needs more than acts, after all effects; zero where the model is right. Where a command changes
     /// the torque that acts by more or less than itself, the difference is that of the commands, to first order. Its inputs are those
     /// of [`Dynamics`] with the accelerations `qdd1..qddn` before the parameters. `None` for a model that gives accelerations,
-    /// which has no torques.
+    /// which has no torques, and for one that is driven by commands, of which logs show no torques.
     pub fn torque_balance(&self) -> Option<Dynamics> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
@@ -58,6 +59,9 @@ impl Model {
     }
 
     fn balanced(&self, mut assembly: Assembly<'_>, qdd: &[Node]) -> Option<Dynamics> {
+        if self.equations.drive.is_some() {
+            return None;
+        }
         assembly.apply_sensors();
         let commanded = assembly.tau.clone();
         assembly.apply_torque_effects();
@@ -132,7 +136,7 @@ struct Assembly<'a> {
     /// The angle of the rig, once sensors are accounted for.
     q: Vec<Node>,
     qd: Vec<Node>,
-    /// The torque after what has been applied so far.
+    /// The torque after what has been applied so far; the command before the drive.
     tau: Vec<Node>,
     time: Node,
     declared: Vec<Node>,
@@ -148,7 +152,8 @@ impl<'a> Assembly<'a> {
                 .map(|joint| graph.input(&joint.name(stem)))
                 .collect()
         };
-        let (q, qd, tau) = (numbered("q"), numbered("qd"), numbered("tau"));
+        let stems = ["q", "qd", system.driven_by().key()];
+        let [q, qd, tau] = stems.map(&mut numbered);
         let time = graph.input("t");
         let declared = system
             .parameters
@@ -191,6 +196,24 @@ impl<'a> Assembly<'a> {
         for (qd, direction) in self.qd.iter().zip(&self.directions) {
             scope.give_sign(*qd, *direction);
         }
+    }
+
+    /// A drive sees the angles that its sensors show.
+    fn apply_drive(&mut self) {
+        let Some(drive) = &self.system.equations.drive else {
+            return;
+        };
+        let mut scope = Scope::new(self.narrowest_sign());
+        for joint in Joint::all(self.system.joints) {
+            scope.bind(&joint.name("q"), self.q[joint]);
+            scope.bind(&joint.name("qd"), self.qd[joint]);
+            scope.bind(&joint.name(Quantity::Command.key()), self.tau[joint]);
+        }
+        scope.bind("t", self.time);
+        for (parameter, node) in self.system.parameters.iter().zip(&self.declared) {
+            scope.bind(&parameter.name, *node);
+        }
+        self.tau = drive.torques(&mut self.graph, &scope);
     }
 
     /// The angles of the state are those of the sensors; everything that follows uses the rig's own.

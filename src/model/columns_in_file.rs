@@ -8,11 +8,12 @@ const KEYS: &[&str] = &["column", "unit", "factor", "wrapped"];
 pub(super) fn columns(
     section: Option<Section<'_>>,
     joints: usize,
+    driven_by: Quantity,
     joint_names: &[String],
 ) -> Result<Columns, FileError> {
     let mut columns = Columns {
         joint_names: joint_names.to_vec(),
-        ..Columns::standard(joints)
+        ..Columns::standard(joints, driven_by)
     };
     let Some(section) = section else {
         return Ok(columns);
@@ -22,7 +23,7 @@ pub(super) fn columns(
             Quantity::Time,
             Quantity::Angle,
             Quantity::Velocity,
-            Quantity::Torque,
+            driven_by,
         ]
         .map(Quantity::key),
     )?;
@@ -32,7 +33,7 @@ pub(super) fn columns(
     if let Some(q) = list(&section, Quantity::Angle, joints)? {
         columns.q = q;
     }
-    if let Some(tau) = list(&section, Quantity::Torque, joints)? {
+    if let Some(tau) = list(&section, driven_by, joints)? {
         columns.tau = tau;
     }
     // An empty list says that no column holds velocities.

@@ -4,7 +4,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::filter::Filter;
-use crate::data::Log;
+use crate::data::{Joint, Log, Quantity};
 use crate::expr::Program;
 
 /// A physical parameter of a model or an effect.
@@ -64,8 +64,8 @@ impl OwnValue {
 /// A compiled model: first-order differential equations as one program, with the values of its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
-/// (N m or N), `t` (s), then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values),
-/// then `dqd/dt` (n values). The torques are those that act, after `filters`.
+/// (N m or N) or the commands of the drives `cmd1..cmdn`, `t` (s), then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values),
+/// then `dqd/dt` (n values). Torques or commands are those that act, after `filters`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.
@@ -116,6 +116,15 @@ impl Dynamics {
         };
         let called = self.own.iter().filter(|own| log.is_called(&own.log));
         called.filter(move |own| is_path(own) || !by_path(own.parameter))
+    }
+
+    /// What drives the model: torques or commands, as the names of the program's inputs say.
+    pub fn driven_by(&self) -> Quantity {
+        let commands = Joint::at(0).name(Quantity::Command.key());
+        match self.program.inputs().get(2 * self.joints) {
+            Some(name) if *name == commands => Quantity::Command,
+            _ => Quantity::Torque,
+        }
     }
 
     /// Number of states, 2n.

@@ -4,10 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::columns_in_file::columns;
+use super::drive::Drive;
 use super::effect::Effect;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Equations, Model, Motion};
 use super::{chain_in_file, effects_in_file, sections};
+use crate::data::{Joint, Quantity};
 use crate::expr::{Formula, Graph, Scope};
 
 impl Model {
@@ -32,6 +34,7 @@ impl Model {
         top.only(&[
             "system",
             "columns",
+            "drive",
             "parameters",
             "dynamics",
             "chain",
@@ -43,13 +46,18 @@ impl Model {
         section.only(sections::SYSTEM_KEYS)?;
         let joints = sections::joints(&section)?;
         let joint_names = sections::joint_names(&section, joints)?;
+        let drive = top.section("drive")?;
+        let driven_by = match drive {
+            None => Quantity::Torque,
+            Some(_) => Quantity::Command,
+        };
         let prismatic = sections::prismatic(&section, joints)?;
         let system = Self {
             name: section.required_text("name")?.value,
             about: section.text_or_empty("about")?,
             joints,
             sign_width: sections::sign_width(&section, joints)?,
-            columns: columns(top.section("columns")?, joints, &joint_names)?,
+            columns: columns(top.section("columns")?, joints, driven_by, &joint_names)?,
             joint_names,
             parameters: sections::parameters(top.section("parameters")?)?,
             effects: effects_in_file::read(&top, joints, library)?,
@@ -60,6 +68,9 @@ impl Model {
                 lets: sections::lets(document, &top)?,
                 motion: motion(document, &top, &prismatic)?,
                 energy: sections::energy(top.section("energy")?)?,
+                drive: drive
+                    .map(|section| Drive::read(document, &section, joints))
+                    .transpose()?,
             }),
             prismatic,
         };
@@ -77,6 +88,7 @@ impl Model {
     fn check_names(&self, top: &Section<'_>) -> Result<(), FileError> {
         let mut taken: Vec<String> = self.input_names();
         taken.truncate(3 * self.joints + 1);
+        taken.extend(Joint::all(self.joints).map(|joint| joint.name(Quantity::Command.key())));
         let parameters = self.parameters.iter().map(|p| ("parameters", &p.name));
         let lets = self
             .equations
@@ -120,6 +132,12 @@ impl Model {
             .flat_map(|energy| [&energy.total, &energy.power]);
         for formula in self.equations.motion.formulas().chain(energy) {
             lower(&scope, formula)?;
+        }
+        let names = self.drive_names();
+        let scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        for formula in self.equations.drive.iter().flat_map(Drive::formulas) {
+            let lowered = scope.lower(&mut graph, &formula.value);
+            lowered.map_err(|error| document.formula_error(formula.at, &error))?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use super::Parameter;
 use super::dynamics::OwnValue;
 use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
 use super::filter::CommandFilter;
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 use crate::expr::{Graph, Program, Scope, SignForm};
 
 /// Whether an effect that was found may be relied on by its name.
@@ -77,11 +77,11 @@ impl FittedEffect {
         self.joint == other.joint && self.effect.contains.contains(&other.effect.name)
     }
 
-    /// The effect's formula in the names of its joint: `-F_c1 * sign(qd1)`.
-    pub fn expression(&self, names: &[String]) -> String {
+    /// The effect's formula in the names of its joint, which is driven by torques or commands: `-F_c1 * sign(qd1)`.
+    pub fn expression(&self, names: &[String], driven_by: Quantity) -> String {
         match self.program(names) {
             Ok(program) => program.formula(0),
-            Err(filter) => filter.expression(&self.joint.name("tau"), &names[0]),
+            Err(filter) => filter.expression(&self.joint.name(driven_by.key()), &names[0]),
         }
     }
 
@@ -151,7 +151,7 @@ impl FittedEffect {
 }
 
 /// Effect files give units for joints that turn; on one that slides, N replaces N m and m replaces rad.
-fn unit_on(prismatic: bool, unit: &str) -> String {
+pub(super) fn unit_on(prismatic: bool, unit: &str) -> String {
     if prismatic {
         unit.replace("kg m^2", "kg")
             .replace("N m", "N")

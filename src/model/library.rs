@@ -4,6 +4,7 @@ use include_dir::{Dir, include_dir};
 
 use super::effect::Effect;
 use super::reader::FileError;
+use super::ready_drive::ReadyDrive;
 use super::system::Model;
 
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/models");
@@ -22,8 +23,8 @@ impl Library {
     /// Never: a test reads every embedded file.
     pub fn built_in() -> Self {
         Self {
-            effects: embedded("effects"),
-            probes: embedded("probes"),
+            effects: embedded("effects", Effect::from_text),
+            probes: embedded("probes", Effect::from_text),
         }
     }
 
@@ -80,6 +81,14 @@ impl Library {
         Effect::find(&self.effects, name)
     }
 
+    /// The embedded drives, by name.
+    ///
+    /// # Panics
+    /// Never: a test reads every embedded file.
+    pub fn drives() -> Vec<ReadyDrive> {
+        embedded("drives", ReadyDrive::from_text)
+    }
+
     /// Names of the embedded systems.
     pub fn system_names() -> Vec<String> {
         let mut names: Vec<String> = BUILT_IN
@@ -121,21 +130,19 @@ impl Library {
     }
 }
 
-/// The embedded effect files of one folder, by name.
-fn embedded(folder: &str) -> Vec<Effect> {
+/// The embedded files of one folder, by name.
+fn embedded<T>(folder: &str, read: impl Fn(&Path, &str) -> Result<T, FileError>) -> Vec<T> {
     let files = BUILT_IN
         .get_dir(folder)
         .expect("the folder is embedded")
         .files();
-    let mut effects: Vec<Effect> = files
-        .filter(|file| is_toml(file.path()))
-        .map(|file| {
-            let text = file.contents_utf8().expect("embedded files are UTF-8");
-            Effect::from_text(file.path(), text).expect("embedded effects are read by a test")
-        })
-        .collect();
-    effects.sort_by(|a, b| a.name.cmp(&b.name));
-    effects
+    let mut files: Vec<_> = files.filter(|file| is_toml(file.path())).collect();
+    files.sort_by_key(|file| file.path());
+    let whole = files.into_iter().map(|file| {
+        let text = file.contents_utf8().expect("embedded files are UTF-8");
+        read(file.path(), text).expect("embedded files are read by a test")
+    });
+    whole.collect()
 }
 
 fn is_toml(path: &Path) -> bool {
@@ -155,6 +162,7 @@ mod tests {
         for name in Library::system_names() {
             library.model(Path::new(&name)).unwrap();
         }
+        assert!(Library::drives().len() >= 4);
         for effect in library.effects() {
             for other in effect.contains.iter().chain(&effect.confused_with) {
                 let of_system = other == "parameter_shift";

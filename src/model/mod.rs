@@ -5,6 +5,7 @@ mod bodies;
 pub mod chain;
 mod chain_in_file;
 mod columns_in_file;
+mod drive;
 mod dynamics;
 mod effect;
 mod effect_file;
@@ -16,6 +17,7 @@ mod fitted;
 mod library;
 mod network;
 mod reader;
+mod ready_drive;
 mod residual;
 mod saved;
 mod sections;
@@ -36,6 +38,7 @@ pub use network::{
     ResidualOn,
 };
 pub use reader::FileError;
+pub use ready_drive::ReadyDrive;
 pub(crate) use residual::nothing_but;
 pub use residual::with_residual;
 pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::bodies::Bodies;
 use super::chain::{Body, Recovered};
+use super::drive::Drive;
 use super::dynamics::{Dynamics, OwnValue, Parameter};
 use super::effect::{Effect, Entry, Measure};
 use super::fitted::FittedEffect;
@@ -36,11 +37,13 @@ pub(super) struct Energy {
 }
 
 /// The declared equations of motion, checked. Models that differ in values or effects share them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Equations {
     pub lets: Vec<(String, Located<Formula>)>,
     pub motion: Motion,
     pub energy: Option<Energy>,
+    /// What makes the torques, where commands do.
+    pub drive: Option<Drive>,
 }
 
 /// A model: declared equations, effects on their joints, the values of all parameters and the smoothing of friction.
@@ -105,7 +108,7 @@ impl Model {
         }
     }
 
-    /// The names that formulas may use before any `let`: states, torques, time, parameters.
+    /// The names that formulas of the motion may use before any `let`: states, torques, time, parameters.
     pub fn input_names(&self) -> Vec<String> {
         let numbered = |stem: &str| {
             (1..=self.joints)
@@ -308,12 +311,21 @@ impl Model {
         !matches!(self.equations.motion, Motion::Accelerations(_))
     }
 
-    /// Total energy and the power of the torques as a program of [`Model::input_names`], where the file
+    /// Total energy and the power of the torques as a program of the inputs of a compiled model, where the file
     /// states them or its equations are those of a chain: `[total, power, d total/dq.., d total/dqd..]`.
     pub fn energy_program(&self) -> Option<crate::expr::Program> {
         let mut graph = Graph::new();
-        let names = self.input_names();
+        let names = match self.equations.drive {
+            None => self.input_names(),
+            Some(_) => self.drive_names(),
+        };
         let mut scope = Scope::of_inputs(&mut graph, names.iter().map(String::as_str));
+        if let Some(drive) = &self.equations.drive {
+            let torques = drive.torques(&mut graph, &scope);
+            for (joint, torque) in Joint::all(self.joints).zip(torques) {
+                scope.bind(&joint.name("tau"), torque);
+            }
+        }
         let states = names[..2 * self.joints].iter();
         let states: Vec<Node> = states.filter_map(|name| scope.get(name)).collect();
         let mut lower = |scope: &Scope, formula: &Located<Formula>| {

@@ -1,14 +1,16 @@
+use super::drive::Drive;
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
+use crate::data::{Joint, Quantity};
 use crate::expr::{Formula, latex_name};
 
 impl Model {
-    /// The declared equations as lines of a LaTeX `align` environment: intermediates, then the motion. Torques are
+    /// The declared equations as lines of a LaTeX `align` environment: drives, intermediates, then the motion. Torques are
     /// those after all effects.
     pub fn latex(&self) -> Vec<String> {
         let mut names = self.input_names();
-        let mut lines = Vec::new();
+        let mut lines = self.drive_lines();
         for (name, formula) in &self.equations.lets {
             lines.push(format!(
                 "{} &= {}",
@@ -53,14 +55,30 @@ impl Model {
     }
 }
 
+impl Model {
+    /// The torques of the drives, where there are any.
+    fn drive_lines(&self) -> Vec<String> {
+        let names = self.drive_names();
+        let drives = self.equations.drive.iter().flat_map(Drive::formulas);
+        let line = |(joint, formula): (Joint, &Located<Formula>)| {
+            format!(
+                "{} &= {}",
+                latex_name(&joint.name("tau")),
+                latex(&names, formula)
+            )
+        };
+        Joint::all(self.joints).zip(drives).map(line).collect()
+    }
+}
+
 impl FittedEffect {
     /// The effect's formula in the names of its joint and of its parameters, in LaTeX.
-    pub fn latex(&self, names: &[String]) -> String {
+    pub fn latex(&self, names: &[String], driven_by: Quantity) -> String {
         match self.program(names) {
             Ok(program) => program.latex_formula(0),
             Err(filter) => {
-                let tau = latex_name(&self.joint.name("tau"));
-                filter.latex(&tau, &latex_name(&names[0]))
+                let driven = latex_name(&self.joint.name(driven_by.key()));
+                filter.latex(&driven, &latex_name(&names[0]))
             }
         }
     }

@@ -1,6 +1,7 @@
 use crate::expr::{FormulaError, Graph, Program, Scope, SignForm, parse};
 
-/// A formula of the state at the end of a step (`q1`, `qd1`, ...), the torque held over it (`tau1`, ...) and time (`t`):
+/// A formula of the state at the end of a step (`q1`, `qd1`, ...), the torque or command held over it (`tau1` or
+/// `cmd1`, ...) and time (`t`):
 /// the reward of a step, which planners sum over a rollout and maximise, or another quantity of a task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Objective {
@@ -21,6 +22,9 @@ impl Objective {
         for name in numbered.chain(["t".to_owned()]) {
             let node = graph.input(&name);
             scope.bind(&name, node);
+            if let Some(joint) = name.strip_prefix("tau") {
+                scope.bind(&format!("cmd{joint}"), node);
+            }
         }
         let reward = scope.lower(&mut graph, &parse(formula)?)?;
         Ok(Self {

@@ -3,11 +3,11 @@ use std::f64::consts::TAU;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-/// The excitation torque: a multisine of equal amplitudes whose phases are drawn anew for each log.
+/// The torques or commands that excite a plant: a multisine of equal amplitudes whose phases are drawn anew for each log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Excitation {
-    /// Size of the torque per joint in N m (or N): each of k sines has this amplitude divided by the root of k.
+    /// Size per joint, of a torque in N m (or N): each of k sines has this amplitude divided by the root of k.
     pub amplitude: Vec<f64>,
     /// Lowest and highest frequency in Hz.
     pub band_hz: [f64; 2],

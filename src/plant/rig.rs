@@ -3,6 +3,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use super::PlantError;
+use crate::data::{Log, Quantity};
 use crate::model::Dynamics;
 use crate::sim::{Environment, Integrator};
 
@@ -13,6 +14,7 @@ pub struct Rig<'d> {
     environment: Environment<'d>,
     noise: Noise,
     joints: usize,
+    driven_by: Quantity,
     state: Vec<f64>,
     step_s: f64,
     steps: u32,
@@ -45,6 +47,7 @@ impl<'d> Rig<'d> {
             environment: Environment::new(dynamics, integrator, step_s),
             noise,
             joints: dynamics.joints,
+            driven_by: dynamics.driven_by(),
             state: start.to_vec(),
             step_s,
             steps: 0,
@@ -54,6 +57,14 @@ impl<'d> Rig<'d> {
     /// The true state: positions, then velocities.
     pub fn state(&self) -> &[f64] {
         &self.state
+    }
+
+    /// A log of this plant, without a row.
+    pub fn empty_log(&self) -> Log {
+        Log {
+            driven_by: self.driven_by,
+            ..Log::empty(self.joints)
+        }
     }
 
     /// Seconds since the start.
@@ -76,7 +87,7 @@ impl<'d> Rig<'d> {
             .collect()
     }
 
-    /// Hold the torque `tau` for one step.
+    /// Hold the torques or commands `tau` for one step.
     ///
     /// # Errors
     /// A plant that diverges.

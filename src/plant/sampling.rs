@@ -19,6 +19,7 @@ pub struct Sampling {
     /// The same for velocities.
     pub velocity: Vec<[f64; 2]>,
     /// The same for torques, in N m (or N).
+    #[serde(alias = "command")]
     pub torque: Vec<[f64; 2]>,
     pub starts: Starts,
 }

@@ -38,15 +38,18 @@ impl Plant {
         // checked to be a few thousand
         let rows = (self.recording.duration_s * self.sensor.rate_hz).round() as usize + 1;
         let substeps = substeps(&Row([dt]), RIG_S);
-        let mut log = Log::empty(n);
+        let mut log = Log {
+            driven_by: self.system.driven_by(),
+            ..Log::empty(n)
+        };
         #[allow(clippy::cast_precision_loss)] // a few thousand rows
         let times: Vec<f64> = (0..rows).map(|row| row as f64 * dt).collect();
-        let torques: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
-        let tau_of_joints = by_joint(&torques, n);
-        let commands = [&Commands::new(&dynamics, &times, &tau_of_joints)];
+        let driving: Vec<Vec<f64>> = times.iter().map(|time| tones.at(*time)).collect();
+        let driving_joints = by_joint(&driving, n);
+        let commands = [&Commands::new(&dynamics, &times, &driving_joints)];
         let mut simulator = Simulator::new(&dynamics, RK4);
         simulator.put(&self.as_read(&self.recording.start));
-        for (row, (&time, tau)) in times.iter().zip(torques).enumerate() {
+        for (row, (&time, tau)) in times.iter().zip(driving).enumerate() {
             let [angles, _] = simulator.shown(commands, [row]);
             self.measure(&mut log, time, angles, &tau, rng);
             let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();

@@ -7,8 +7,12 @@ use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
 use crate::closeloop::{Outcome, Space, TorqueErrors};
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
+use crate::identify::Identifiability;
 use crate::sim::metric::{Summary, TorqueError, summarise};
+
+/// More parameters than this that trade with one another are counted.
+const MOST_NAMED: usize = 6;
 
 /// The unit of positions: that of all joints, or both.
 fn position_unit(outcome: &Outcome) -> &'static str {
@@ -48,15 +52,22 @@ const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zero
                             its first second, and scored on the rest: what a rig gives that is zeroed before a run.";
 
 /// What was compared, as a sentence.
-pub(super) fn compared(outcome: &Outcome) -> &'static str {
+pub(super) fn compared(outcome: &Outcome) -> String {
     match outcome.space {
         Space::Motion => {
-            "Models are fitted to, selected and compared by the open-loop motion under the logged torques."
+            let driving = match outcome.models.after.model.driven_by() {
+                Quantity::Command => "commands",
+                _ => "torques",
+            };
+            format!(
+                "Models are fitted to, selected and compared by the open-loop motion under the logged {driving}."
+            )
         }
         Space::Torque => {
             "Models are fitted to, selected and compared by the torques that the logged motion needs: a controller prescribes \
              this motion, and what half a second of it under the logged torques would add up to says little. Values and names \
              hold for motions like these; a good fit cannot tell what no log moves, holds or loads."
+                .to_owned()
         }
     }
 }
@@ -232,14 +243,33 @@ pub(super) fn parameters(outcome: &Outcome) -> String {
         );
     }
     for &k in &verdict.hold {
-        let name = &outcome.models.before.model.parameters[k].name;
-        let _ = writeln!(
-            out,
-            "- `{name}` is held: the logs determine it only in combination with others, and it stays as near to its declared \
-             value as they allow. Intervals of the others, and of effects, are relative to it."
-        );
+        let name = &outcome.models.before.model.all_parameters()[k].name;
+        let _ = writeln!(out, "- `{name}` is held: {}", why_held(verdict, name));
     }
     out + "\n"
+}
+
+/// What the logs do not tell of a parameter.
+fn why_held(verdict: &Identifiability, name: &str) -> String {
+    let weight = |direction: &&Vec<(String, f64)>| {
+        let own = direction.iter().find(|(other, _)| other == name);
+        own.map_or(0.0, |(_, weight)| weight.abs())
+    };
+    let directions = verdict.undetermined.iter();
+    let direction = directions.max_by(|a, b| weight(a).total_cmp(&weight(b)));
+    let others: Vec<String> = (direction.into_iter().flatten())
+        .filter(|(other, _)| other != name)
+        .map(|(other, _)| format!("`{other}`"))
+        .collect();
+    let with = match others.len() {
+        0 => return "the logs do not show it, and it stays at its declared value.".to_owned(),
+        1..=MOST_NAMED => listed(&others),
+        _ => format!("{} others", others.len()),
+    };
+    format!(
+        "it trades with {with}, and the logs tell only their combination. It stays as near to its declared value as they allow; \
+         intervals of the others, and of effects, are relative to it."
+    )
 }
 
 /// Which numbers of the model file do not hold for these logs.

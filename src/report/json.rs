@@ -185,7 +185,11 @@ fn ended(fit: &Fit) -> FitEntry {
 
 fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
     let verdict = &outcome.models.identifiability;
-    let name = |k: &usize| outcome.models.before.model.parameters[*k].name.clone();
+    let name = |k: &usize| {
+        outcome.models.before.model.all_parameters()[*k]
+            .name
+            .clone()
+    };
     IdentifiabilityEntry {
         free: verdict.free,
         determined: verdict.determined,

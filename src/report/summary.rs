@@ -30,7 +30,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
         let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
     for &k in &outcome.models.identifiability.hold {
-        let name = &outcome.models.before.model.parameters[k].name;
+        let name = &outcome.models.before.model.all_parameters()[k].name;
         let _ = writeln!(
             out,
             "  {name} is held, since the logs do not determine it: the other values are relative to it"

@@ -1,19 +1,19 @@
 use super::motion::Motion;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 
-/// The torque of an experiment.
+/// The torque, or the command, of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drive {
-    /// The logged torque times a factor, run off at another pace.
+    /// The logged one times a factor, run off at another pace.
     Logged {
         factor: f64,
         pace: f64,
     },
-    /// The logged torque and, on one joint, so many times its top torque on top.
+    /// The logged one and, on one joint, so many times its largest on top.
     Added(f64),
-    /// A triangle on one joint, from zero up, down and back, to this share of its top torque.
+    /// A triangle on one joint, from zero up, down and back, to this share of its largest.
     Ramps(f64),
     Nothing,
 }
@@ -32,7 +32,8 @@ enum Start {
 /// One experiment that the rig of the logs might do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct MenuItem {
-    /// What to do; `{joint}`, `{torque}` (N m or N) and `{speed}` (rad/s or m/s) stand for what the logs say.
+    /// What to do; `{joint}`, `{speed}` (rad/s or m/s), `{driving}` (torque or command) and `{size}` stand for what
+    /// the logs say.
     text: &'static str,
     drive: Drive,
     start: Start,
@@ -88,18 +89,18 @@ const MENU: [MenuItem; 12] = [
         finer: 4,
         ..AS_LOGGED
     },
-    logged("half the torque", 0.5, 1.0, 0.5),
-    logged("double the torque", 2.0, 1.0, 2.0),
+    logged("half the {driving}", 0.5, 1.0, 0.5),
+    logged("double the {driving}", 2.0, 1.0, 2.0),
     logged(
-        "the same torque run three times as slowly",
+        "the same {driving} run three times as slowly",
         1.0,
         1.0 / 3.0,
         1.0 / 3.0,
     ),
-    logged("the same torque run twice as fast", 1.0, 2.0, 1.0),
-    logged("the torque's sign reversed", -1.0, 1.0, -1.0),
+    logged("the same {driving} run twice as fast", 1.0, 2.0, 1.0),
+    logged("the {driving}'s sign reversed", -1.0, 1.0, -1.0),
     MenuItem {
-        text: "slow torque ramps on joint {joint} from standstill to {torque}, up and down",
+        text: "slow {driving} ramps on joint {joint} from standstill to {size}, up and down",
         drive: Drive::Ramps(0.5),
         start: Start::Rest,
         ..AS_LOGGED
@@ -113,11 +114,11 @@ const MENU: [MenuItem; 12] = [
         2.0,
     ),
     turning(
-        "full turns of joint {joint}, by a constant {torque} added to its torque",
+        "full turns of joint {joint}, by a constant {size} added to its {driving}",
         1.0,
     ),
     turning(
-        "full turns of joint {joint}, by a constant {torque} added to its torque",
+        "full turns of joint {joint}, by a constant {size} added to its {driving}",
         2.0,
     ),
 ];
@@ -160,28 +161,35 @@ pub(super) fn as_logged(study: &Study<'_>, fitted: &Fitted) -> Vec<Motion> {
 
 impl MenuItem {
     fn is_possible(&self, study: &Study<'_>, joint: Joint) -> bool {
-        let undriven = [AS_LOGGED.drive, Drive::Nothing].contains(&self.drive);
+        // No torque comes of no command only where commands are torques.
+        let coasts = study.declared.driven_by() == Quantity::Torque;
         let driven = match self.drive {
-            Drive::Logged { .. } => study.top_torque.iter().any(|torque| *torque > 0.0),
-            _ => study.top_torque[joint] > 0.0,
+            _ if *self == AS_LOGGED => true,
+            Drive::Nothing => coasts,
+            Drive::Logged { .. } => study.top_driving.iter().any(|top| *top > 0.0),
+            Drive::Added(_) | Drive::Ramps(_) => study.top_driving[joint] > 0.0,
         };
         let coarse = study
             .logs
             .iter()
             .all(|log| log.median_step() >= study.settings.discriminate.fastest_sampling_s);
-        (undriven || driven)
+        driven
             && (self.finer == 1 || coarse)
             && !(self.turns && (study.declared.prismatic[joint] || goes_round(study, joint)))
     }
 
     fn words(&self, study: &Study<'_>, joint: Joint) -> String {
         let (force, length) = if study.declared.prismatic[joint] {
-            ("N", "m")
+            (" N", "m")
         } else {
-            ("N m", "rad")
+            (" N m", "rad")
         };
-        let torque = match self.drive {
-            Drive::Added(share) | Drive::Ramps(share) => share * study.top_torque[joint],
+        let (driving, unit) = match study.declared.driven_by() {
+            Quantity::Torque => ("torque", force),
+            _ => ("command", ""),
+        };
+        let size = match self.drive {
+            Drive::Added(share) | Drive::Ramps(share) => share * study.top_driving[joint],
             _ => 0.0,
         };
         let speed = match self.start {
@@ -190,7 +198,8 @@ impl MenuItem {
         };
         self.text
             .replace("{joint}", &joint.to_string())
-            .replace("{torque}", &format!("{torque:.2} {force}"))
+            .replace("{driving}", driving)
+            .replace("{size}", &format!("{size:.2}{unit}"))
             .replace("{speed}", &format!("{speed:.1} {length}/s"))
     }
 
@@ -246,11 +255,11 @@ impl MenuItem {
             motion.time.push(begin + since);
             motion.tau.push(match self.drive {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
-                Drive::Added(share) => with(logged, joint, share * study.top_torque[joint]),
+                Drive::Added(share) => with(logged, joint, share * study.top_driving[joint]),
                 Drive::Ramps(share) => {
-                    let torque =
-                        share * study.top_torque[joint] * triangle(since / settings.ramps_s);
-                    with(logged.map(|_| 0.0), joint, torque)
+                    let ramp =
+                        share * study.top_driving[joint] * triangle(since / settings.ramps_s);
+                    with(logged.map(|_| 0.0), joint, ramp)
                 }
                 Drive::Nothing => logged.map(|_| 0.0).collect(),
             });
@@ -272,11 +281,11 @@ impl MenuItem {
     }
 }
 
-/// The torques with an additional torque on one joint.
-fn with(torques: impl Iterator<Item = f64>, joint: Joint, more: f64) -> Vec<f64> {
-    let mut torques: Vec<f64> = torques.collect();
-    torques[joint] += more;
-    torques
+/// Torques or commands with more on one joint.
+fn with(driving: impl Iterator<Item = f64>, joint: Joint, more: f64) -> Vec<f64> {
+    let mut driving: Vec<f64> = driving.collect();
+    driving[joint] += more;
+    driving
 }
 
 /// 0, up to 1, down to -1 and back to 0 as `phase` goes from 0 to 1.

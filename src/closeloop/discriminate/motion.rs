@@ -73,6 +73,7 @@ impl Record {
         self.origins.push(origin);
         self.logs.push(Log {
             path: log.path.clone(),
+            driven_by: log.driven_by,
             ..Log::empty(log.joints())
         });
         self.logs.len() - 1

@@ -35,10 +35,13 @@ pub(in crate::closeloop) fn residual_force(
         Space::Motion => forces_of_motion(&shooting, fitted)?,
         Space::Torque => forces_of_torques(study, &shooting, fitted)?,
     };
+    let logs = study.logs.iter();
+    let torques: Vec<Vec<Vec<f64>>> = logs.map(|log| fitted.model.drive_torques(log)).collect();
+    let sample = |(window, force): (&Window, &Vec<f64>)| {
+        ForceSample::over(window, &study.logs[window.log], &torques[window.log], force)
+    };
     let stretches = shooting.windows.iter().zip(&forces);
-    let mut samples: Vec<ForceSample> = stretches
-        .map(|(window, force)| ForceSample::over(window, &study.logs[window.log], force))
-        .collect();
+    let mut samples: Vec<ForceSample> = stretches.map(sample).collect();
     within_turn(&mut samples, &study.declared.prismatic);
     Ok(samples)
 }
@@ -76,8 +79,8 @@ fn forces_of_torques(
 }
 
 impl ForceSample {
-    /// The sample of one stretch of a log with the force that was found there.
-    fn over(window: &Window, log: &Log, force: &[f64]) -> Self {
+    /// The sample of one stretch of a log, under these torques, with the force that was found there.
+    fn over(window: &Window, log: &Log, tau: &[Vec<f64>], force: &[f64]) -> Self {
         let rows = window.first..=window.last;
         #[allow(clippy::cast_precision_loss)] // few rows
         let count = window.rows() as f64;
@@ -89,7 +92,7 @@ impl ForceSample {
             time_s: log.time[window.first] + 0.5 * span,
             q: log.q.iter().map(mean).collect(),
             qd: log.q.iter().map(speed).collect(),
-            tau: log.tau.iter().map(mean).collect(),
+            tau: tau.iter().map(mean).collect(),
             force: force.to_vec(),
         }
     }

@@ -9,7 +9,7 @@ use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::{Losses, best_start, gain};
 use crate::closeloop::study::Study;
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 use crate::model::{Effect, FittedEffect};
 
 /// A formula for the remainder: a proposal, not a finding. Supported only by its fit.
@@ -139,7 +139,9 @@ fn longer(study: &Study<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Op
 impl Sum {
     fn formula(&self) -> String {
         let values = self.effect.values.iter().map(|(value, _)| digits(*value));
-        let written = self.effect.expression(&values.collect::<Vec<_>>());
+        let written = self
+            .effect
+            .expression(&values.collect::<Vec<_>>(), Quantity::Torque);
         written.replace("+ -", "- ")
     }
 

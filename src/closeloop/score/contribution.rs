@@ -105,7 +105,7 @@ fn described(declared: &Model, model: &Model, k: usize) -> (String, Vec<Paramete
         None => {
             let own = model.all_parameters()[model.place_of(k)].to_vec();
             let names: Vec<String> = own.iter().map(|p| p.name.clone()).collect();
-            (effect.expression(&names), own)
+            (effect.expression(&names, model.driven_by()), own)
         }
     }
 }

@@ -10,6 +10,7 @@ use super::demand::{TorqueDemand, torque_demand};
 use super::motion::Motion;
 use super::response::{Response, response};
 use crate::data::Joint;
+use crate::data::column::Quantity;
 use crate::data::jumps::rows_that_jump;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
 use crate::data::log::Log;
@@ -34,7 +35,7 @@ pub struct JointAudit {
     pub q: Channel,
     /// The velocity as logged \[rad/s\].
     pub qd: Channel,
-    /// The torque \[N m\].
+    /// The torque \[N m\], or the command of the drive.
     pub tau: Channel,
     /// How the logged velocity compares with the derivative of the angle; `None` where one of them
     /// stands still, the joint is too slow to be told from one at rest, or the log is too short.
@@ -82,10 +83,15 @@ pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
         .collect();
     for joint in Joint::all(log.joints()) {
         let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
-        joints[joint].torque_lag = torque_lag(&slow, &fast, joint, log.median_step());
         joints[joint].q.spikes = spikes[joint];
         joints[joint].response = response(&slow, &fast, joint);
-        joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
+        if log.driven_by == Quantity::Torque {
+            joints[joint].torque_lag = torque_lag(&slow, &fast, joint, log.median_step());
+            joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
+        } else if let Some(response) = &mut joints[joint].response {
+            // What a drive makes of its command depends on the motion.
+            response.to_torque = None;
+        }
     }
     joints
 }
@@ -135,7 +141,7 @@ impl JointAudit {
                 spikes,
                 ..qd_channel
             },
-            tau: channel("tau", tau, rows_that_jump(tau).len()),
+            tau: channel(log.driven_by.key(), tau, rows_that_jump(tau).len()),
         }
     }
 }

@@ -73,6 +73,7 @@ fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
         jitter: relative_deviation(&regular, median_step_s),
         gaps: gaps.map(gap).collect(),
         dropped_rows: dropped(log).iter().map(|dropped| dropped.count).sum(),
+        driven_by: log.driven_by,
         joints,
         findings: vec![],
     }
@@ -89,6 +90,7 @@ fn relative_deviation(steps: &[f64], median_step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::Quantity;
 
     pub(super) fn audit(log: &Log) -> Audit {
         super::audit(log, &Columns::default())
@@ -101,6 +103,7 @@ mod tests {
             q: vec![q],
             qd: vec![qd],
             tau: vec![tau],
+            driven_by: Quantity::Torque,
             masked: vec![vec![]],
             filled: vec![],
             leave_out: vec![],

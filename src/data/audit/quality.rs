@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::joint::JointAudit;
 use crate::data::Joint;
+use crate::data::column::Quantity;
 use crate::data::log::Interval;
 
 /// The quality of one log.
@@ -30,6 +31,8 @@ pub struct Audit {
     pub gaps: Vec<Interval>,
     /// Rows that are missing in steps of two to five median steps.
     pub dropped_rows: usize,
+    /// What drives the joints: torques or commands.
+    pub driven_by: Quantity,
     /// One entry a joint.
     pub joints: Vec<JointAudit>,
     /// What an engineer should know before fitting, the most serious first.

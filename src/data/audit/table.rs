@@ -4,6 +4,7 @@ use std::fmt;
 
 use super::channel::Channel;
 use super::quality::{Audit, Severity};
+use crate::data::column::Quantity;
 
 /// Widest line \[characters\].
 const WIDTH: usize = 100;
@@ -41,10 +42,14 @@ impl Audit {
             "\n{:<8}{:<6}{:>12}{:>12}{:>12}{:>12}{:>9}{:>11}",
             "channel", "unit", "min", "max", "resolution", "noise", "spikes", "at limit"
         )?;
+        let driven_in = match self.driven_by {
+            Quantity::Torque => "N m",
+            _ => "",
+        };
         for joint in &self.joints {
             write_channel(f, &joint.q, "rad")?;
             write_channel(f, &joint.qd, "rad/s")?;
-            write_channel(f, &joint.tau, "N m")?;
+            write_channel(f, &joint.tau, driven_in)?;
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ pub(super) use names::Names;
 use super::template::filled;
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 use crate::expr::Notation;
 use crate::model::CommandFilter;
 use crate::sim::{Scheme, Stage};
@@ -92,7 +92,14 @@ fn head(model: &ExportModel, names: &Names) -> String {
             .iter()
             .map(|limit| format!("Not carried: {limit}.")),
     );
-    let usage = filled(include_str!("usage.txt"), &[("STEP", &model.step_s)]);
+    let driving = match model.equations.driven_by() {
+        Quantity::Command => "the commands of the drives",
+        _ => "in N m (N)",
+    };
+    let usage = filled(
+        include_str!("usage.txt"),
+        &[("STEP", &model.step_s), ("DRIVING", &driving)],
+    );
     let usage = names.fill(&usage);
     lines.extend(["".to_owned(), usage.trim_end().to_owned(), "".to_owned()]);
     let origin = serde_json::to_string_pretty(&model.provenance()).expect("JSON is text");

@@ -40,7 +40,7 @@ impl Names {
         let moving = of_joints("q", "state", 0)
             .chain(of_joints("qd", "state", n))
             .chain(of_joints("qdd", "acceleration", 0))
-            .chain(of_joints("tau", "torque", 0))
+            .chain(of_joints(model.equations.driven_by().key(), "torque", 0))
             .chain([("t".to_owned(), "time".to_owned())]);
         let held = model.equations.parameters.iter().map(|parameter| {
             let field = variable(&parameter.name);

@@ -1,4 +1,4 @@
-use crate::data::Joint;
+use crate::data::{Joint, Quantity};
 use crate::formats::ExportModel;
 use crate::formats::c::Names;
 use crate::model::CommandFilter;
@@ -75,10 +75,10 @@ fn states(model: &ExportModel) -> Vec<Variable> {
 }
 
 fn torque(model: &ExportModel, joint: Joint, prefix: &str, about: &str, role: Role) -> Variable {
-    let what = if model.system.prismatic[joint] {
-        "force"
-    } else {
-        "torque"
+    let what = match model.equations.driven_by() {
+        Quantity::Command => "command",
+        _ if model.system.prismatic[joint] => "force",
+        _ => "torque",
     };
     Variable {
         name: format!("joint[{joint}].{prefix}{what}"),

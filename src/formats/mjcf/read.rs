@@ -6,9 +6,10 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
 
+use super::actuator::{self, Drive};
 use super::classes::Classes;
 use super::orientation::Angles;
-use super::{actuator, equality, geom};
+use super::{equality, geom};
 use crate::formats::robot::element::Element;
 use crate::formats::robot::tree::{self, Body, Hinge, Mimics};
 use crate::formats::xml::{self, Source, elements, named};
@@ -35,6 +36,7 @@ pub fn read_mjcf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
         name,
         gravity,
         joints,
+        drive: None,
         notes: source.into_notes(),
     })
 }
@@ -63,7 +65,7 @@ struct Reader<'s, 'x> {
     /// `auto`, `true` or `false`.
     inertia_from_geom: String,
     /// Effort limit of the drive (N m or N), by joint.
-    efforts: HashMap<String, f64>,
+    drives: HashMap<String, Drive>,
     /// What joints follow others, by their names.
     mimics: HashMap<String, Mimics>,
 }
@@ -99,7 +101,7 @@ impl<'s, 'x> Reader<'s, 'x> {
                 .text("inertiafromgeom")
                 .unwrap_or("auto")
                 .to_owned(),
-            efforts: actuator::efforts(source, root, &classes, autolimits)?,
+            drives: actuator::drives(source, root, &classes, autolimits)?,
             mimics: equality::mimics(source, root)?,
             source,
             root,
@@ -235,6 +237,7 @@ impl<'s, 'x> Reader<'s, 'x> {
                 armature: joint.not_negative("armature")?,
                 spring: (stiffness > 0.0).then_some(Spring { stiffness, rest }),
                 effort: self.effort(joint, &name)?,
+                servo: self.drives.get(&name).and_then(|drive| drive.servo),
             },
             name,
         })
@@ -244,7 +247,7 @@ impl<'s, 'x> Reader<'s, 'x> {
     fn effort(&self, joint: &Element<'s, 'x>, name: &str) -> Result<Option<f64>, FileError> {
         let range = joint.limits("actuatorfrcrange", "actuatorfrclimited", self.autolimits)?;
         let own = range.and_then(|range| actuator::symmetric(joint, range, "actuatorfrcrange"));
-        let of_drive = self.efforts.get(name).copied();
+        let of_drive = self.drives.get(name).and_then(|drive| drive.effort);
         Ok([own, of_drive].into_iter().flatten().reduce(f64::min))
     }
 

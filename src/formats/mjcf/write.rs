@@ -147,11 +147,11 @@ fn attributes(values: &[(&str, f64, f64)]) -> String {
 fn actuator(joint: &Joint, drive: &Drive) -> String {
     let mut text = format!("    <general name=\"{}\" joint=\"{0}\"", joint.name);
     text += &attributes(&[("gear", drive.gear, 1.0), ("gainprm", drive.gain, 1.0)]);
-    if drive.constant != 0.0 {
+    if drive.bias != [0.0; 3] {
         let _ = write!(
             text,
             " biastype=\"affine\" biasprm=\"{}\"",
-            numbers([drive.constant, 0.0, 0.0])
+            numbers(drive.bias)
         );
     }
     if let Some(limit) = drive.limit {

@@ -40,7 +40,8 @@ pub fn inputs(builder: &mut Builder, model: &ExportModel, torque: &str) -> Input
 pub fn graph(model: &ExportModel) -> Graph {
     let n = model.joints();
     let mut builder = Builder::default();
-    let inputs = inputs(&mut builder, model, "torque commanded over the step");
+    let about = format!("{} over the step", model.driving());
+    let inputs = inputs(&mut builder, model, &about);
     let acting = act(&mut builder, model, &inputs);
     let derivative = Derivative::new(&mut builder, model);
     let mut step = Step {

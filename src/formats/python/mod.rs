@@ -93,7 +93,7 @@ fn head(model: &ExportModel) -> String {
     let provenance = json!(model.provenance().to_string());
     format!(
         "\"\"\"A model of {}: step and derivative for numpy.\n\n\
-         A state is {n} position{s}, then the velocities; positions and torques are of {}.\n\
+         A state is {n} position{s}, then the velocities; positions and {driving} are of {}.\n\
          All functions take single rows or any number of them in front.\n\"\"\"\n\n\
          import json\n\n\
          import numpy as np\n\n\
@@ -102,6 +102,7 @@ fn head(model: &ExportModel) -> String {
          PROVENANCE = json.loads({provenance})\n",
         plain(model.name()),
         units.join(", "),
+        driving = model.driving(),
         s = if n == 1 { "" } else { "s" },
     )
 }
@@ -238,7 +239,8 @@ fn derivative(out: &mut String, model: &ExportModel) {
              p = PARAMETERS if parameters is None else parameters\n";
     let names = |stem: &str| -> Vec<String> { (1..=n).map(|j| format!("{stem}{j}")).collect() };
     let list = |names: &[String]| format!("[{}]", names.join(", "));
-    let (q, qd, tau) = (names("q"), names("qd"), names("tau"));
+    let driven = model.equations.driven_by().key();
+    let (q, qd, tau) = (names("q"), names("qd"), names(driven));
     let state = [q.as_slice(), &qd].concat();
     for (names, from) in [(&state, "state"), (&tau, "torque")] {
         let _ = writeln!(

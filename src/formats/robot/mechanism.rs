@@ -6,7 +6,7 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::data;
+use super::servo::{Servo, servos};
 use crate::formats::xml::escaped;
 use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
 use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
@@ -24,13 +24,13 @@ pub(in crate::formats) struct Mechanism {
     pub not_carried: Vec<String>,
 }
 
-/// A drive: torque = gear * clamp(gain * command + constant, -limit, limit).
+/// A drive: torque = gear * clamp(gain * command + bias, -limit, limit).
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::formats) struct Drive {
     pub gain: f64,
     pub gear: f64,
-    /// N m or N
-    pub constant: f64,
+    /// A constant (N m or N), and slopes by position and velocity of the joint.
+    pub bias: [f64; 3],
     /// N m or N, before the gear.
     pub limit: Option<f64>,
     /// Time constant in s.
@@ -86,21 +86,23 @@ impl Mechanism {
         let still = Drive {
             gain: 1.0,
             gear: 1.0,
-            constant: 0.0,
+            bias: [0.0; 3],
             limit: None,
             lag: None,
         };
         let mut mechanism = Self {
-            drives: vec![still; found.joints.len()],
+            drives: drives(model, &still)?,
             joints: found.joints,
             gravity: found.gravity,
             integrator: integrator(model.integrator.scheme())?,
             not_carried: Vec::new(),
         };
-        for effect in &model.effects {
+        // Behind a limit no constant torque can be added.
+        let is_constant = |effect: &&ExportedEffect| effect.name == "constant_torque";
+        let (constant, others): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_constant);
+        for effect in others.into_iter().chain(constant) {
             mechanism.carry(effect, model);
         }
-        mechanism.note_conflicts();
         if model.residual.is_some() {
             mechanism
                 .not_carried
@@ -139,25 +141,16 @@ impl Mechanism {
             // A gain behind the limit is a gear.
             ("actuator_gain", [excess]) if drive.limit.is_some() => drive.gear *= 1.0 + excess,
             ("actuator_gain", [excess]) => drive.gain *= 1.0 + excess,
-            ("actuator_saturation", [limit]) => drive.limit = Some(*limit),
+            ("actuator_saturation", [limit]) => {
+                let behind = limit / drive.gear;
+                drive.limit = Some(drive.limit.map_or(behind, |own| own.min(behind)));
+            }
             ("actuator_lag", [time]) => drive.lag = Some(*time),
-            ("constant_torque", [torque]) => drive.constant = *torque,
+            ("constant_torque", [torque]) if drive.limit.is_none() => drive.bias[0] += torque,
             _ => self.not_carried.push(format!(
                 "{} on joint {}: {}",
                 effect.name, effect.joint, effect.expression
             )),
-        }
-    }
-
-    /// Refuse a constant torque beside a limit: there it is added before the limit, in the model after it.
-    fn note_conflicts(&mut self) {
-        for (joint, drive) in data::Joint::all(self.joints.len()).zip(&mut self.drives) {
-            if drive.limit.is_some() && drive.constant != 0.0 {
-                self.not_carried.push(format!(
-                    "constant_torque on joint {joint}, beside the limit of its drive"
-                ));
-                drive.constant = 0.0;
-            }
         }
     }
 
@@ -189,6 +182,26 @@ impl Mechanism {
 fn central(inertia: &Inertia, back: &Pose) -> Matrix3<f64> {
     let tensor = inertia.seen_from(back).tensor;
     (tensor + tensor.transpose()) * 0.5
+}
+
+/// The drives of a model, which are like `still` where torques are commanded.
+fn drives(model: &ExportModel, still: &Drive) -> Result<Vec<Drive>, String> {
+    let Some(program) = model.system.drive_program() else {
+        return Ok(vec![still.clone(); model.joints()]);
+    };
+    let values = model.equations.values();
+    let servos = servos(
+        &program,
+        model.joints(),
+        &values[..model.system.parameters.len()],
+    )?;
+    let drive = |servo: Servo| Drive {
+        gain: servo.gain,
+        bias: servo.bias,
+        limit: servo.limit,
+        ..still.clone()
+    };
+    Ok(servos.into_iter().map(drive).collect())
 }
 
 /// The joint's frame in the frame of its body.

@@ -3,4 +3,5 @@
 
 pub(super) mod element;
 pub(super) mod mechanism;
+mod servo;
 pub(super) mod tree;

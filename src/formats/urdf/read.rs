@@ -40,6 +40,7 @@ pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
         name,
         gravity: Vector3::new(0.0, 0.0, -GRAVITY),
         joints,
+        drive: None,
         notes: source.into_notes(),
     })
 }

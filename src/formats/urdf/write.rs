@@ -59,7 +59,7 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
         lost(joint.drivetrain.armature > 0.0, "the rotor's inertia");
         lost(joint.drivetrain.spring.is_some(), "the spring");
         lost(drive.lag.is_some(), "the drive's lag");
-        lost(drive.constant != 0.0, "the constant torque");
+        lost(drive.bias != [0.0; 3], "what the drive adds to its command");
         #[allow(clippy::float_cmp)] // as set
         lost(drive.gain != 1.0 || drive.gear != 1.0, "the drive's gain");
     }

@@ -3,6 +3,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::recursive::{Body, Place};
 use super::{Inertia, Pose, turn};
 use crate::data;
+use crate::model::ReadyDrive;
 
 /// A spring between a joint and its base: force `-stiffness * (q - rest)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +26,17 @@ pub struct Drivetrain {
     pub spring: Option<Spring>,
     /// Effort limit of the drive, N m or N.
     pub effort: Option<f64>,
+    /// A loop that holds the joint at the position that is commanded.
+    pub servo: Option<Servo>,
+}
+
+/// A position loop: torque = stiffness * (command - q) - damping * qd.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Servo {
+    /// N m/rad, or N/m.
+    pub stiffness: f64,
+    /// N m s/rad, or N s/m.
+    pub damping: f64,
 }
 
 /// How a joint follows another one: its coordinate is `ratio * q + offset` of the leader's q.
@@ -94,12 +106,14 @@ impl Joint {
 }
 
 /// A serial mechanism: from 1 to [`MOST_JOINTS`](crate::model::MOST_JOINTS) joints, each carrying the next.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Chain {
     pub name: String,
     /// Acceleration, m/s^2, in the frame of the world.
     pub gravity: Vector3<f64>,
     pub joints: Vec<Joint>,
+    /// What drives every joint, where that is known and no torque.
+    pub drive: Option<ReadyDrive>,
     /// Properties of the file that the model file does not carry, or carries in another form.
     pub notes: Vec<String>,
 }

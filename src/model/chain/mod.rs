@@ -19,7 +19,7 @@ mod series;
 mod spatial;
 mod weightless;
 
-pub use body::{Chain, Drivetrain, Follows, Joint, Spring};
+pub use body::{Chain, Drivetrain, Follows, Joint, Servo, Spring};
 pub use model_file::model_text;
 pub(crate) use recover::{Recovered, recover};
 pub use recursive::{Body, Links, Place};

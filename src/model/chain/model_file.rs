@@ -4,12 +4,20 @@ use std::collections::HashSet;
 use std::fmt::Write;
 
 use super::bodies_text::Bodies;
-use super::body::{Chain, Joint};
+use toml_edit::DocumentMut;
+
+use super::body::{Chain, Drivetrain, Joint};
 use super::closed_form::ClosedForm;
 use super::equations::Kind;
 use super::formula::number;
 use super::series::{LONGEST_CLOSED_FORM, rounded};
 use crate::data;
+use crate::model::ready_drive::write_plain;
+use crate::model::{Library, ReadyDrive};
+
+/// The drive of a position loop, and the parameter of drives that is their effort limit.
+const SERVO: &str = "position_servo";
+const LIMIT: &str = "limit";
 
 const ABOUT: &str = "equations derived from the description of a serial mechanism";
 
@@ -25,7 +33,36 @@ pub fn model_text(chain: &Chain) -> String {
         let closed = ClosedForm::of(chain);
         (closed.text(), closed.rotors())
     };
-    [head(chain), equations, effects(chain, &rotors)].concat()
+    let declared = with_drives([head(chain), equations].concat(), chain);
+    declared + &effects(chain, &rotors)
+}
+
+/// The text with the drives of the joints, where some joint is not driven by a torque.
+fn with_drives(text: String, chain: &Chain) -> String {
+    let servo = |joint: &Joint| joint.drivetrain.servo.is_some();
+    if chain.drive.is_none() && !chain.joints.iter().any(servo) {
+        return text;
+    }
+    let mut model: DocumentMut = text.parse().expect("what is written here is TOML");
+    for (number, joint) in chain.leaders() {
+        let Drivetrain { servo, effort, .. } = joint.drivetrain;
+        let gains = servo
+            .into_iter()
+            .flat_map(|servo| [("kp", servo.stiffness), ("kd", servo.damping)]);
+        let known: Vec<(&str, f64)> = gains.chain(effort.map(|limit| (LIMIT, limit))).collect();
+        match drive_of(chain, joint) {
+            Some(drive) => drive.write_into(&mut model, number, joint.slides, &known),
+            None => write_plain(&mut model, number),
+        }
+    }
+    model.to_string()
+}
+
+/// What drives a joint, unless a torque does.
+fn drive_of(chain: &Chain, joint: &Joint) -> Option<ReadyDrive> {
+    let servo = || ReadyDrive::find(Library::drives(), SERVO).expect("an embedded drive");
+    let given = || joint.drivetrain.servo.map(|_| servo());
+    chain.drive.clone().or_else(given)
 }
 
 fn head(chain: &Chain) -> String {
@@ -129,7 +166,8 @@ fn effects(chain: &Chain, rotors: &[f64]) -> String {
         if rotors[number] > 0.0 {
             effect("rotor_inertia", &[("J", rounded(rotors[number]))]);
         }
-        if let Some(effort) = joint.drivetrain.effort {
+        let in_drive = drive_of(chain, joint).is_some_and(|drive| drive.has(LIMIT));
+        if let Some(effort) = joint.drivetrain.effort.filter(|_| !in_drive) {
             effect("actuator_saturation", &[("m", effort)]);
             text += "fixed = true\n";
         }

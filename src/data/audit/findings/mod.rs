@@ -1,5 +1,6 @@
 //! What the measured quality of a log means for fitting a model to it, in plain sentences.
 
+mod command;
 mod jumps;
 mod torque;
 mod velocity;
@@ -7,6 +8,7 @@ mod velocity;
 use super::joint::{JointAudit, VISIBLE_STEPS};
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;
+use crate::data::column::Quantity;
 use crate::data::log::{Interval, Log};
 use Severity::{Info, Serious, Warning};
 
@@ -41,12 +43,15 @@ pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
     found.about_reading(log);
     found.about_sampling(audit);
     found.about_amount_of_motion(audit);
-    let passive = audit.joints.iter().all(is_passive);
+    let by_torque = log.driven_by == Quantity::Torque;
+    let passive = by_torque && audit.joints.iter().all(is_passive);
     if passive {
         found.add(Info, "all torques are zero throughout: a passive rig; only ratios to the inertia can be found");
     }
     for joint in &audit.joints {
-        if !passive {
+        if !by_torque {
+            found.about_command(joint);
+        } else if !passive {
             found.about_torque(joint, audit);
         }
         if found.moves(joint) {

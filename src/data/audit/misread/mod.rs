@@ -129,7 +129,7 @@ impl Change {
         let values = match (self.quantity, self.joint) {
             (Quantity::Angle, Some(joint)) => &mut log.q[joint],
             (Quantity::Velocity, Some(joint)) => &mut log.qd[joint],
-            (Quantity::Torque, Some(joint)) => &mut log.tau[joint],
+            (Quantity::Torque | Quantity::Command, Some(joint)) => &mut log.tau[joint],
             _ => &mut log.time,
         };
         let factor = match self.to {
@@ -157,7 +157,7 @@ impl Change {
             Quantity::Time => None,
             Quantity::Angle => Some(&mut columns.q),
             Quantity::Velocity => columns.qd.as_mut(),
-            Quantity::Torque => Some(&mut columns.tau),
+            Quantity::Torque | Quantity::Command => Some(&mut columns.tau),
         };
         let column = match (list, self.joint) {
             (Some(list), Some(joint)) => &mut list[joint],

@@ -1,0 +1,165 @@
+//! Drives that many rigs have, ready to be written into model files.
+
+use std::path::Path;
+
+use toml_edit::{DocumentMut, InlineTable, Item, Table};
+
+use super::fitted::unit_on;
+use super::reader::{Document, FileError, Section};
+use super::sections;
+use crate::data::{Joint, Quantity};
+use crate::expr::{Formula, Graph, Scope, SignForm, suggestion};
+
+/// What formulas of a drive file may mention of their joint besides the parameters.
+const NAMES: [&str; 4] = ["q", "qd", Quantity::Command.key(), "t"];
+
+/// A drive of one joint: one file of `models/drives`.
+#[derive(Debug, Clone)]
+pub struct ReadyDrive {
+    pub name: String,
+    /// What it is, and what its command is.
+    pub about: String,
+    torque: Formula,
+    /// Entries as in `[parameters]` of a model file, without the number of a joint.
+    parameters: Vec<(String, InlineTable)>,
+}
+
+impl ReadyDrive {
+    /// The drive in `text`; `path` is for messages.
+    ///
+    /// # Errors
+    /// Unknown or missing key, formula error: with line, column and remedy.
+    pub fn from_text(path: &Path, text: &str) -> Result<Self, FileError> {
+        let document = Document::new(path, text);
+        let top = document.parse()?;
+        top.only(&["drive", "parameters"])?;
+        let section = top.required_section("drive")?;
+        section.only(&["name", "about", "torque"])?;
+        let missing = || section.error("`torque` is missing in [drive]");
+        let torque = section.formula("torque")?.ok_or_else(missing)?;
+        let given = sections::parameters(top.section("parameters")?)?;
+        let names = given.iter().map(|p| p.name.as_str());
+        let mut graph = Graph::new();
+        let scope = Scope::of_inputs(&mut graph, NAMES.into_iter().chain(names));
+        (scope.lower(&mut graph, &torque.value))
+            .map_err(|error| document.formula_error(torque.at, &error))?;
+        Ok(Self {
+            name: section.required_text("name")?.value,
+            about: section.required_text("about")?.value,
+            torque: torque.value,
+            parameters: entries(&section, text)?,
+        })
+    }
+
+    /// The drive of this name.
+    ///
+    /// # Errors
+    /// Unknown name, with a similar known one.
+    pub fn find(drives: Vec<Self>, name: &str) -> Result<Self, String> {
+        let near = suggestion(name, drives.iter().map(|drive| drive.name.as_str()));
+        let mut drives = drives.into_iter();
+        drives
+            .find(|drive| drive.name == name)
+            .ok_or_else(|| format!("unknown drive `{name}`{near}; `residyn list drives` shows all"))
+    }
+
+    /// The torque in terms of the command, as the file has it.
+    pub fn text(&self) -> &str {
+        self.torque.text()
+    }
+
+    /// Name, unit and meaning of each parameter.
+    pub fn parameters(&self) -> impl Iterator<Item = [&str; 3]> {
+        self.parameters.iter().map(|(name, table)| {
+            let part = |key: &str| table.get(key).and_then(toml_edit::Value::as_str);
+            [
+                name,
+                part("unit").unwrap_or(""),
+                part("about").unwrap_or(""),
+            ]
+        })
+    }
+
+    pub(super) fn has(&self, parameter: &str) -> bool {
+        self.parameters.iter().any(|(name, _)| name == parameter)
+    }
+
+    /// Write the drive of a joint into a model file, with these values of its parameters where they are known.
+    pub(super) fn write_into(
+        &self,
+        model: &mut DocumentMut,
+        joint: Joint,
+        slides: bool,
+        known: &[(&str, f64)],
+    ) {
+        add_line(model, joint, &self.formula(joint));
+        for (name, table) in &self.parameters {
+            let mut table = table.clone();
+            if let Some((_, value)) = known.iter().find(|(known, _)| known == name) {
+                table.insert("value", (*value).into());
+            }
+            if let Some(unit) = table.get("unit").and_then(toml_edit::Value::as_str) {
+                let unit = unit_on(slides, unit);
+                table.insert("unit", unit.into());
+            }
+            model["parameters"][&own_name(name, joint)] = toml_edit::value(table);
+        }
+    }
+
+    /// The torque in the names of a joint.
+    fn formula(&self, joint: Joint) -> String {
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(SignForm::Exact);
+        for name in NAMES {
+            let of_joint = match name {
+                "t" => name.to_owned(),
+                stem => joint.name(stem),
+            };
+            let node = graph.input(&of_joint);
+            scope.bind(name, node);
+        }
+        for (name, _) in &self.parameters {
+            let node = graph.input(&own_name(name, joint));
+            scope.bind(name, node);
+        }
+        let node = scope
+            .lower(&mut graph, &self.torque)
+            .expect("formulas were checked when the file was read");
+        graph.finish(&[node]).formula(0)
+    }
+}
+
+/// A command that is the torque itself, in a model file in which other joints have drives.
+pub(super) fn write_plain(model: &mut DocumentMut, joint: Joint) {
+    add_line(model, joint, &joint.name(Quantity::Command.key()));
+}
+
+/// `kp_1`
+fn own_name(parameter: &str, joint: Joint) -> String {
+    format!("{parameter}_{joint}")
+}
+
+fn add_line(model: &mut DocumentMut, joint: Joint, formula: &str) {
+    let drive = model
+        .entry("drive")
+        .or_insert_with(|| Item::Table(Table::new()));
+    drive[&joint.name(Quantity::Torque.key())] = toml_edit::value(formula);
+}
+
+/// The entries under `[parameters]`.
+fn entries(section: &Section<'_>, text: &str) -> Result<Vec<(String, InlineTable)>, FileError> {
+    let document: DocumentMut = text.parse().expect("the text was read as TOML before");
+    let given = document.get("parameters").and_then(Item::as_table_like);
+    let entry = |(name, item): (&str, &Item)| {
+        let table = item.as_inline_table().cloned();
+        let table = table.ok_or_else(|| {
+            section.error(format!("write parameter `{name}` as a table in braces"))
+        })?;
+        Ok((name.to_owned(), table))
+    };
+    given
+        .into_iter()
+        .flat_map(|given| given.iter())
+        .map(entry)
+        .collect()
+}

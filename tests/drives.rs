@@ -1,0 +1,299 @@
+//! Rigs that are driven by commands: servos under position targets, motors under volts.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use residyn::data::Joint;
+use residyn::formats::{ExportModel, find};
+use residyn::model::chain::model_text;
+use residyn::sim::Integrator;
+use residyn::{Library, Model};
+use serde_json::Value;
+
+use crate::clients::client;
+use crate::common::{assert_near, points};
+use crate::mechanism;
+use crate::support::{refuses, succeeds, text};
+
+/// A pendulum arm on two position servos, as it is drawn or as it is built. Friction there hardens in half a millisecond: by
+/// default MuJoCo's acts some ten milliseconds ahead of the velocity.
+fn arm(shoulder: &str, elbow: &str) -> String {
+    format!(
+        r#"<mujoco model="servo arm">
+  <compiler angle="radian"/>
+  <option timestep="0.00005"/>
+  <worldbody>
+    <body name="upper" pos="0 0 1">
+      <joint name="shoulder" axis="0 1 0" damping="0.3" {shoulder}/>
+      <inertial pos="0 0 -0.15" mass="0.8" diaginertia="0.007 0.007 0.0005"/>
+      <body name="fore" pos="0 0 -0.3">
+        <joint name="elbow" axis="0 1 0" {elbow}/>
+        <inertial pos="0 0 -0.12" mass="0.4" diaginertia="0.0025 0.0025 0.0002"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="shoulder" joint="shoulder" kp="60" kv="2" forcerange="-12 12"/>
+    <position name="elbow" joint="elbow" kp="25" kv="0.8" forcerange="-5 5"/>
+  </actuator>
+</mujoco>
+"#
+    )
+}
+
+/// What the report found of an effect on a joint: value and 95 % interval of its first parameter.
+fn found(report: &Value, name: &str, joint: u64) -> Option<[f64; 3]> {
+    let mut effects = report["effects"].as_array()?.iter();
+    let effect = effects.find(|e| e["name"] == name && e["joint"] == joint)?;
+    estimate(&effect["parameters"][0])
+}
+
+fn estimate(parameter: &Value) -> Option<[f64; 3]> {
+    let ends = parameter["ci95"].as_array()?;
+    Some([
+        parameter["value"].as_f64()?,
+        ends[0].as_f64()?,
+        ends[1].as_f64()?,
+    ])
+}
+
+/// Whether a value is right within twice its interval.
+fn holds([value, low, high]: [f64; 3], truth: f64) -> bool {
+    (value - truth).abs() <= high - low
+}
+
+fn close_the_loop(model: &Path, train: &[PathBuf], test: &Path, out: &Path) -> Value {
+    let mut arguments = vec!["closeloop", "--json", "--model", text(model), "--train"];
+    arguments.extend(train.iter().map(|log| text(log)));
+    arguments.extend(["--test", text(test), "--out", text(out)]);
+    serde_json::from_str(&succeeds(&arguments)).unwrap()
+}
+
+#[test]
+fn what_a_drawing_of_a_servo_arm_lacks_is_named() {
+    if std::env::var_os("RESIDYN_PYTHON").is_none() {
+        eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("drawn.xml"), arm("", "")).unwrap();
+    let friction = |level: f64, rotor: f64| {
+        format!("armature=\"{rotor}\" frictionloss=\"{level}\" solreffriction=\"0.0005 1\"")
+    };
+    fs::write(
+        at("built.xml"),
+        arm(&friction(0.4, 0.02), &friction(0.15, 0.01)),
+    )
+    .unwrap();
+    let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
+    let (built, delay) = (at("built.xml"), PathBuf::from("0.014"));
+    let mut arguments: Vec<&Path> = vec![&built, &delay];
+    arguments.extend(logs.iter().map(PathBuf::as_path));
+    client("servo.py", &arguments);
+    let model = at("arm.toml");
+    succeeds(&[
+        "new",
+        "--from-mjcf",
+        text(&at("drawn.xml")),
+        "--tip",
+        "fore",
+        "--out",
+        text(&model),
+    ]);
+    // The gains of the loops are set, and known.
+    let declared = fs::read_to_string(&model).unwrap();
+    let known = declared.replace(
+        "unit = \"N m/rad\", positive = true",
+        "unit = \"N m/rad\", fixed = true",
+    );
+    assert_eq!(known.matches("fixed = true").count(), 5, "{known}");
+    fs::write(&model, known).unwrap();
+    let report = close_the_loop(&model, &logs[..3], &logs[3], &at("out"));
+    assert_eq!(report["verdict"], "explained", "{report:#}");
+    // MuJoCo moves positions by the new velocities: half a step ahead.
+    let truth = [
+        ("actuator_delay", 1, 0.014 - 2.5e-5),
+        ("actuator_delay", 2, 0.014 - 2.5e-5),
+        ("coulomb_friction", 1, 0.4),
+        ("coulomb_friction", 2, 0.15),
+        ("rotor_inertia", 2, 0.01),
+    ];
+    assert_eq!(report["effects"].as_array().unwrap().len(), truth.len());
+    for (name, joint, value) in truth {
+        let estimate = found(&report, name, joint).unwrap();
+        assert!(holds(estimate, value), "{name} {joint}: {estimate:?}");
+    }
+    // The rotor of the shoulder is part of the upper arm's inertia.
+    let inertia = &report["parameters"][0];
+    assert_eq!(inertia["name"], "zz_1");
+    let estimate = estimate(inertia).unwrap();
+    assert!(holds(estimate, 0.061 + 0.02), "{estimate:?}");
+}
+
+#[test]
+fn what_a_servo_hides_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
+    for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
+        succeeds(&[
+            "simulate",
+            "--plant",
+            "servo-real",
+            "--out",
+            text(log),
+            "--seed",
+            seed,
+        ]);
+    }
+    let header = fs::read_to_string(&logs[0]).unwrap();
+    assert!(header.starts_with("time,q1,qd1,cmd1\n"));
+    let report = close_the_loop(Path::new("servo"), &logs[..3], &logs[3], &at("out"));
+    assert_eq!(report["verdict"], "explained");
+    assert_eq!(report["effects"].as_array().unwrap().len(), 2);
+    for (name, value) in [("coulomb_friction", 0.12), ("actuator_delay", 0.012)] {
+        let estimate = found(&report, name, 1).unwrap();
+        assert!(holds(estimate, value), "{name}: {estimate:?}");
+    }
+    let text = fs::read_to_string(at("out/report.md")).unwrap();
+    assert!(text.contains("under the logged commands"));
+    assert!(text.contains("`cmd1(t - d1)`"));
+    // No torque is in the logs, and none can be compared.
+    assert!(report["torque"].is_null());
+    let said = refuses(&[
+        "closeloop",
+        "--model",
+        "servo",
+        "--train",
+        self::text(&logs[0]),
+        "--errors",
+        "torque",
+    ]);
+    assert!(said.contains("servo is driven by commands"), "{said}");
+}
+
+#[test]
+fn a_log_of_commands_needs_a_drive() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("log.csv");
+    fs::write(&log, "time,q1,qd1,cmd1\n0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n").unwrap();
+    let said = refuses(&["closeloop", "--model", "pendulum", "--train", text(&log)]);
+    assert!(
+        said.contains("log.csv, line 1: there is no column \"tau1\""),
+        "{said}"
+    );
+    assert!(said.contains("say in [drive] of the model file"), "{said}");
+    fs::write(&log, "time,q1,qd1,tau1\n0,0,0,1\n0.01,0,0,1\n0.02,0,0,1\n").unwrap();
+    let said = refuses(&["closeloop", "--model", "servo", "--train", text(&log)]);
+    assert!(said.contains("there is no column \"cmd1\""), "{said}");
+}
+
+/// What a model file says that is wrong in this way.
+fn message(drive: &str) -> String {
+    let library = Library::built_in();
+    let text = Library::system_text("servo").unwrap();
+    let start = text.find("tau1 =").unwrap();
+    let end = start + text[start..].find('\n').unwrap();
+    let wrong = [&text[..start], drive, &text[end..]].concat();
+    let read = Model::from_text(Path::new("servo.toml"), &wrong, library.effects());
+    read.unwrap_err().to_string()
+}
+
+#[test]
+fn faults_of_a_drive_are_told_with_their_place() {
+    assert!(message("").contains(
+        "`tau1` is missing in [drive]; a joint whose command is its torque has tau1 = \"cmd1\""
+    ));
+    let unknown = message("tau1 = \"kp*(cmd2 - q1)\"");
+    assert!(
+        unknown.starts_with("servo.toml, line 14, column") && unknown.contains("cmd2"),
+        "{unknown}"
+    );
+    assert!(message("tau1 = \"cmd1\"\ntau2 = \"cmd1\"").contains("tau2"));
+    // The torque is what comes out.
+    assert!(message("tau1 = \"tau1 + cmd1\"").contains("tau1"));
+}
+
+#[test]
+fn ready_drives_are_written_into_models() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = mechanism::fixture("planar_2r.urdf");
+    for drive in Library::drives() {
+        let out = folder.path().join(format!("{}.toml", drive.name));
+        let flags = [
+            "new",
+            "--from-urdf",
+            text(&file),
+            "--drive",
+            &drive.name,
+            "--out",
+        ];
+        succeeds(&[&flags[..], &[text(&out)]].concat());
+        let library = Library::built_in();
+        let model = library.model(&out).unwrap();
+        assert_eq!(model.dynamics().program.inputs()[4], "cmd1");
+        let own = |name: &str| model.parameters.iter().any(|p| p.name == name);
+        assert!(
+            drive
+                .parameters()
+                .all(|[name, ..]| own(&format!("{name}_2")))
+        );
+        // An effort limit is part of the drive where that has one.
+        let limits = model
+            .effects
+            .iter()
+            .filter(|e| e.effect.name == "actuator_saturation");
+        assert_eq!(
+            limits.count(),
+            usize::from(!own("limit_1")),
+            "{}",
+            drive.name
+        );
+    }
+    let said = refuses(&[
+        "new",
+        "--from-urdf",
+        text(&file),
+        "--drive",
+        "position_server",
+    ]);
+    assert!(said.contains("did you mean `position_servo`"), "{said}");
+}
+
+#[test]
+fn a_written_servo_reads_back_as_one() {
+    let library = Library::built_in();
+    let servo = library.model("servo").unwrap();
+    let model = ExportModel::of_system(&servo, Integrator::RK4, 0.01, Value::Null);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("servo.xml");
+    find("mjcf").unwrap().write(&model, &path).unwrap();
+    let text = model_text(&mechanism::read(&path));
+    let back = Model::from_text(Path::new("back.toml"), &text, library.effects()).unwrap();
+    let [back, own] = [back.dynamics(), servo.dynamics()];
+    for point in points(&own, 50, 1) {
+        let [found, wanted] =
+            [&back, &own].map(|d| d.program.eval(&[&point[..4], &d.values()].concat())[1]);
+        assert_near(found, wanted, 1e-9, "acceleration");
+    }
+}
+
+#[test]
+fn effects_of_the_torque_act_behind_the_drive() {
+    let library = Library::built_in();
+    let model = library.model("servo").unwrap();
+    let gain = library.effect("actuator_gain").unwrap();
+    let mut doubled = residyn::model::FittedEffect::absent(gain, Joint::at(0));
+    doubled.values[0].0 = 1.0;
+    let with = model.with_effects(vec![doubled]);
+    let acceleration = |model: &Model, command: f64| {
+        let dynamics = model.dynamics();
+        let inputs = [&[0.0, 0.0, command, 0.0], dynamics.values().as_slice()].concat();
+        dynamics.program.eval(&inputs)[1]
+    };
+    // 15 N m/rad up to 1.9 N m, on 0.02 kg m^2; twice the torque, not twice the command.
+    assert!((acceleration(&model, 0.1) - 75.0).abs() < 1e-9);
+    assert!((acceleration(&model, 9.0) - 95.0).abs() < 1e-9);
+    assert!((acceleration(&with, 9.0) - 190.0).abs() < 1e-9);
+}
