@@ -228,7 +228,10 @@ fn only_parameters_per_log_take_values_of_single_logs() {
 fn a_missing_model_is_answered_with_the_known_ones() {
     says(
         &scratch("log.csv", GOOD).closeloop("pendulun"),
-        &["pendulun", "acrobot, cartpole, drive, pendulum"],
+        &[
+            "pendulun",
+            "acrobot, cartpole, drive, motor, pendulum, servo",
+        ],
     );
 }
 

@@ -52,8 +52,12 @@ pub fn dynamics(system: &Model, effects: &[FittedEffect], sign: SignForm) -> Dyn
 
 /// Whether the effect can act on that joint.
 pub fn can_act(system: &Model, effect: &Effect, joint: usize) -> bool {
-    let inertia = matches!(effect.entry, Entry::Inertia(_));
-    !(inertia && !system.has_mass_matrix() || effect.first_joint_only && joint > 0)
+    let inertia = matches!(effect.entry, Entry::Inertia(_) | Entry::Coupling(_));
+    let slides = &system.prismatic;
+    let alone = joint + 1 == system.joints || slides[joint] != slides[joint + 1];
+    !(inertia && !system.has_mass_matrix()
+        || effect.first_joint_only && joint > 0
+        || effect.is_coupling() && alone)
 }
 
 /// An effect as a user would write one, in a folder of the user's own.
@@ -205,6 +209,7 @@ pub fn simulate(model: &Dynamics, start: &[f64], torque: f64, rows: usize, seed:
         .map(|_| [rng.random_range(0.5..12.0), rng.random_range(0.0..TAU)])
         .collect();
     let mut log = empty_log(&format!("{seed}.csv"), n);
+    log.driven_by = model.driven_by();
     log.time = (0..=rows).map(|row| 0.01 * row as f64).collect();
     for (j, tau) in log.tau.iter_mut().enumerate() {
         let wave = |time: f64| {

@@ -240,6 +240,38 @@ fn a_rotor_adds_to_its_own_joint_alone() {
     }
 }
 
+/// The motor turns with both joints: what its friction and its rotor take of the sum is missing on the first joint, and r times
+/// that on the second.
+#[test]
+fn a_coupled_motor_takes_from_both_joints() {
+    let library = Library::built_in();
+    let coupling = library.effect("joint_coupling").unwrap();
+    let (name, oracle) = ORACLES[1];
+    assert_eq!(name, "acrobot");
+    let system = system(name);
+    assert!(system.can_carry(coupling, Joint::at(1)).is_err());
+    for ratio in [1.0, -1.0, 0.3] {
+        let [level, viscous, inertia] = [0.4, 0.3, 0.2];
+        let effect = fitted(coupling, 0, &[level, viscous, inertia, ratio]);
+        assert_eq!(effect.label(), "joint_coupling on joint 1 with 2");
+        let model = dynamics(&system, &[effect], SignForm::Exact);
+        for mut point in points(&model, 100, 6) {
+            let end = point.len() - 4;
+            point[end..].copy_from_slice(&[level, viscous, inertia, ratio]);
+            let found = model.program.eval(&point);
+            let sum = |of: &[f64]| of[0] + ratio * of[1];
+            let (speed, acceleration) = (sum(&point[2..4]), sum(&found[2..]));
+            let taken = level * sign(speed) + viscous * speed + inertia * acceleration;
+            let mut left = point[..end].to_vec();
+            left[4] -= taken;
+            left[5] -= ratio * taken;
+            for (j, wanted) in oracle(&left).into_iter().enumerate() {
+                assert_near(found[2 + j], wanted, ROUNDING, name);
+            }
+        }
+    }
+}
+
 #[test]
 fn torque_effects_come_before_forces_and_in_their_order() {
     let library = Library::built_in();
@@ -286,9 +318,10 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 #[test]
 fn every_effect_file_is_tested_here() {
     let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
-    // Those with memory and those of the sensor are tested in memory.rs, a tilt, a rotor and an offset above.
+    // Those with memory and those of the sensor are tested in memory.rs, a tilt, a rotor, a coupling and an offset above.
     tested.extend([
         "gravity_tilt",
+        "joint_coupling",
         "rotor_inertia",
         "encoder_eccentricity",
         "sensor_offset",

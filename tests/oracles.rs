@@ -19,6 +19,9 @@ pub const ORACLES: [(&str, Oracle); 4] = [
     ("drive", drive),
 ];
 
+/// Those that are driven by commands, in place of torques.
+const COMMANDED: [(&str, Oracle); 2] = [("servo", servo), ("motor", motor)];
+
 fn pendulum(x: &[f64]) -> Vec<f64> {
     let [phi, _, a, _, c_g, c_i] = x.try_into().unwrap();
     vec![c_g * phi.sin() + c_i * a]
@@ -91,9 +94,28 @@ fn drive(x: &[f64]) -> Vec<f64> {
     vec![force / m]
 }
 
+/// A link that a spring pulls to its target, no harder than a limit.
+fn servo(x: &[f64]) -> Vec<f64> {
+    let [q, v, target, _, inertia, gravity, stiffness, damping, limit] = x.try_into().unwrap();
+    let pull = stiffness * (target - q) - damping * v;
+    let held = if pull.abs() > limit {
+        limit.copysign(pull)
+    } else {
+        pull
+    };
+    vec![(held - gravity * q.sin()) / inertia]
+}
+
+/// A pendulum on a motor whose current is what its voltage leaves beside the voltage that it makes itself.
+fn motor(x: &[f64]) -> Vec<f64> {
+    let [q, v, volts, _, inertia, gravity, constant, resistance] = x.try_into().unwrap();
+    let current = (volts - constant * v) / resistance;
+    vec![(constant * current - gravity * q.sin()) / inertia]
+}
+
 #[test]
 fn systems_match_equations_written_by_hand() {
-    for (name, oracle) in ORACLES {
+    for (name, oracle) in ORACLES.into_iter().chain(COMMANDED) {
         let model = dynamics(&system(name), &[], SignForm::Exact);
         let n = model.joints;
         for point in points(&model, 500, 1) {
@@ -108,7 +130,8 @@ fn systems_match_equations_written_by_hand() {
 
 #[test]
 fn every_system_has_an_oracle() {
-    let mut known = ORACLES.map(|(name, _)| name);
+    let all = ORACLES.into_iter().chain(COMMANDED);
+    let mut known: Vec<&str> = all.map(|(name, _)| name).collect();
     known.sort_unstable();
     assert_eq!(residyn::model::Library::system_names(), known);
 }

@@ -17,7 +17,8 @@ reference = {variable.name: variable.valueReference for variable in description.
 joints = [f"joint[{k + 1}]" for k in range(samples["joints"])]
 states = [reference[f"{joint}.{what}"] for what in ("position", "velocity") for joint in joints]
 rates = [reference[f"der({joint}.{what})"] for what in ("position", "velocity") for joint in joints]
-torques = [reference.get(f"{joint}.torque", reference.get(f"{joint}.force")) for joint in joints]
+kinds = ("torque", "force", "command")
+torques = [next(reference[v] for v in (f"{joint}.{k}" for k in kinds) if v in reference) for joint in joints]
 
 
 fmi2 = description.fmiVersion == "2.0"

@@ -1,5 +1,7 @@
 //! One cell: record its logs, close the loop, fit the true structure for comparison, judge.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, anyhow};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -76,12 +78,21 @@ impl Cell {
     /// # Errors
     /// A model file that cannot be read, or rules by which no rig can be drawn.
     pub fn settled(&self, library: &Library) -> anyhow::Result<Self> {
-        let Source::Drawn(recipe) = &self.source else {
-            return Ok(self.clone());
-        };
-        let model = library.model(&self.model)?;
         let mut rng =
             ChaCha8Rng::seed_from_u64(content_hash(format!("{}: rig", self.id).as_bytes()));
+        let recipe = match &self.source {
+            Source::Drawn(recipe) => recipe,
+            Source::Arm(arm) => {
+                let effects = arm.hidden(&library.model(&self.model)?, &mut rng);
+                let effects = effects.map_err(|message| anyhow!("{}: {message}", self.id))?;
+                return Ok(Self {
+                    effects,
+                    ..self.clone()
+                });
+            }
+            Source::Simulated(_) | Source::Files { .. } => return Ok(self.clone()),
+        };
+        let model = library.model(&self.model)?;
         let drawn = recipe.settle(self, &model, library, &mut rng)?;
         let mut settled = self.drawn(&drawn, &drawn.effects);
         let (_, truth) = settled.record(&model)?;
@@ -95,6 +106,7 @@ impl Cell {
         match &self.source {
             Source::Simulated(simulation) => Some(simulation.mechanics.joints()),
             Source::Drawn(recipe) => Some(recipe.mechanics.joints()),
+            Source::Arm(arm) => Some(arm.amplitude.len()),
             Source::Files { .. } => None,
         }
     }
@@ -138,6 +150,11 @@ impl Cell {
                 Ok((logs, Truth::of(&self.effects, declared.clone(), &[])))
             }
             Source::Simulated(simulation) => Ok(self.simulate(simulation)),
+            Source::Arm(arm) => {
+                let logs = arm.record(model, &self.effects, &mut self.rng());
+                let logs = logs.map_err(|message| anyhow!("{}: {message}", self.id))?;
+                Ok((logs, Truth::of(&self.effects, BTreeMap::new(), &[])))
+            }
             Source::Drawn(_) => Err(anyhow!("{}: its rig has not been drawn", self.id)),
         }
     }
@@ -146,8 +163,7 @@ impl Cell {
         let (driving, condition) = (&simulation.driving, &simulation.condition);
         let machine = Machine::with(simulation.mechanics.clone(), &self.effects)
             .expect("the effects were checked when the grid was read");
-        // Cells share neither their motions nor their noise.
-        let mut rng = ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()));
+        let mut rng = self.rng();
         let offsets: Vec<Pair> = (0..condition.logs)
             .map(|_| self.draw_offset(&mut rng))
             .collect();
@@ -156,6 +172,11 @@ impl Cell {
             machine.record(driving, condition, index, *offset, &mut rng)
         };
         (offsets.iter().enumerate().map(record).collect(), truth)
+    }
+
+    /// Cells share neither their motions nor their noise.
+    fn rng(&self) -> ChaCha8Rng {
+        ChaCha8Rng::seed_from_u64(content_hash(self.id.as_bytes()))
     }
 
     fn draw_offset(&self, rng: &mut ChaCha8Rng) -> Pair {
@@ -178,7 +199,11 @@ impl Cell {
         let split = last_is_test(logs);
         let settings = Settings::default();
         let (effects, known) = (&self.effects, &truth.declared);
-        let told = Told::fit(&model, library, &split, &settings, effects, known);
+        // What an arm is told is compared by torques, which this fit knows nothing of.
+        let told = match self.source {
+            Source::Arm(_) => None,
+            _ => Told::fit(&model, library, &split, &settings, effects, known),
+        };
         if self.group == Group::Told {
             let told = told.context("the true structure cannot be fitted")?;
             return Ok(Findings::Told(KnownStructure {

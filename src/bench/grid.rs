@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::arm::{Arm, Lacks};
 use super::condition::{Condition, Driving};
 use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
@@ -73,6 +74,24 @@ struct Draws {
     outside: usize,
 }
 
+/// Arms of many joints: what each of them lacks is drawn by chance, of these kinds in turn.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Arms {
+    /// The part of a cell's name before what is hidden and its number.
+    name: String,
+    /// A model file, as seen from the grid.
+    model: PathBuf,
+    lacks: Vec<Lacks>,
+    /// First and last number of the cells of each kind.
+    numbers: [u64; 2],
+    bodies: [f64; 2],
+    amplitude: Vec<f64>,
+    rate_hz: f64,
+    seconds: Vec<f64>,
+    noise: [f64; 2],
+}
+
 /// Every set of effects under every condition with every seed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -87,6 +106,7 @@ struct Series {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    #[serde(default)]
     plants: BTreeMap<String, Plant>,
     #[serde(default)]
     conditions: BTreeMap<String, Condition>,
@@ -96,6 +116,8 @@ struct File {
     rules: Option<Rules>,
     #[serde(default)]
     draws: Vec<Draws>,
+    #[serde(default)]
+    arms: Vec<Arms>,
 }
 
 /// One test: a rig with its effects, how its logs are taken, and a seed.
@@ -133,6 +155,8 @@ pub enum Source {
     Simulated(Box<Simulation>),
     /// A rig that is drawn when it is asked for.
     Drawn(Box<Recipe>),
+    /// An arm, whose effects are drawn when it is asked for.
+    Arm(Box<Arm>),
     /// Recorded by another program.
     Files {
         logs: Vec<PathBuf>,
@@ -173,6 +197,7 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
         let drawn = file.drawn(draws, path);
         all.extend(drawn.map_err(|message| wrong(format!("draws {}: {message}", draws.name)))?);
     }
+    all.extend(file.arms.iter().flat_map(|arms| arms.cells(path)));
     let mut ids: Vec<&str> = all.iter().map(|cell| cell.id.as_str()).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|two| two[0] == two[1]) {
@@ -275,6 +300,36 @@ impl File {
                 })
             })
             .collect()
+    }
+}
+
+impl Arms {
+    fn cells(&self, path: &Path) -> Vec<Cell> {
+        let [first, last] = self.numbers;
+        let cell = |lacks: Lacks, number: u64| Cell {
+            id: format!("{}/{}/{number}", self.name, lacks.name()),
+            group: match lacks {
+                Lacks::Nothing => Group::None,
+                _ => Group::Several,
+            },
+            plant: self.name.clone(),
+            condition: lacks.name().to_owned(),
+            effects: Vec::new(),
+            seed: number,
+            model: beside_or_named(path, &self.model),
+            start: BTreeMap::new(),
+            source: Source::Arm(Box::new(Arm {
+                lacks,
+                bodies: self.bodies,
+                amplitude: self.amplitude.clone(),
+                rate_hz: self.rate_hz,
+                seconds: self.seconds.clone(),
+                noise: self.noise,
+            })),
+        };
+        let of_kind = |lacks: &Lacks| (first..=last).map(|number| cell(*lacks, number)).collect();
+        let all: Vec<Vec<Cell>> = self.lacks.iter().map(of_kind).collect();
+        all.concat()
     }
 }
 

@@ -5,6 +5,7 @@
 //! until the logs are recorded.
 
 mod answer;
+mod arm;
 mod cell;
 mod condition;
 mod coverage;
@@ -29,6 +30,7 @@ mod told;
 mod transmission;
 mod wires;
 
+pub use arm::{Arm, Lacks};
 pub use cell::{Errors, Findings, KnownStructure, Searched};
 pub use condition::{Condition, Driving, Loop};
 pub use coverage::Coverage;

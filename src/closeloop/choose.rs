@@ -12,12 +12,13 @@ use crate::sim::metric::{errors_in, torque_error};
 /// A window in which a joint moves by less than this share of its farthest way (as squares) is one at rest.
 const AT_REST: f64 = 1e-2;
 
-/// With more joints than this a fit of the motion takes too long to try.
+/// With more joints than this a fit of the motion takes minutes before any search begins, and torques are compared.
 const FITTED_JOINTS: usize = 3;
 
 impl Study<'_> {
     /// Whether a controller prescribes the motion, so that the declared model, with the friction that most machines have,
-    /// explains far more of the torques than of half a second of open-loop motion. Never of a model that gives accelerations.
+    /// explains far more of the torques than of half a second of open-loop motion, or so many joints move that no other errors
+    /// can be lowered in time. Never of a model that gives accelerations, nor of one driven by commands.
     pub(super) fn is_prescribed(&self, library: &[Effect]) -> bool {
         self.tells_more_of_torques(library).unwrap_or(false)
     }
@@ -31,12 +32,12 @@ impl Study<'_> {
             .with_effects([own, friction.as_slice()].concat());
         let fitted = fit_torques(&self.smoothed(&model), self.declared, self.logs).ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
+        if self.declared.joints > FITTED_JOINTS {
+            return Some(true);
+        }
         let far = self.settings.fit.prescribed * torque;
         if self.motion_error(&fitted.model) < far {
             return Some(false);
-        }
-        if self.declared.joints > FITTED_JOINTS {
-            return Some(true);
         }
         // Torques may be fitted well by what cannot move like the rig.
         let mut by_motion = Study {

@@ -51,7 +51,7 @@ pub(super) fn establish(
                 };
             }
         };
-        let of_joint = |losses: &Losses| losses.of_joint(effect.joint);
+        let of_joint = |losses: &Losses| losses.of_effect(&effect);
         let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
         let evidence = Evidence {
             gain: gain(&of_joint(&less.losses), &of_joint(&chosen.losses)),

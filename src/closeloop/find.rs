@@ -8,9 +8,8 @@ use super::select::{Losses, Rival, Round, Search, Trial, candidates, starts};
 use super::space::Space;
 use super::stage::{Observer, Stage};
 use super::study::Study;
-use crate::data::Joint;
 use crate::identify::{FitError, Identifiability};
-use crate::model::{Library, Status};
+use crate::model::{FittedEffect, Library, Status};
 
 /// The result of searching the logs for what the declared model lacks.
 pub struct Found {
@@ -48,17 +47,19 @@ impl Chosen {
     fn doubt(&mut self, study: &Study<'_>, before: &Fitted, remainder: &Unexplained) {
         let settings = &study.settings.establish;
         let [declared, with] = [before, &self.after].map(|model| Loss::of(study, model));
-        let left = |of: &Loss, joint| of.on(joint) / declared.on(joint).max(f64::MIN_POSITIVE);
+        let left = |of: &Loss, effect: &FittedEffect| {
+            of.on(effect) / declared.on(effect).max(f64::MIN_POSITIVE)
+        };
         self.demote(MASKING, |standing| {
-            let joint = standing.effect.joint;
-            remainder.matters_on(study, joint) && left(&with, joint) > settings.masking
+            let effect = &standing.effect;
+            remainder.matters_on(study, effect.joint) && left(&with, effect) > settings.masking
         });
         self.demote(OUTWEIGHED, |standing| {
-            let joint = standing.effect.joint;
-            let least = settings.outweighed * remainder.fraction_on(study, joint);
+            let effect = &standing.effect;
+            let least = settings.outweighed * remainder.fraction_on(study, effect.joint);
             let without = standing.without.as_ref();
             let without = without.map(|without| Loss::of(study, without));
-            without.is_ok_and(|without| left(&without, joint) - left(&with, joint) < least)
+            without.is_ok_and(|without| left(&without, effect) - left(&with, effect) < least)
         });
     }
 
@@ -228,8 +229,8 @@ impl Loss {
         self.losses.total() * self.unit
     }
 
-    /// Of what a joint is judged by.
-    fn on(&self, joint: Joint) -> f64 {
-        self.losses.of_joint(joint).iter().sum::<f64>() * self.unit
+    /// Of what an effect is judged by.
+    fn on(&self, effect: &FittedEffect) -> f64 {
+        self.losses.of_effect(effect).iter().sum::<f64>() * self.unit
     }
 }

@@ -40,6 +40,12 @@ impl Joint {
         self.0
     }
 
+    /// The one after it.
+    #[must_use]
+    pub const fn next(self) -> Self {
+        Self(self.0 + 1)
+    }
+
     /// Its number, from 1.
     pub const fn number(self) -> usize {
         self.0 + 1

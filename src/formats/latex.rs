@@ -114,6 +114,13 @@ fn place(effect: &FittedEffect) -> String {
         Entry::Force(_) => format!("added to {}", of_joint("tau")),
         Entry::Torque(_) => format!("in place of {}", of_joint("tau")),
         Entry::Angle(_) => format!("in place of {}", of_joint("q")),
+        Entry::Coupling(_) => {
+            let next = latex_name(&effect.joint.next().name("tau"));
+            format!(
+                "added to {}, and times the ratio to ${next}$",
+                of_joint("tau")
+            )
+        }
         Entry::Inertia(_) => "added to the joint's own entry of the mass matrix".to_owned(),
         Entry::Shift(..) => "added to a parameter".to_owned(),
         Entry::Command(_) => format!("between the command and {}", of_joint("tau")),

@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use super::dynamics::{Dynamics, OwnValue, Parameter};
-use super::effect::{Effect, Entry};
+use super::effect::{Effect, Entry, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
 use super::reader::Located;
@@ -126,6 +126,14 @@ impl Model {
     }
 }
 
+/// An effect on the sum of two joints' coordinates, each with its share.
+struct Coupling {
+    shares: [(Joint, Node); 2],
+    /// Generalised force of the sum, without what its inertia takes.
+    force: Node,
+    inertia: Node,
+}
+
 /// The program under construction.
 struct Assembly<'a> {
     system: &'a Model,
@@ -241,6 +249,49 @@ impl<'a> Assembly<'a> {
         for (joint, force) in forces {
             self.tau[joint] = self.graph.add(self.tau[joint], force);
         }
+        for coupling in self.couplings() {
+            for (joint, share) in coupling.shares {
+                let force = self.graph.mul(share, coupling.force);
+                self.tau[joint] = self.graph.add(self.tau[joint], force);
+            }
+        }
+    }
+
+    /// The effects on sums of two joints.
+    fn couplings(&mut self) -> Vec<Coupling> {
+        let indices: Vec<usize> = (0..self.effects.len())
+            .filter(|k| self.effects[*k].0.effect.is_coupling())
+            .collect();
+        indices.into_iter().map(|k| self.coupling(k)).collect()
+    }
+
+    fn coupling(&mut self, index: usize) -> Coupling {
+        let (effect, nodes) = (self.effects[index].0, self.effects[index].1.clone());
+        let [joint, next] = [effect.joint, effect.joint.next()];
+        let names = effect.effect.parameters.iter().map(|p| p.name.as_str());
+        let ratio = names.zip(&nodes).find(|(name, _)| *name == RATIO);
+        let ratio = *ratio.expect("a coupling has a ratio").1;
+        let mut sum = |of: [Node; 2]| {
+            let shared = self.graph.mul(ratio, of[1]);
+            self.graph.add(of[0], shared)
+        };
+        let q = sum([self.q[joint], self.q[next]]);
+        let qd = sum([self.qd[joint], self.qd[next]]);
+        let wider = [self.sign[joint], self.sign[next]];
+        let sign = wider
+            .into_iter()
+            .max_by(|a, b| width(a).total_cmp(&width(b)));
+        let program = effect.effect.coupling(sign.expect("two of them"));
+        let rest = self.graph.constant(0.0);
+        let inputs = [&[q, qd, rest, self.time], nodes.as_slice()].concat();
+        let program = program.expect("the effect is a coupling");
+        let out = self.graph.append(&program, &inputs);
+        let one = self.graph.constant(1.0);
+        Coupling {
+            shares: [(joint, one), (next, ratio)],
+            force: out[0],
+            inertia: out[1],
+        }
     }
 
     /// The effects that enter in one way: number, joint and formula.
@@ -337,6 +388,18 @@ impl<'a> Assembly<'a> {
             let extra = self.effect_node(index, formula);
             matrix[joint][joint] = self.graph.add(matrix[joint][joint], extra);
         }
+        for Coupling {
+            shares, inertia, ..
+        } in self.couplings()
+        {
+            for (i, of_row) in shares {
+                for (j, of_column) in shares {
+                    let share = self.graph.mul(of_row, of_column);
+                    let extra = self.graph.mul(share, inertia);
+                    matrix[i][j.index()] = self.graph.add(matrix[i][j.index()], extra);
+                }
+            }
+        }
     }
 
     /// The angles of the declared equations: those of the rig after effects on them.
@@ -396,15 +459,18 @@ impl<'a> Assembly<'a> {
 
     /// A declared formula may use several joints: the narrowest of their widths serves all.
     fn narrowest_sign(&self) -> SignForm {
-        let width = |sign: &SignForm| match sign {
-            SignForm::Exact => 0.0,
-            SignForm::Smooth { width } => *width,
-        };
         *self
             .sign
             .iter()
             .min_by(|a, b| width(a).total_cmp(&width(b)))
             .expect("a system has at least one joint")
+    }
+}
+
+fn width(sign: &SignForm) -> f64 {
+    match sign {
+        SignForm::Exact => 0.0,
+        SignForm::Smooth { width } => *width,
     }
 }
 

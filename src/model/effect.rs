@@ -1,8 +1,12 @@
 use super::filter::CommandFilter;
-use crate::expr::{Formula, Graph, Scope, SignForm, suggestion};
+use crate::expr::{Formula, Graph, Program, Scope, SignForm, suggestion};
 
 /// What a formula of an effect may mention besides its parameters.
 pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
+
+/// What a formula on the sum of two joints may mention, and the parameter that is the share of the next joint in it.
+pub(super) const COUPLING_NAMES: [&str; 4] = ["q", "qd", "qdd", "t"];
+pub(super) const RATIO: &str = "r";
 
 /// Commands (N m or N) at which torques that act are compared, on either side of zero, and the step between them: effects are
 /// typically of desktop rigs.
@@ -45,6 +49,9 @@ pub enum Entry {
     Command(CommandFilter),
     /// Replaces the measured angle.
     Reading(Formula),
+    /// A generalised force on the sum q + r q' of the joint's coordinate and the next joint's, r being the parameter of that
+    /// name: the joint feels it, and the next one r times. It may be linear in the acceleration of the sum, `qdd`.
+    Coupling(Formula),
 }
 
 impl Entry {
@@ -56,7 +63,8 @@ impl Entry {
             | Self::Angle(f)
             | Self::Inertia(f)
             | Self::Shift(_, f)
-            | Self::Reading(f) => Ok(f),
+            | Self::Reading(f)
+            | Self::Coupling(f) => Ok(f),
             Self::Command(filter) => Err(*filter),
         }
     }
@@ -110,6 +118,35 @@ pub struct EffectParameter {
 }
 
 impl Effect {
+    /// Whether the effect couples its joint with the next one.
+    pub fn is_coupling(&self) -> bool {
+        matches!(self.entry, Entry::Coupling(_))
+    }
+
+    /// The force of a coupling at rest in its acceleration, and the inertia of the sum, as a program of [`COUPLING_NAMES`] and the
+    /// parameters; `sign` is how dry friction reverses.
+    pub(super) fn coupling(&self, sign: SignForm) -> Option<Program> {
+        let Entry::Coupling(formula) = &self.entry else {
+            return None;
+        };
+        let mut graph = Graph::new();
+        let mut scope = Scope::new(sign);
+        let parameters = self.parameters.iter().map(|p| p.name.as_str());
+        for name in COUPLING_NAMES.into_iter().chain(parameters) {
+            let node = graph.input(name);
+            scope.bind(name, node);
+        }
+        let lowered = "formulas were checked when the file was read";
+        let force = scope.lower(&mut graph, formula).expect(lowered);
+        let acceleration = scope.get("qdd").expect("bound above");
+        let one = graph.constant(1.0);
+        let slope = graph.gradient(&[force], &[one], &[acceleration])[0];
+        let (inertia, rest) = (graph.neg(slope), graph.constant(0.0));
+        scope.bind("qdd", rest);
+        let at_rest = scope.lower(&mut graph, formula).expect(lowered);
+        Some(graph.finish(&[at_rest, inertia]))
+    }
+
     /// The effect of this name.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+use super::effect::{COUPLING_NAMES, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, RATIO};
 use super::filter::CommandFilter;
 use super::reader::{Document, FileError, Located, Section};
 use crate::expr::{Formula, Graph, Scope};
@@ -16,6 +16,7 @@ const EFFECT_KEYS: &[&str] = &[
     "inertia",
     "command",
     "reading",
+    "coupling",
     "contains",
     "confused_with",
     "shown_by",
@@ -34,7 +35,7 @@ const PARAMETER_KEYS: &[&str] = &[
     "whole",
     "per",
 ];
-const ONE_WAY: &str = "one of force, torque, angle, inertia, command and reading";
+const ONE_WAY: &str = "one of force, torque, angle, inertia, command, reading and coupling";
 const ALL_OR_FIRST: [(&str, bool); 3] = [("", false), ("all", false), ("first", true)];
 const FILTERS: [(&str, Option<CommandFilter>); 3] = [
     ("", None),
@@ -105,24 +106,37 @@ fn entry(
     parameters: &[EffectParameter],
 ) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    let kinds: [(&str, Make); 5] = [
-        ("force", Entry::Force),
-        ("torque", Entry::Torque),
-        ("angle", Entry::Angle),
-        ("inertia", Entry::Inertia),
-        ("reading", Entry::Reading),
+    let kinds: [(&str, Make, &[&str]); 6] = [
+        ("force", Entry::Force, &EFFECT_NAMES),
+        ("torque", Entry::Torque, &EFFECT_NAMES),
+        ("angle", Entry::Angle, &EFFECT_NAMES),
+        ("inertia", Entry::Inertia, &EFFECT_NAMES),
+        ("reading", Entry::Reading, &EFFECT_NAMES),
+        ("coupling", Entry::Coupling, &COUPLING_NAMES),
     ];
     let mut found = command(section, parameters)?;
-    for (key, make) in kinds {
+    for (key, make, names) in kinds {
         if let Some(formula) = section.formula(key)? {
             if found.is_some() {
                 return Err(section.error_at(key, format!("an effect has {ONE_WAY}")));
             }
-            check_names(document, &formula, &EFFECT_NAMES, parameters)?;
+            check_names(document, &formula, names, parameters)?;
+            if key == "coupling" {
+                check_ratio(section, parameters)?;
+            }
             found = Some(make(formula.value));
         }
     }
     found.ok_or_else(|| section.error(format!("{ONE_WAY} is missing in [effect]")))
+}
+
+/// A coupling says how much of the next joint is in the sum.
+fn check_ratio(section: &Section<'_>, parameters: &[EffectParameter]) -> Result<(), FileError> {
+    if parameters.iter().any(|p| p.name == RATIO) {
+        return Ok(());
+    }
+    let message = format!("`coupling` needs a parameter `{RATIO}`: the share of the next joint");
+    Err(section.error_at("coupling", message))
 }
 
 /// `command = "delay"` or `"lag"`, with the time as the only parameter.

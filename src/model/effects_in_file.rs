@@ -27,11 +27,11 @@ fn fitted(
     let name = section.required_text("name")?.value;
     let effect = Effect::find(library, &name);
     let effect = effect.map_err(|message| section.error_at("name", message))?;
-    let joint = section.whole("joint")?.and_then(Joint::numbered);
-    let Some(joint) = joint.filter(|joint| joint.is_of(joints)) else {
-        return Err(section.error_at("joint", format!("`joint` is a number from 1 to {joints}")));
+    let (key, joint) = match effect.is_coupling() {
+        true => ("joints", pair(section, joints)?),
+        false => ("joint", one(section, joints)?),
     };
-    let mut known = vec!["name", "joint", "fixed", "status"];
+    let mut known = vec!["name", key, "fixed", "status"];
     known.extend(effect.parameters.iter().map(|p| p.name.as_str()));
     section.only(&known)?;
     let values = effect
@@ -50,6 +50,28 @@ fn fitted(
         own: own.concat(),
         fixed: section.flag("fixed")?,
         status: status(section)?,
+    })
+}
+
+/// `joint = 2`
+fn one(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
+    let joint = section.whole("joint")?.and_then(Joint::numbered);
+    joint
+        .filter(|joint| joint.is_of(joints))
+        .ok_or_else(|| section.error_at("joint", format!("`joint` is a number from 1 to {joints}")))
+}
+
+/// The first of `joints = [5, 6]`, two joints in a row.
+fn pair(section: &Section<'_>, joints: usize) -> Result<Joint, FileError> {
+    let given = section.numbers("joints")?.unwrap_or_default();
+    let is_it = |joint: &Joint| given == [*joint, joint.next()].map(|j| j.number() as f64);
+    let mut pairs = Joint::all(joints.saturating_sub(1));
+    pairs.find(is_it).ok_or_else(|| {
+        let message = format!(
+            "`joints` are two joints in a row, [1, 2] to [{}, {joints}]",
+            joints - 1
+        );
+        section.error_at("joints", message)
     })
 }
 

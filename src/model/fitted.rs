@@ -2,7 +2,7 @@
 
 use super::Parameter;
 use super::dynamics::OwnValue;
-use super::effect::{EFFECT_NAMES, Effect, Entry, Measure};
+use super::effect::{COUPLING_NAMES, EFFECT_NAMES, Effect, Entry, Measure, RATIO};
 use super::filter::CommandFilter;
 use crate::data::{Joint, Quantity};
 use crate::expr::{Graph, Program, Scope, SignForm};
@@ -62,7 +62,23 @@ impl FittedEffect {
 
     /// Identifies the effect within a model.
     pub fn label(&self) -> String {
-        format!("{} on joint {}", self.title(), self.joint)
+        format!(
+            "{} on joint {}",
+            self.title(),
+            self.place(|joint| joint.to_string())
+        )
+    }
+
+    /// Its joint as it is called, or `5 with 6` where it couples two.
+    pub fn place(&self, called: impl Fn(Joint) -> String) -> String {
+        let joints: Vec<String> = self.joints().into_iter().map(called).collect();
+        joints.join(" with ")
+    }
+
+    /// The joint that the effect acts on, and the next one where it couples the two.
+    pub fn joints(&self) -> Vec<Joint> {
+        let next = self.effect.is_coupling().then(|| self.joint.next());
+        [self.joint].into_iter().chain(next).collect()
     }
 
     /// Whether the two cannot act in one model: they are the same effect, or filters of one kind on one joint.
@@ -90,17 +106,26 @@ impl FittedEffect {
         let formula = self.effect.entry.formula_or_filter()?;
         let mut graph = Graph::new();
         let mut scope = Scope::new(SignForm::Exact);
-        for name in EFFECT_NAMES {
-            let of_joint = match name {
-                "t" => name.to_owned(),
-                stem => self.joint.name(stem),
-            };
-            let node = graph.input(&of_joint);
-            scope.bind(name, node);
-        }
         for (parameter, name) in self.effect.parameters.iter().zip(names) {
             let node = graph.input(name);
             scope.bind(&parameter.name, node);
+        }
+        let known: &[&str] = match self.effect.is_coupling() {
+            true => &COUPLING_NAMES,
+            false => &EFFECT_NAMES,
+        };
+        for stem in known {
+            let node = match (*stem, scope.get(RATIO)) {
+                ("t", _) => graph.input("t"),
+                (_, Some(ratio)) if self.effect.is_coupling() => {
+                    let [own, next] =
+                        [self.joint, self.joint.next()].map(|j| graph.input(&j.name(stem)));
+                    let shared = graph.mul(ratio, next);
+                    graph.add(own, shared)
+                }
+                _ => graph.input(&self.joint.name(stem)),
+            };
+            scope.bind(stem, node);
         }
         let node = scope
             .lower(&mut graph, formula)

@@ -268,12 +268,21 @@ impl Model {
             ));
         }
         match effect.entry {
-            Entry::Inertia(_) if !self.has_mass_matrix() => Err(format!(
+            Entry::Coupling(_) if !self.couples(joint) => Err(format!(
+                "`{name}` acts on two joints in a row that both turn or both slide"
+            )),
+            Entry::Inertia(_) | Entry::Coupling(_) if !self.has_mass_matrix() => Err(format!(
                 "`{name}` needs a model that gives `mass` and `bias`; {} gives accelerations",
                 self.name
             )),
             _ => Ok(()),
         }
+    }
+
+    /// Whether a joint and the next one have coordinates of one kind.
+    fn couples(&self, joint: Joint) -> bool {
+        let next = joint.next();
+        next.is_of(self.joints) && self.prismatic[joint] == self.prismatic[next]
     }
 
     /// Whether an effect with its values can join `present` ones.

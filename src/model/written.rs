@@ -14,8 +14,9 @@ impl Model {
         for effect in &self.effects {
             let _ = write!(
                 text,
-                "\n[[effect]]\nname = \"{}\"\njoint = {}\n",
-                effect.effect.name, effect.joint
+                "\n[[effect]]\nname = \"{}\"\n{}\n",
+                effect.effect.name,
+                place(effect)
             );
             if let Some(status) = effect.status {
                 let _ = writeln!(text, "status = \"{}\"", status.name());
@@ -56,6 +57,14 @@ impl Model {
             document["system"]["sign_width"] = toml_edit::value(widths);
         }
         document.to_string()
+    }
+}
+
+/// `joint = 1`, or `joints = [5, 6]` of an effect that couples two.
+fn place(effect: &FittedEffect) -> String {
+    match effect.joints()[..] {
+        [joint, next] => format!("joints = [{joint}, {next}]"),
+        _ => format!("joint = {}", effect.joint),
     }
 }
 

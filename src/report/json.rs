@@ -97,6 +97,7 @@ fn effect(finding: &Finding) -> EffectEntry {
     EffectEntry {
         name: finding.effect.effect.name.clone(),
         joint: finding.effect.joint,
+        joints: both(&finding.effect),
         expression: finding.expression.clone(),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
@@ -104,6 +105,11 @@ fn effect(finding: &Finding) -> EffectEntry {
         error_reduction_failure: (finding.error_reduction.as_ref().err()).map(ToString::to_string),
         not_established: finding.reason.clone(),
     }
+}
+
+/// The joints of an effect that couples two.
+fn both(effect: &FittedEffect) -> Option<Vec<Joint>> {
+    effect.effect.is_coupling().then(|| effect.joints())
 }
 
 fn row((of, own): &(Parameter, Option<&OwnValue>)) -> ParameterEntry {
@@ -138,6 +144,7 @@ fn effect_name(effect: &FittedEffect) -> EffectName {
     EffectName {
         name: effect.effect.name.clone(),
         joint: effect.joint,
+        joints: both(effect),
         parameter: shifted(effect),
     }
 }

@@ -88,6 +88,9 @@ pub struct Report {
 pub(super) struct EffectEntry {
     pub name: String,
     pub joint: Joint,
+    /// both joints, where the effect couples two
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints: Option<Vec<Joint>>,
     /// what is added, with the names of this model's parameters; of a shift, the new value
     pub expression: String,
     #[schemars(length(min = 1))]
@@ -133,6 +136,9 @@ pub(super) struct ContradictedEntry {
 pub(super) struct EffectName {
     pub name: String,
     pub joint: Joint,
+    /// both joints, where the effect couples two
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints: Option<Vec<Joint>>,
     /// of a parameter_shift: the parameter that has another value
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter: Option<String>,

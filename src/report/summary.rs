@@ -2,7 +2,7 @@ use std::fmt::Write;
 
 use super::calibration::line;
 use super::remainder::proposal_line;
-use super::text::{headline, label, serious};
+use super::text::{headline, label, place, serious};
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::{Outcome, Space, TorqueErrors};
 use crate::data::Joint;
@@ -18,7 +18,7 @@ pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
     out = serious(outcome).replace("**", "") + &out;
     for finding in &outcome.effects.findings {
         let name = finding.effect.title();
-        let joint = label(outcome, finding.effect.joint);
+        let joint = place(outcome, &finding.effect);
         let _ = writeln!(
             out,
             "  {name} on joint {joint}: {}\n    {}",

@@ -62,7 +62,7 @@ pub(super) fn headline(outcome: &Outcome) -> String {
     let mut titles: Vec<String> = Vec::new();
     let mut joints: Vec<Vec<String>> = Vec::new();
     for finding in &outcome.effects.findings {
-        let (title, joint) = (finding.effect.title(), label(outcome, finding.effect.joint));
+        let (title, joint) = (finding.effect.title(), place(outcome, &finding.effect));
         match titles.iter().position(|known| *known == title) {
             Some(known) => joints[known].push(joint),
             None => {
@@ -92,6 +92,11 @@ pub(super) fn label(outcome: &Outcome, joint: Joint) -> String {
     outcome.models.after.model.joint_label(joint)
 }
 
+/// The joint of an effect, or both where it couples two.
+pub(super) fn place(outcome: &Outcome, effect: &FittedEffect) -> String {
+    effect.place(|joint| label(outcome, joint))
+}
+
 fn effects(outcome: &Outcome) -> String {
     let findings = &outcome.effects.findings;
     if findings.is_empty() {
@@ -106,7 +111,7 @@ fn effects(outcome: &Outcome) -> String {
             out,
             "| {} | {} | `{}` | {} | {} | {} |",
             finding.effect.title(),
-            label(outcome, finding.effect.joint),
+            place(outcome, &finding.effect),
             finding.expression,
             values.join("<br>"),
             probability(finding.p_value),
@@ -135,7 +140,7 @@ fn alternatives(outcome: &Outcome) -> String {
             out,
             "- **{}** on joint {}: {}. To tell them apart: {}.",
             alternative.effect.title(),
-            label(outcome, alternative.effect.joint),
+            place(outcome, &alternative.effect),
             alternative.reason,
             alternative.experiment()
         );
@@ -157,7 +162,7 @@ fn supported(outcome: &Outcome) -> String {
             out,
             "- **{}** on joint {}, {}: {}.",
             finding.effect.title(),
-            label(outcome, finding.effect.joint),
+            place(outcome, &finding.effect),
             values(finding).join(", "),
             finding.reason.as_deref().unwrap_or_default()
         );

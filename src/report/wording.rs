@@ -53,8 +53,7 @@ pub(super) fn values(finding: &Finding) -> Vec<String> {
 /// `coulomb_friction on joint 1: F_c1 = 0.1598 N m (0.1593 to 0.1603)`
 impl Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (name, joint) = (self.effect.title(), self.effect.joint);
-        write!(f, "{name} on joint {joint}: {}", values(self).join(", "))
+        write!(f, "{}: {}", self.effect.label(), values(self).join(", "))
     }
 }
 

@@ -7,7 +7,6 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{Losses, p_of_gains, p_value};
 use crate::closeloop::study::Study;
-use crate::data::Joint;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Model, OwnValue, Parameter, Status};
 
@@ -75,8 +74,8 @@ pub(in crate::closeloop) fn findings(
             parameters,
             p_value: p_value(&refined.study, &refined.after, k)
                 .or_else(|| {
-                    let joint = standing.effect.joint;
-                    Some(p_of_refit(study, chosen, less.as_ref().ok()?, joint))
+                    let effect = &standing.effect;
+                    Some(p_of_refit(study, chosen, less.as_ref().ok()?, effect))
                 })
                 .unwrap_or(1.0),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
@@ -88,8 +87,8 @@ pub(in crate::closeloop) fn findings(
 }
 
 /// The signed-rank p-value of a model beside the refit without one of its effects.
-fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted, joint: Joint) -> f64 {
-    let losses = |model: &Fitted| Losses::of(study, model).of_joint(joint);
+fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted, effect: &FittedEffect) -> f64 {
+    let losses = |model: &Fitted| Losses::of(study, model).of_effect(effect);
     p_of_gains(&losses(without), &losses(chosen))
 }
 

@@ -7,6 +7,7 @@ use crate::closeloop::space::Space;
 use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::identify::{Values, Window, huber};
+use crate::model::FittedEffect;
 
 /// The losses of a model on stretches left out of its fit: `[stretch * parts + part]`, where in a motion all joints are one
 /// part, since each moves the others, and of torques each joint is one. What an effect on one of many joints is worth shows on
@@ -39,9 +40,22 @@ impl Losses {
 
     /// Of the part that a joint belongs to, one a stretch.
     pub fn of_joint(&self, joint: Joint) -> Vec<f64> {
-        let part = joint.index().min(self.parts - 1);
-        let own = self.values.iter().skip(part).step_by(self.parts);
-        own.copied().collect()
+        self.of_parts(&[joint.index().min(self.parts - 1)])
+    }
+
+    /// Of the parts that an effect acts on, one a stretch.
+    pub fn of_effect(&self, effect: &FittedEffect) -> Vec<f64> {
+        let joints = effect.joints().into_iter();
+        let mut parts: Vec<usize> = joints.map(|j| j.index().min(self.parts - 1)).collect();
+        parts.dedup();
+        self.of_parts(&parts)
+    }
+
+    fn of_parts(&self, parts: &[usize]) -> Vec<f64> {
+        let stretches = self.values.chunks(self.parts);
+        stretches
+            .map(|of_stretch| parts.iter().map(|part| of_stretch[*part]).sum())
+            .collect()
     }
 }
 

@@ -8,7 +8,6 @@ use super::trial::{Trial, differences};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::study::Study;
-use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::FitError;
 use crate::model::FittedEffect;
@@ -80,15 +79,15 @@ fn instead_of(
     options.sort_by(|a, b| a.0.total_cmp(&b.0));
     options.retain(|(loss, _)| *loss <= settings.slack * settings.as_little * chosen.loss());
     options.truncate(settings.rivals);
-    let of_joint = |trial: &Trial| trial.losses.of_joint(present.joint);
-    let gain = |trial: &Trial| gain(&of_joint(less), &of_joint(trial));
+    let own = |trial: &Trial| trial.losses.of_effect(present);
+    let gain = |trial: &Trial| gain(&own(less), &own(trial));
     let rival = |(_, effect): &(f64, &FittedEffect)| {
         let mut effects = chosen.fitted.model.effects.clone();
         effects[declared + k] = (*effect).clone();
         let below = settings.as_little * chosen.loss();
         let fitted = study.with_better_effects(&chosen.fitted, effects, below)?;
         let trial = Trial::of(study, fitted);
-        let is_as_good = is_as_good([&trial, chosen, less], present.joint, settings);
+        let is_as_good = is_as_good([&trial, chosen, less], present, settings);
         let as_good = trial.is_valid(study) && is_as_good;
         as_good.then(|| Rival {
             effect: trial.fitted.model.effects[declared + k].clone(),
@@ -101,9 +100,14 @@ fn instead_of(
     options.iter().filter_map(rival).collect()
 }
 
-/// Whether the losses of a joint on left-out stretches do not tell a set from the chosen one; `less` is without either effect.
-fn is_as_good([trial, chosen, less]: [&Trial; 3], joint: Joint, settings: &SelectSettings) -> bool {
-    let [trial, chosen, less] = [trial, chosen, less].map(|of| of.losses.of_joint(joint));
+/// Whether the losses of an effect's joints on left-out stretches do not tell a set from the chosen one; `less` is without either
+/// effect.
+fn is_as_good(
+    [trial, chosen, less]: [&Trial; 3],
+    effect: &FittedEffect,
+    settings: &SelectSettings,
+) -> bool {
+    let [trial, chosen, less] = [trial, chosen, less].map(|of| of.losses.of_effect(effect));
     let sum = |losses: &[f64]| losses.iter().sum::<f64>();
     let differences = differences(&trial, &chosen);
     let saved = |losses: &[f64]| sum(&less) - sum(losses);

@@ -105,7 +105,7 @@ impl Trial {
             let known = b.key();
             let effects = a.fitted.model.effects.iter();
             let other = effects.filter(|effect| !known.contains(&identity(effect)));
-            other.map(|effect| effect.joint).collect()
+            other.flat_map(FittedEffect::joints).collect()
         };
         [not_in(self, other), not_in(other, self)].concat()
     }

@@ -147,11 +147,13 @@ fn attributes(values: &[(&str, f64, f64)]) -> String {
 fn actuator(joint: &Joint, drive: &Drive) -> String {
     let mut text = format!("    <general name=\"{}\" joint=\"{0}\"", joint.name);
     text += &attributes(&[("gear", drive.gear, 1.0), ("gainprm", drive.gain, 1.0)]);
+    let [constant, by_position, by_velocity] = drive.bias;
     if drive.bias != [0.0; 3] {
         let _ = write!(
             text,
             " biastype=\"affine\" biasprm=\"{}\"",
-            numbers(drive.bias)
+            // The bias is by the length and the velocity of the actuator: those of the joint times the gear.
+            numbers([constant, by_position / drive.gear, by_velocity / drive.gear])
         );
     }
     if let Some(limit) = drive.limit {
