@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use residyn::bench::{Group, Hidden, Mechanics, Source, read, recorded};
+use residyn::bench::{Cell, Group, Hidden, Mechanics, Source, read, recorded};
 use residyn::model::{FittedEffect, Library};
 use residyn::sim::metric::assess;
 
@@ -24,8 +24,16 @@ fn the_full_grid_has_cells_of_every_group_and_hides_every_kind_of_effect() {
     assert!(of(Group::Pair) >= 25, "{}", of(Group::Pair));
     assert!(of(Group::None) >= 20, "{}", of(Group::None));
     assert!(of(Group::Outside) >= 20, "{}", of(Group::Outside));
-    let hidden: Vec<&Hidden> = cells.iter().flat_map(|cell| &cell.effects).collect();
-    let mut missing = Library::built_in().effects().to_vec();
+    // What arms hide is drawn.
+    let library = Library::built_in();
+    let arms = read(&path("arms.toml")).unwrap();
+    let settled: Vec<Cell> = arms
+        .iter()
+        .map(|arm| arm.settled(&library).unwrap())
+        .collect();
+    let all = cells.iter().chain(&settled);
+    let hidden: Vec<&Hidden> = all.flat_map(|cell| &cell.effects).collect();
+    let mut missing = library.effects().to_vec();
     missing.retain(|effect| !hidden.iter().any(|hidden| hidden.name == effect.name));
     let names: Vec<&String> = missing.iter().map(|effect| &effect.name).collect();
     assert!(names.is_empty(), "no cell hides {names:?}");

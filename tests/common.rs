@@ -57,7 +57,8 @@ pub fn can_act(system: &Model, effect: &Effect, joint: usize) -> bool {
     let alone = joint + 1 == system.joints || slides[joint] != slides[joint + 1];
     !(inertia && !system.has_mass_matrix()
         || effect.first_joint_only && joint > 0
-        || effect.is_coupling() && alone)
+        || effect.is_coupling() && alone
+        || matches!(effect.entry, Entry::Payload(_)))
 }
 
 /// An effect as a user would write one, in a folder of the user's own.

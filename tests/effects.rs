@@ -7,6 +7,7 @@ use residyn::model::{Effect, Library};
 use crate::common::{
     USER_EFFECT, assert_near, dynamics, fitted, library_with_user_effect, points, rng, system,
 };
+use crate::mechanism::{fixture, read_to};
 use crate::oracles::ORACLES;
 use rand::RngExt;
 
@@ -272,6 +273,43 @@ fn a_coupled_motor_takes_from_both_joints() {
     }
 }
 
+/// A point of a mass m at a place makes the last body another one: by the parallel axis theorem.
+#[test]
+fn a_payload_is_part_of_the_last_body() {
+    let library = Library::built_in();
+    let payload = library.effect("payload").unwrap();
+    let arm = crate::arms::model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
+    assert!(arm.can_carry(payload, Joint::at(2)).is_err());
+    let [m, x, y, z] = [1.3, 0.1, -0.2, 0.15];
+    let loaded = arm.with_effects(vec![fitted(payload, 3, &[m, x, y, z])]);
+    let mut heavier = arm.clone();
+    let parts = [
+        m,
+        m * x,
+        m * y,
+        m * z,
+        m * (y * y + z * z),
+        -m * x * y,
+        -m * x * z,
+    ];
+    let parts = parts
+        .into_iter()
+        .chain([m * (x * x + z * z), -m * y * z, m * (x * x + y * y)]);
+    for (place, more) in arm.inertias().pop().unwrap().into_iter().zip(parts) {
+        heavier.parameters[place].value += more;
+    }
+    let [loaded, heavier] = [&loaded, &heavier].map(|model| model.dynamics());
+    for point in points(&arm.dynamics(), 50, 6) {
+        let [found, wanted] = [&loaded, &heavier].map(|d| {
+            d.program
+                .eval(&[&point[..13], d.values().as_slice()].concat())
+        });
+        for (found, wanted) in found.into_iter().zip(wanted) {
+            assert_near(found, wanted, 1e-9, "accelerations");
+        }
+    }
+}
+
 #[test]
 fn torque_effects_come_before_forces_and_in_their_order() {
     let library = Library::built_in();
@@ -318,10 +356,11 @@ fn torque_effects_come_before_forces_and_in_their_order() {
 #[test]
 fn every_effect_file_is_tested_here() {
     let mut tested: Vec<&str> = MEANINGS.iter().map(|(name, _)| *name).collect();
-    // Those with memory and those of the sensor are tested in memory.rs, a tilt, a rotor, a coupling and an offset above.
+    // Those with memory and those of the sensor are tested in memory.rs, a tilt, a rotor, a coupling, a payload and an offset above.
     tested.extend([
         "gravity_tilt",
         "joint_coupling",
+        "payload",
         "rotor_inertia",
         "encoder_eccentricity",
         "sensor_offset",

@@ -189,7 +189,9 @@ fn an_effects_expression_names_its_joint_and_reads_back() {
                 let own = fitted.parameter_names(&taken);
                 let formula = parse(&fitted.expression(&own, Quantity::Torque)).unwrap();
                 for name in formula.names() {
-                    let state = ["q", "qd", "tau", "load"].map(|s| Joint::at(joint).name(s));
+                    let of =
+                        |joint: Joint| ["q", "qd", "qdd", "tau", "load"].map(|s| joint.name(s));
+                    let state: Vec<String> = fitted.joints().into_iter().flat_map(of).collect();
                     let known = own.iter().chain(&state).any(|known| known == name);
                     assert!(known, "{}: `{name}` in {}", effect.name, formula.text());
                     let declared = system.parameters.iter().any(|p| p.name == name);

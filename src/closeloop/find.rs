@@ -130,6 +130,12 @@ pub fn find(
     if left.is_significant() {
         chosen.doubt(study, &before, &left);
     }
+    if study.space == Space::Torque
+        && let Some((after, standing)) = study.with_payload(&chosen.after, library.effects())
+    {
+        chosen.after = after;
+        chosen.standings.push(standing);
+    }
     chosen.mark(study);
     if chosen.established() == 0 && !chosen.standings.is_empty() {
         // What is not established explains nothing.

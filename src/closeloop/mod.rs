@@ -15,6 +15,7 @@ mod fitted;
 mod gravity;
 mod learn;
 mod outcome;
+mod payload;
 mod pushes;
 mod refine;
 mod remainder;

@@ -162,6 +162,8 @@ settings! {
     EstablishSettings {
         /// Probability of a false alarm for one effect, over all candidates and all their starting points.
         false_alarm: f64 = 0.05,
+        /// A load at the tip is established if it takes away this share of what the bodies' departure from the declared ones costs.
+        of_departure: f64 = 0.5,
         /// Few stretches cannot give so small a probability. With them an effect that plainly helps is established at
         /// this level, without a correction for the number of candidates.
         significant_alone: f64 = 0.01,

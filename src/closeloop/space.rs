@@ -18,11 +18,12 @@ pub enum Space {
 }
 
 impl Space {
-    /// Whether an effect can be told by these errors. The torques are those of the motion as it was read, and it takes commands
+    /// Whether an effect can be told by these errors. In a motion, in which each joint moves the others, a motor between two of them
+    /// is too much like the links' own inertia. The torques are those of the motion as it was read, and it takes commands
     /// that can be told from the torque that acts: one that explains any command would always fit.
     pub(super) fn shows(self, effect: &Effect) -> bool {
         match self {
-            Self::Motion => true,
+            Self::Motion => !effect.is_coupling(),
             Self::Torque => !matches!(effect.entry, Entry::Reading(_)) && effect.tells_command(),
         }
     }

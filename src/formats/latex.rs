@@ -114,6 +114,7 @@ fn place(effect: &FittedEffect) -> String {
         Entry::Force(_) => format!("added to {}", of_joint("tau")),
         Entry::Torque(_) => format!("in place of {}", of_joint("tau")),
         Entry::Angle(_) => format!("in place of {}", of_joint("q")),
+        Entry::Payload(_) => "a mass on the last body".to_owned(),
         Entry::Coupling(_) => {
             let next = latex_name(&effect.joint.next().name("tau"));
             format!(

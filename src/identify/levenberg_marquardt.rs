@@ -295,6 +295,7 @@ impl<'a> Search<'a> {
         let fit = Fit {
             active: self.tangent.active.clone(),
             cost: self.cost - self.departure(),
+            departure: self.departure(),
             columns: self.layout.columns,
             locals: self.locals,
             scale: self.scale,

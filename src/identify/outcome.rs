@@ -34,6 +34,8 @@ pub struct Fit {
     pub scale: f64,
     /// Sum of the losses at that scale.
     pub cost: f64,
+    /// What the departure from the declared values costs beside it.
+    pub departure: f64,
     /// What the declared values add to the normal equations; no cost.
     pub(super) prior: WindowTerms,
     /// The part of its matrix that is of bodies, which are known to be near those declared: like data.

@@ -1,7 +1,7 @@
 use std::ops::Range;
 
 use super::dynamics::{Dynamics, OwnValue, Parameter};
-use super::effect::{Effect, Entry, RATIO};
+use super::effect::{Effect, Entry, PLACE, RATIO};
 use super::filter::Filter;
 use super::fitted::FittedEffect;
 use super::reader::Located;
@@ -257,6 +257,23 @@ impl<'a> Assembly<'a> {
         }
     }
 
+    /// Mass and place of the load at the tip, where there is one.
+    fn payload(&mut self) -> Option<[Node; 4]> {
+        let is_load = |effect: &Effect| matches!(effect.entry, Entry::Payload(_));
+        let (index, _, mass) = self.entries(is_load).pop()?;
+        let mass = self.effect_node(index, mass);
+        let (effect, nodes) = &self.effects[index];
+        let names: Vec<&str> = effect
+            .effect
+            .parameters
+            .iter()
+            .map(|p| p.name.as_str())
+            .collect();
+        let node = |name: &str| names.iter().position(|own| *own == name).map(|k| nodes[k]);
+        let [x, y, z] = PLACE.map(|name| node(name).expect("checked when the file was read"));
+        Some([mass, x, y, z])
+    }
+
     /// The effects on sums of two joints.
     fn couplings(&mut self) -> Vec<Coupling> {
         let indices: Vec<usize> = (0..self.effects.len())
@@ -334,7 +351,8 @@ impl<'a> Assembly<'a> {
             }
             Motion::Chain(bodies) => {
                 let still = vec![self.graph.constant(0.0); self.system.joints];
-                let mut links = bodies.links(&mut self.graph, &scope);
+                let payload = self.payload();
+                let mut links = bodies.loaded(&mut self.graph, &scope, payload);
                 (links.mass(), links.torques(&self.qd, &still))
             }
         };
@@ -353,7 +371,8 @@ impl<'a> Assembly<'a> {
             }
             Motion::Chain(bodies) => {
                 let none = vec![self.graph.constant(0.0); self.system.joints];
-                let mut links = bodies.links(&mut self.graph, &scope);
+                let payload = self.payload();
+                let mut links = bodies.loaded(&mut self.graph, &scope, payload);
                 (vec![none; self.system.joints], links.torques(&self.qd, qdd))
             }
         };

@@ -74,10 +74,46 @@ impl Bodies {
 
     /// The links at the angles that `scope` calls `q1..qn`.
     pub fn links<'g>(&self, graph: &'g mut Graph, scope: &Scope) -> Links<'g> {
+        self.loaded(graph, scope, None)
+    }
+
+    /// The same with a point on the last body: its mass (kg), and where it is in the frame of that body (m).
+    pub fn loaded<'g>(
+        &self,
+        graph: &'g mut Graph,
+        scope: &Scope,
+        payload: Option<[Node; 4]>,
+    ) -> Links<'g> {
         let gravity = std::array::from_fn(|a| lower(scope, graph, &self.gravity[a]));
         let body = |body: &Body<Located<Formula>>| body.map(|formula| lower(scope, graph, formula));
-        let bodies: Vec<Body<Node>> = self.bodies.iter().map(body).collect();
+        let mut bodies: Vec<Body<Node>> = self.bodies.iter().map(body).collect();
+        if let (Some(payload), Some(last)) = (payload, bodies.last_mut()) {
+            *last = with_point(graph, last, payload);
+        }
         let q = self.named(scope, "q");
         Links::at(graph, &self.places, &bodies, gravity, &q)
+    }
+}
+
+/// A body with a point of this mass on it.
+fn with_point(graph: &mut Graph, body: &Body<Node>, [mass, x, y, z]: [Node; 4]) -> Body<Node> {
+    let place = [x, y, z];
+    let moment = place.map(|along| graph.mul(mass, along));
+    // Mass times the products of the coordinates.
+    let spread: [[Node; 3]; 3] = moment.map(|moment| place.map(|along| graph.mul(moment, along)));
+    let mut sum = |a: Node, b: Node| graph.add(a, b);
+    let [xx, yy, zz] = [[1, 2], [0, 2], [0, 1]].map(|[a, b]| sum(spread[a][a], spread[b][b]));
+    let [of_xx, of_xy, of_xz, of_yy, of_yz, of_zz] = body.tensor;
+    Body {
+        mass: sum(body.mass, mass),
+        moment: std::array::from_fn(|k| sum(body.moment[k], moment[k])),
+        tensor: [
+            sum(of_xx, xx),
+            graph.sub(of_xy, spread[0][1]),
+            graph.sub(of_xz, spread[0][2]),
+            graph.add(of_yy, yy),
+            graph.sub(of_yz, spread[1][2]),
+            graph.add(of_zz, zz),
+        ],
     }
 }

@@ -8,6 +8,9 @@ pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
 pub(super) const COUPLING_NAMES: [&str; 4] = ["q", "qd", "qdd", "t"];
 pub(super) const RATIO: &str = "r";
 
+/// Where a payload is: parameters of that name.
+pub(super) const PLACE: [&str; 3] = ["x", "y", "z"];
+
 /// Commands (N m or N) at which torques that act are compared, on either side of zero, and the step between them: effects are
 /// typically of desktop rigs.
 const COMMANDS: i32 = 60;
@@ -52,6 +55,8 @@ pub enum Entry {
     /// A generalised force on the sum q + r q' of the joint's coordinate and the next joint's, r being the parameter of that
     /// name: the joint feels it, and the next one r times. It may be linear in the acceleration of the sum, `qdd`.
     Coupling(Formula),
+    /// A point of this mass on the last body of a chain, at the parameters x, y, z in the frame of that body.
+    Payload(Formula),
 }
 
 impl Entry {
@@ -64,7 +69,8 @@ impl Entry {
             | Self::Inertia(f)
             | Self::Shift(_, f)
             | Self::Reading(f)
-            | Self::Coupling(f) => Ok(f),
+            | Self::Coupling(f)
+            | Self::Payload(f) => Ok(f),
             Self::Command(filter) => Err(*filter),
         }
     }

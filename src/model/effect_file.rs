@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use super::effect::{COUPLING_NAMES, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, RATIO};
+use super::effect::{
+    COUPLING_NAMES, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, PLACE, RATIO,
+};
 use super::filter::CommandFilter;
 use super::reader::{Document, FileError, Located, Section};
 use crate::expr::{Formula, Graph, Scope};
@@ -17,6 +19,7 @@ const EFFECT_KEYS: &[&str] = &[
     "command",
     "reading",
     "coupling",
+    "payload",
     "contains",
     "confused_with",
     "shown_by",
@@ -35,7 +38,8 @@ const PARAMETER_KEYS: &[&str] = &[
     "whole",
     "per",
 ];
-const ONE_WAY: &str = "one of force, torque, angle, inertia, command, reading and coupling";
+const ONE_WAY: &str =
+    "one of force, torque, angle, inertia, command, reading, coupling and payload";
 const ALL_OR_FIRST: [(&str, bool); 3] = [("", false), ("all", false), ("first", true)];
 const FILTERS: [(&str, Option<CommandFilter>); 3] = [
     ("", None),
@@ -106,13 +110,14 @@ fn entry(
     parameters: &[EffectParameter],
 ) -> Result<Entry, FileError> {
     type Make = fn(Formula) -> Entry;
-    let kinds: [(&str, Make, &[&str]); 6] = [
+    let kinds: [(&str, Make, &[&str]); 7] = [
         ("force", Entry::Force, &EFFECT_NAMES),
         ("torque", Entry::Torque, &EFFECT_NAMES),
         ("angle", Entry::Angle, &EFFECT_NAMES),
         ("inertia", Entry::Inertia, &EFFECT_NAMES),
         ("reading", Entry::Reading, &EFFECT_NAMES),
         ("coupling", Entry::Coupling, &COUPLING_NAMES),
+        ("payload", Entry::Payload, &[]),
     ];
     let mut found = command(section, parameters)?;
     for (key, make, names) in kinds {
@@ -121,22 +126,30 @@ fn entry(
                 return Err(section.error_at(key, format!("an effect has {ONE_WAY}")));
             }
             check_names(document, &formula, names, parameters)?;
-            if key == "coupling" {
-                check_ratio(section, parameters)?;
-            }
+            let needed: &[&str] = match key {
+                "coupling" => &[RATIO],
+                "payload" => &PLACE,
+                _ => &[],
+            };
+            check_has(section, key, needed, parameters)?;
             found = Some(make(formula.value));
         }
     }
     found.ok_or_else(|| section.error(format!("{ONE_WAY} is missing in [effect]")))
 }
 
-/// A coupling says how much of the next joint is in the sum.
-fn check_ratio(section: &Section<'_>, parameters: &[EffectParameter]) -> Result<(), FileError> {
-    if parameters.iter().any(|p| p.name == RATIO) {
-        return Ok(());
+/// Parameters that a kind of effect has by their names: the share of the next joint, the place of a load.
+fn check_has(
+    section: &Section<'_>,
+    key: &str,
+    needed: &[&str],
+    parameters: &[EffectParameter],
+) -> Result<(), FileError> {
+    let has = |name: &&&str| parameters.iter().any(|p| p.name == **name);
+    match needed.iter().find(|name| !has(name)) {
+        None => Ok(()),
+        Some(name) => Err(section.error_at(key, format!("`{key}` needs a parameter `{name}`"))),
     }
-    let message = format!("`coupling` needs a parameter `{RATIO}`: the share of the next joint");
-    Err(section.error_at("coupling", message))
 }
 
 /// `command = "delay"` or `"lag"`, with the time as the only parameter.

@@ -268,6 +268,9 @@ impl Model {
             ));
         }
         match effect.entry {
+            Entry::Payload(_) if !self.carries_at(joint) => Err(format!(
+                "`{name}` acts on the last joint of a chain of bodies"
+            )),
             Entry::Coupling(_) if !self.couples(joint) => Err(format!(
                 "`{name}` acts on two joints in a row that both turn or both slide"
             )),
@@ -277,6 +280,11 @@ impl Model {
             )),
             _ => Ok(()),
         }
+    }
+
+    /// Whether the joint moves the tip of a chain of bodies.
+    fn carries_at(&self, joint: Joint) -> bool {
+        matches!(self.equations.motion, Motion::Chain(_)) && !joint.next().is_of(self.joints)
     }
 
     /// Whether a joint and the next one have coordinates of one kind.

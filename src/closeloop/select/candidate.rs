@@ -8,7 +8,7 @@ use crate::data::Joint;
 use crate::identify::{
     Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, with_unit_diagonal,
 };
-use crate::model::{Dynamics, Effect, EffectParameter, FittedEffect};
+use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
 /// shift of a parameter that the file declares fixed.
@@ -29,6 +29,7 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     for effect in effects.iter().filter(|effect| study.space.shows(effect)) {
         for joint in Joint::all(study.declared.joints) {
             if is_driven_enough(study, effect, joint)
+                && !is_told_by_bodies(study, effect)
                 && study.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
@@ -40,6 +41,11 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
         }
     }
     all
+}
+
+/// A load at the tip is no other torque where the bodies are free: what is declared of them tells it, in a stage of its own.
+fn is_told_by_bodies(study: &Study<'_>, effect: &Effect) -> bool {
+    matches!(effect.entry, Entry::Payload(_)) && study.has_free_bodies()
 }
 
 /// Effects of the torque cannot be observed where there is none.
