@@ -297,3 +297,99 @@ fn effects_of_the_torque_act_behind_the_drive() {
     assert!((acceleration(&model, 9.0) - 95.0).abs() < 1e-9);
     assert!((acceleration(&with, 9.0) - 190.0).abs() < 1e-9);
 }
+
+const RECIPE: &str = r#"
+model = "servo"
+kind = "hybrid"
+
+[start]
+J = 0.03
+
+[data]
+logs = ["run.csv"]
+steps = 5
+
+[network]
+hidden = [8, 8]
+angles = "raw"
+on = "derivative"
+
+[fit]
+epochs = 100
+learning_rates = { physics = 0.01, residual = 0.01 }
+penalty = { fixed = { alpha = 1e-4 } }
+integrator = "rk4"
+"#;
+
+const TASK: &str = r#"
+system = "servo"
+about = "raise the link and hold it"
+objective = "-(q1 - 1.2)^2 - 0.001*cmd1^2"
+steps = 60
+step_s = 0.02
+start = [0.0, 0.0]
+command = [[-2.0, 2.0]]
+replan = 5
+integrator = "rk4"
+
+[planner]
+method = "cem"
+population = 200
+elite = 20
+iterations = 5
+horizon = 15
+
+[goal]
+formula = "q1"
+at_least = 1.1
+hold_s = 0.4
+
+[plant]
+integrator = "rk4"
+"#;
+
+/// Whoever trains a servo's model and plans with it gives targets, and the log of the episode has them.
+#[test]
+fn a_servo_is_trained_and_planned_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("recipe.toml"), RECIPE).unwrap();
+    fs::write(at("task.toml"), TASK).unwrap();
+    succeeds(&[
+        "simulate",
+        "--plant",
+        "servo-real",
+        "--out",
+        text(&at("run.csv")),
+    ]);
+    succeeds(&[
+        "train",
+        "--config",
+        text(&at("recipe.toml")),
+        "--out",
+        text(&at("trained")),
+    ]);
+    succeeds(&[
+        "control",
+        "--checkpoint",
+        text(&at("trained")),
+        "--plant",
+        "servo-real",
+        "--task",
+        text(&at("task.toml")),
+        "--episodes",
+        "1",
+        "--out",
+        text(&at("episodes")),
+    ]);
+    let episode = fs::read_to_string(at("episodes/episode-000.csv")).unwrap();
+    assert!(episode.starts_with("time,q1,qd1,cmd1\n"));
+    // Targets near 1.2 rad, within their range.
+    let targets = episode
+        .lines()
+        .skip(1)
+        .filter_map(|row| row.rsplit(',').next()?.parse().ok());
+    let targets: Vec<f64> = targets.collect();
+    assert!(targets.len() == 61 && targets.iter().all(|target| target.abs() <= 2.0));
+    assert!(targets.iter().copied().fold(f64::MIN, f64::max) > 0.8);
+}

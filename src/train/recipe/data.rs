@@ -47,6 +47,7 @@ struct Keys {
     integrator: Option<Integrator>,
     position: Option<Vec<[f64; 2]>>,
     velocity: Option<Vec<[f64; 2]>>,
+    #[serde(alias = "command")]
     torque: Option<Vec<[f64; 2]>>,
     starts: Option<Starts>,
 }
