@@ -129,7 +129,7 @@ fn compare(name: &str, program: &Program, points: &[Vec<f64>], found: &[Vec<f64>
 
 #[test]
 fn the_catalog_covers_every_system_and_effect() {
-    // 6 systems and 8 joints; 29 shapes (21 effects, 7 probes, a user's own) on each joint, but no tilt on a second joint, no
-    // rotor in the pendulum, a coupling in the acrobot alone, and payloads in chains of bodies alone.
+    // 6 systems and 8 joints; 29 shapes (21 effects that are not of chains alone, 7 probes, a user's own) on each joint, but
+    // no tilt on a second joint, no rotor in the pendulum, and a coupling in the acrobot alone.
     assert_eq!(catalog(SignForm::Exact).len(), 6 + 8 * 29 - 2 - 1 - 7);
 }

@@ -71,7 +71,7 @@ impl Arm {
         Ok(self.draw(&bodies, &motion, rng))
     }
 
-    /// Logs of the arm with these effects, and its true bodies.
+    /// Logs of the arm with these effects, on bodies that are off.
     ///
     /// # Errors
     /// As [`Arm::hidden`], and effects that an arm cannot have.
