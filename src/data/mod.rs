@@ -38,5 +38,5 @@ pub use joint::Joint;
 pub use leave_out::{LeaveOut, LeaveOutError};
 pub use local_cubic::{LocalCubic, half_width_s, local_cubic};
 pub use log::{Interval, Log};
-pub use smooth::Smooth;
+pub use smooth::{Smooth, Smoothing};
 pub use trajectory::{Thinning, Trajectory, trajectories};

@@ -28,22 +28,78 @@ pub struct Smooth {
     pub directions: Vec<Vec<f64>>,
 }
 
-impl Smooth {
-    /// The log at its median step, without half a second at either end and without the intervals that are left out. Velocity
-    /// and acceleration are central differences of the filtered angle.
-    pub fn of(log: &Log) -> Self {
-        Self::with_directions(log, &[])
-    }
+/// How the channels of a log are smoothed, and which rows of them are used.
+#[derive(Debug, Clone)]
+pub struct Smoothing {
+    step_s: f64,
+    filter: LowPass,
+    /// Times of the log, s.
+    logged: Vec<f64>,
+    /// Even times, s.
+    even: Vec<f64>,
+    /// Rows at even times that are used.
+    used: Vec<usize>,
+}
 
-    /// The same with the direction of each joint, which reverses over these speeds, rad/s or m/s.
-    pub fn with_directions(log: &Log, widths: &[f64]) -> Self {
+impl Smoothing {
+    /// At the median step of a log, without half a second at either end and without the intervals that are left out.
+    pub fn of(log: &Log) -> Self {
         let step_s = log.median_step();
         let cutoff = (CUTOFF_HZ * step_s).min(HIGHEST / 2.0);
-        let filter = LowPass::new(cutoff);
-        let time = even(log, step_s);
-        let channel = |channel: &Vec<f64>| filter.apply(&resampled(&time, &log.time, channel));
-        let channels = |channels: &[Vec<f64>]| channels.iter().map(channel).collect::<Vec<_>>();
-        let (q, tau) = (channels(&log.q), channels(&log.tau));
+        let even = even(log, step_s);
+        let inner = 1..even.len().saturating_sub(1);
+        Self {
+            step_s,
+            filter: LowPass::new(cutoff),
+            logged: log.time.clone(),
+            used: inner.filter(|row| is_used(log, even[*row])).collect(),
+            even,
+        }
+    }
+
+    /// Every so many rows that what is left still holds all that the filter lets through.
+    #[must_use]
+    pub fn thinned(self) -> Self {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, and small
+        let every = ((ROWS_S / self.step_s).floor() as usize).max(1);
+        Self {
+            used: self.used.into_iter().step_by(every).collect(),
+            ..self
+        }
+    }
+
+    /// A channel of the log at the rows that are used.
+    pub fn channel(&self, channel: &[f64]) -> Vec<f64> {
+        self.used_of(&self.filtered(channel))
+    }
+
+    /// At all even times.
+    fn filtered(&self, channel: &[f64]) -> Vec<f64> {
+        self.filter
+            .apply(&resampled(&self.even, &self.logged, channel))
+    }
+
+    fn used_of(&self, filtered: &[f64]) -> Vec<f64> {
+        self.used.iter().map(|row| filtered[*row]).collect()
+    }
+}
+
+impl Smooth {
+    /// A log, all rows that are used. Velocity and acceleration are central differences of the filtered angle.
+    pub fn of(log: &Log) -> Self {
+        Self::by(&Smoothing::of(log), log, &[])
+    }
+
+    /// A log with the direction of each joint, which reverses over these speeds, rad/s or m/s.
+    pub fn by(smoothing: &Smoothing, log: &Log, widths: &[f64]) -> Self {
+        let Smoothing {
+            step_s,
+            filter,
+            even,
+            used,
+            ..
+        } = smoothing;
+        let q: Vec<Vec<f64>> = (log.q.iter().map(|q| smoothing.filtered(q))).collect();
         let direction = |(q, width): (&Vec<f64>, &f64)| {
             let speed = |pair: &[f64]| (pair[2] - pair[0]) / (2.0 * step_s);
             let inner = q.windows(3).map(speed);
@@ -52,42 +108,20 @@ impl Smooth {
                 .collect();
             // One more at either end, like the rows.
             let ends = [signs.first(), signs.last()].map(|sign| sign.copied().unwrap_or(0.0));
-            filter.apply(&[&ends[..1], &signs, &ends[1..]].concat())
+            let signs = [&ends[..1], &signs, &ends[1..]].concat();
+            smoothing.used_of(&filter.apply(&signs))
         };
-        let directions: Vec<Vec<f64>> = q.iter().zip(widths).map(direction).collect();
-        let used: Vec<usize> = (1..time.len().saturating_sub(1))
-            .filter(|row| is_used(log, time[*row]))
-            .collect();
-        let each = |channels: &[Vec<f64>], value: &dyn Fn(&[f64], usize) -> f64| {
-            let of = |channel: &Vec<f64>| used.iter().map(|row| value(channel, *row)).collect();
-            channels.iter().map(of).collect::<Vec<Vec<f64>>>()
+        let each = |value: &dyn Fn(&[f64], usize) -> f64| {
+            let of = |q: &Vec<f64>| used.iter().map(|row| value(q, *row)).collect();
+            q.iter().map(of).collect::<Vec<Vec<f64>>>()
         };
         Self {
-            qd: each(&q, &|q, k| (q[k + 1] - q[k - 1]) / (2.0 * step_s)),
-            qdd: each(&q, &|q, k| {
-                (q[k + 1] - 2.0 * q[k] + q[k - 1]) / step_s.powi(2)
-            }),
-            q: each(&q, &|q, k| q[k]),
-            tau: each(&tau, &|tau, k| tau[k]),
-            directions: each(&directions, &|directions, k| directions[k]),
-            time: used.iter().map(|row| time[*row]).collect(),
-        }
-    }
-
-    /// Every so many rows that what is left still holds all that the filter lets through.
-    #[must_use]
-    pub fn thinned(&self, step_s: f64) -> Self {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, and small
-        let every = ((ROWS_S / step_s).floor() as usize).max(1);
-        let channel = |channel: &Vec<f64>| channel.iter().copied().step_by(every).collect();
-        let channels = |channels: &[Vec<f64>]| channels.iter().map(channel).collect();
-        Self {
-            time: channel(&self.time),
-            q: channels(&self.q),
-            qd: channels(&self.qd),
-            qdd: channels(&self.qdd),
-            tau: channels(&self.tau),
-            directions: channels(&self.directions),
+            directions: q.iter().zip(widths).map(direction).collect(),
+            qd: each(&|q, k| (q[k + 1] - q[k - 1]) / (2.0 * step_s)),
+            qdd: each(&|q, k| (q[k + 1] - 2.0 * q[k] + q[k - 1]) / step_s.powi(2)),
+            q: each(&|q, k| q[k]),
+            tau: (log.tau.iter().map(|tau| smoothing.channel(tau))).collect(),
+            time: smoothing.used_of(even),
         }
     }
 

@@ -163,6 +163,11 @@ impl Graph {
         Program::compact(self.ops, self.inputs, self.labels, outputs)
     }
 
+    /// Whether a value is zero whatever the inputs are.
+    pub fn is_zero(&self, node: Node) -> bool {
+        self.constant_value(node) == Some(0.0)
+    }
+
     pub(super) fn constant_value(&self, node: Node) -> Option<f64> {
         match self.ops[node.index()] {
             Op::Const(value) => Some(value),

@@ -1,31 +1,28 @@
 //! The torques that logged motions need, beside those that act: windows of smoothed logs, one a lane.
 
-use super::normal_equations::WindowTerms;
+use super::normal_equations::{Reduced, WindowTerms};
 use super::sensitivity::{LANES, Lane, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
-use crate::data::{Joint, Log, Smooth};
+use crate::data::{Joint, Log, Smooth, Smoothing};
 use crate::expr::Tape;
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{Commands, Point, Window};
-
-/// A delay or lag is varied by this many s for its derivative: small against what shows, large against rounding.
-const STEP_S: f64 = 1e-6;
+use crate::sim::{self, Commands, Point, Window};
 
 /// A log as the error of torques reads it, thinned out.
 pub(super) struct Rows {
     smooth: Smooth,
-    step_s: f64,
+    smoothing: Smoothing,
 }
 
 impl Rows {
     /// Friction reverses over these speeds, one a joint.
     pub fn of(log: &Log, sign_widths: &[f64]) -> Self {
-        let step_s = log.median_step();
+        let smoothing = Smoothing::of(log).thinned();
         Self {
-            smooth: Smooth::with_directions(log, sign_widths).thinned(step_s),
-            step_s,
+            smooth: Smooth::by(&smoothing, log, sign_widths),
+            smoothing,
         }
     }
 
@@ -54,32 +51,24 @@ impl Acting {
         };
         for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
             let own = values.of_log(index);
-            let tau = filtered(dynamics, &own, log, rows);
-            let slope = |parameter: usize, joint: Joint| {
-                let mut moved = own.clone();
-                moved[parameter] += STEP_S;
-                let moved = filtered(dynamics, &moved, log, rows);
-                let both = moved[joint].iter().zip(&tau[joint]);
-                both.map(|(after, before)| (after - before) / STEP_S)
-                    .collect::<Vec<f64>>()
-            };
-            let filters = dynamics.filters.iter();
-            let slopes = filters.map(|filter| slope(filter.parameter, filter.joint));
+            let commands = Commands::of_log(&Point::new(dynamics, &own), log);
+            let smoothed = |channel: &[f64]| rows.smoothing.channel(channel);
+            let filtered: Vec<Option<sim::Acting>> = Joint::all(dynamics.joints)
+                .map(|joint| commands.acting(joint))
+                .collect();
+            let tau = (rows.smooth.tau.iter().zip(&filtered)).map(|(tau, filtered)| {
+                let filtered = filtered.as_ref().map(|acting| smoothed(&acting.tau));
+                filtered.unwrap_or_else(|| tau.clone())
+            });
+            acting.tau.push(tau.collect());
+            let slopes = dynamics.filters.iter().map(|filter| {
+                let acting = filtered[filter.joint].as_ref();
+                smoothed(acting.expect("the joint has a filter").slopes(filter.kind))
+            });
             acting.slopes.push(slopes.collect());
-            acting.tau.push(tau);
         }
         acting
     }
-}
-
-/// The torques of a log after the model's delays and lags, smoothed.
-fn filtered(dynamics: &Dynamics, values: &[f64], log: &Log, rows: &Rows) -> Vec<Vec<f64>> {
-    if dynamics.filters.is_empty() {
-        return rows.smooth.tau.clone();
-    }
-    let point = Point::new(dynamics, values);
-    let acting = Commands::of_log(&point, log).acting_on(log);
-    Smooth::of(&acting).thinned(rows.step_s).tau
 }
 
 /// Up to [`LANES`] windows side by side. Shorter ones are padded with rows of zero weight.
@@ -221,23 +210,28 @@ impl Balance {
         data: (&[Rows], &Acting),
         scale: f64,
     ) -> Vec<(usize, WindowTerms)> {
-        let columns = tangent.columns();
-        let mut sums = Sums::new(columns);
+        let of_joint = |columns: &Vec<usize>| Sums::new(columns.len());
+        let mut sums: Vec<Sums> = tangent.columns_of.iter().map(of_joint).collect();
         let first = tangent.first_parameter();
         let tape = tangent.program.tape_with_held(first);
-        let mut slopes = vec![Row::splat(0.0); columns];
         self.over_rows(tape, first, values, data, |lanes, tape| {
-            for (j, weight) in self.weight.iter().enumerate() {
+            let mut slopes = tangent.joints;
+            for (j, (sums, weight)) in sums.iter_mut().zip(&self.weight).enumerate() {
                 let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));
                 let out = tape.output(j);
                 let residual = Row(std::array::from_fn(|l| out[l] * weight[l]));
-                for (k, slope) in slopes.iter_mut().enumerate() {
-                    *slope = *tape.output(tangent.joints + j * columns + k);
-                }
-                sums.add(&residual, &slopes, &weight);
+                let own = slopes..slopes + tangent.columns_of[j].len();
+                slopes = own.end;
+                sums.add(&residual, own.map(|output| tape.output(output)), &weight);
             }
         });
-        let windows = self.windows.iter().enumerate();
-        windows.map(|(lane, &w)| (w, sums.lane(lane))).collect()
+        let mut all = vec![WindowTerms::zeros(tangent.columns()); self.windows.len()];
+        for (columns, sums) in tangent.columns_of.iter().zip(sums) {
+            for (all, terms) in all.iter_mut().zip(sums.lanes(self.windows.len())) {
+                let columns = columns.clone();
+                Reduced { columns, terms }.add_to(all);
+            }
+        }
+        self.windows.iter().copied().zip(all).collect()
     }
 }

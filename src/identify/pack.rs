@@ -235,11 +235,8 @@ impl Pack {
             }
             stepper.advance(&self.hold(commands, row, &states[2 * n..]));
         }
-        self.windows
-            .iter()
-            .enumerate()
-            .map(|(lane, &window)| (window, sums.lane(lane)))
-            .collect()
+        let terms = sums.lanes(self.windows.len());
+        self.windows.iter().copied().zip(terms).collect()
     }
 
     /// Add the distance of the start states from what the logs tell of them. It has the sensor's scale, not that of the

@@ -38,6 +38,8 @@ pub(super) struct Tangent {
     filters: usize,
     /// Indices into the model's parameters.
     pub active: Vec<usize>,
+    /// Of a balance of torques, the columns that the difference of each joint depends on; else empty.
+    pub columns_of: Vec<Vec<usize>>,
     pub local: Local,
 }
 
@@ -82,6 +84,7 @@ impl Tangent {
             joints: n,
             filters: dynamics.filters.len(),
             active: active.to_vec(),
+            columns_of: Vec::new(),
             local,
         }
     }
@@ -124,7 +127,7 @@ impl Tangent {
     }
 
     /// Of the balance of torques: outputs are the n differences, then for each of them its derivatives with respect to the
-    /// active parameters.
+    /// active parameters that it depends on.
     fn of_torques(dynamics: &Dynamics, active: &[usize]) -> Self {
         let n = dynamics.joints;
         let mut graph = Graph::new();
@@ -147,12 +150,22 @@ impl Tangent {
                 row[column] = graph.mul(by_torque[0], slope);
             }
         }
+        let depends = |row: &Vec<Node>| -> Vec<usize> {
+            (0..row.len())
+                .filter(|column| !graph.is_zero(row[*column]))
+                .collect()
+        };
+        let columns_of: Vec<Vec<usize>> = jacobian.iter().map(depends).collect();
+        let own = jacobian.iter().zip(&columns_of);
+        let slopes = own.flat_map(|(row, columns)| columns.iter().map(|column| row[*column]));
+        let outputs: Vec<Node> = differences.into_iter().chain(slopes).collect();
         Self {
-            program: graph.finish(&[differences, jacobian.concat()].concat()),
+            program: graph.finish(&outputs),
             reading: None,
             joints: n,
             filters: dynamics.filters.len(),
             active: active.to_vec(),
+            columns_of,
             local: Local::Nothing,
         }
     }

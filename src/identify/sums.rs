@@ -25,12 +25,38 @@ pub fn huber(residual: f64) -> f64 {
     loss(residual).0
 }
 
+/// Measurements that are added at once: the sums outgrow the processor's nearest memory, and are fetched once for all of them.
+const TOGETHER: usize = 8;
+
 /// Running sums of the normal equations of all lanes. The matrix is stored as its upper triangle.
 pub(super) struct Sums {
     columns: usize,
     cost: Lane,
     gradient: Vec<Lane>,
     triangle: Vec<Lane>,
+    waiting: Waiting,
+}
+
+/// Measurements that are not in the sums yet.
+struct Waiting {
+    count: usize,
+    /// Both multiplied by the weight of Huber's loss.
+    residuals: [Lane; TOGETHER],
+    weights: [Lane; TOGETHER],
+    /// `[column][measurement]`
+    sensitivities: Vec<[Lane; TOGETHER]>,
+}
+
+impl Waiting {
+    fn new(columns: usize) -> Self {
+        let none = [Row::splat(0.0); TOGETHER];
+        Self {
+            count: 0,
+            residuals: none,
+            weights: none,
+            sensitivities: vec![none; columns],
+        }
+    }
 }
 
 impl Sums {
@@ -40,27 +66,54 @@ impl Sums {
             cost: Row::splat(0.0),
             gradient: vec![Row::splat(0.0); columns],
             triangle: vec![Row::splat(0.0); columns * (columns + 1) / 2],
+            waiting: Waiting::new(columns),
         }
     }
 
-    /// Add one measurement: its normalised residual, the sensitivities of the angle, and 1 / (noise scale).
-    pub fn add(&mut self, residual: &Lane, sensitivities: &[Lane], weight: &Lane) {
+    /// Add one measurement: its normalised residual, its sensitivities column by column, and 1 / (noise scale).
+    pub fn add<'a>(
+        &mut self,
+        residual: &Lane,
+        sensitivities: impl IntoIterator<Item = &'a Lane>,
+        weight: &Lane,
+    ) {
         let losses = residual.map(loss);
         for lane in 0..LANES {
             self.cost[lane] += losses[lane].0;
         }
-        Lane::dispatch(Add {
-            sums: self,
-            // Both are multiplied by the weight of Huber's loss.
-            residual: Row(std::array::from_fn(|l| {
-                losses[l].1 * weight[l] * residual[l]
-            })),
-            weight: Row(std::array::from_fn(|l| losses[l].1 * weight[l] * weight[l])),
-            sensitivities,
-        });
+        let waiting = &mut self.waiting;
+        let at = waiting.count;
+        waiting.residuals[at] = Row(std::array::from_fn(|l| {
+            losses[l].1 * weight[l] * residual[l]
+        }));
+        waiting.weights[at] = Row(std::array::from_fn(|l| losses[l].1 * weight[l] * weight[l]));
+        for (column, value) in waiting.sensitivities.iter_mut().zip(sensitivities) {
+            column[at] = *value;
+        }
+        waiting.count += 1;
+        if waiting.count == TOGETHER {
+            self.add_waiting();
+        }
     }
 
-    pub fn lane(&self, lane: usize) -> WindowTerms {
+    fn add_waiting(&mut self) {
+        let waiting = &mut self.waiting;
+        // Places that are not filled hold a measurement which has been added.
+        for at in waiting.count..TOGETHER {
+            waiting.residuals[at] = Row::splat(0.0);
+            waiting.weights[at] = Row::splat(0.0);
+        }
+        waiting.count = 0;
+        Lane::dispatch(AddWaiting(self));
+    }
+
+    /// The normal equations of the first lanes, so many of them.
+    pub fn lanes(mut self, count: usize) -> Vec<WindowTerms> {
+        self.add_waiting();
+        (0..count).map(|lane| self.lane(lane)).collect()
+    }
+
+    fn lane(&self, lane: usize) -> WindowTerms {
         let mut hessian = DMatrix::zeros(self.columns, self.columns);
         let mut entries = self.triangle.iter();
         for i in 0..self.columns {
@@ -78,33 +131,37 @@ impl Sums {
     }
 }
 
-struct Add<'a> {
-    sums: &'a mut Sums,
-    residual: Lane,
-    weight: Lane,
-    sensitivities: &'a [Lane],
-}
+struct AddWaiting<'a>(&'a mut Sums);
 
-impl WithSimd for Add<'_> {
+impl WithSimd for AddWaiting<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Sums {
-            gradient, triangle, ..
-        } = self.sums;
+            gradient,
+            triangle,
+            waiting,
+            ..
+        } = self.0;
         for part in 0..Lane::parts::<S>() {
-            let (residual, weight) = (self.residual.get(simd, part), self.weight.get(simd, part));
             let mut entries = triangle.as_mut_slice();
-            for (i, sum) in gradient.iter_mut().enumerate() {
-                let rest = &self.sensitivities[i..];
-                let a = rest[0].get(simd, part);
-                sum.set(part, a.mul_add(residual, sum.get(simd, part)));
-                let scaled = a * weight;
+            for (i, gradient) in gradient.iter_mut().enumerate() {
+                let rest = &waiting.sensitivities[i..];
+                let mut scaled = rest[0].map(|value| value.get(simd, part));
+                let mut sum = gradient.get(simd, part);
+                for (k, value) in scaled.iter_mut().enumerate() {
+                    sum = value.mul_add(waiting.residuals[k].get(simd, part), sum);
+                    *value = *value * waiting.weights[k].get(simd, part);
+                }
+                gradient.set(part, sum);
                 let (own, others) = entries.split_at_mut(rest.len());
-                for (b, entry) in rest.iter().zip(own) {
-                    let b = b.get(simd, part);
-                    entry.set(part, b.mul_add(scaled, entry.get(simd, part)));
+                for (values, entry) in rest.iter().zip(own) {
+                    let mut sum = entry.get(simd, part);
+                    for (value, scaled) in values.iter().zip(&scaled) {
+                        sum = value.get(simd, part).mul_add(*scaled, sum);
+                    }
+                    entry.set(part, sum);
                 }
                 entries = others;
             }

@@ -20,6 +20,25 @@ pub struct Commands<'l> {
     histories: Vec<Option<History<'l>>>,
 }
 
+/// Mean torques that act on a joint from each row of a log to the next.
+pub struct Acting {
+    /// N m (or N).
+    pub tau: Vec<f64>,
+    /// Derivatives with respect to the delay and the time constant, per s.
+    by_delay: Vec<f64>,
+    by_lag: Vec<f64>,
+}
+
+impl Acting {
+    /// The derivatives with respect to the parameter of a filter.
+    pub fn slopes(&self, kind: CommandFilter) -> &[f64] {
+        match kind {
+            CommandFilter::Delay => &self.by_delay,
+            CommandFilter::Lag => &self.by_lag,
+        }
+    }
+}
+
 /// The acting torque over one substep.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Mean {
@@ -93,13 +112,32 @@ impl<'l> Commands<'l> {
     #[must_use]
     pub fn acting_on(&self, log: &Log) -> Log {
         let mut acting = log.clone();
-        for (history, tau) in self.histories.iter().zip(&mut acting.tau) {
-            let Some(history) = history else { continue };
-            for (tau, ends) in tau.iter_mut().zip(log.time.windows(2)) {
-                *tau = history.mean(ends[0], ends[1]).value;
+        for (joint, tau) in Joint::all(self.joints).zip(&mut acting.tau) {
+            if let Some(filtered) = self.acting(joint) {
+                *tau = filtered.tau;
             }
         }
         acting
+    }
+
+    /// What acts on a joint, if it has a filter.
+    pub fn acting(&self, joint: Joint) -> Option<Acting> {
+        let history = self.histories[joint].as_ref()?;
+        let ends = self.time.iter().map(|time| history.at(*time));
+        let ends: Vec<Instant> = ends.collect();
+        let mean = |ends: &[Instant]| ends[0].mean_until(&ends[1]);
+        let means: Vec<Mean> = ends.windows(2).map(mean).collect();
+        // The last command is held for ever.
+        let last = Mean {
+            value: *self.tau[joint].last()?,
+            ..Mean::default()
+        };
+        let each = |part: fn(&Mean) -> f64| means.iter().chain([&last]).map(part).collect();
+        Some(Acting {
+            tau: each(|mean| mean.value),
+            by_delay: each(|mean| mean.by_delay),
+            by_lag: each(|mean| mean.by_lag),
+        })
     }
 }
 
@@ -275,10 +313,6 @@ impl<'l> History<'l> {
             integral: command_integral - self.lag * output,
             integral_by_lag: -output - self.lag * output_by_lag,
         }
-    }
-
-    fn mean(&self, from: f64, to: f64) -> Mean {
-        self.at(from).mean_until(&self.at(to))
     }
 
     /// Means over equal substeps. Neighbouring substeps share the same instant, so a jump at it counts once.

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::select::{Losses, best_start, gain};
+use crate::closeloop::select::{Losses, best_start, gain, promise};
 use crate::closeloop::study::Study;
 use crate::data::{Joint, Quantity};
 use crate::model::{Effect, FittedEffect};
@@ -114,7 +114,8 @@ fn longer(study: &Study<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Op
                 return None;
             }
             let effect = FittedEffect::absent(&effect, joint);
-            let (start, cost) = best_start(study, model, &effect)?;
+            let start = best_start(study, model, &effect)?;
+            let cost = promise(study, model, &start)?;
             Some((terms, start, cost))
         })
         .collect();

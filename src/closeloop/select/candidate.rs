@@ -70,25 +70,21 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
     points.into_iter().map(at).collect()
 }
 
-/// The starting point of a candidate with the largest predicted decrease beside a model, and the predicted cost: chosen
-/// on a sample of the windows where there are several, and predicted on all of them.
+/// The starting point of a candidate with the largest predicted decrease beside a model, on a sample of the windows.
 pub fn best_start(
     study: &Study<'_>,
     fitted: &Fitted,
     candidate: &FittedEffect,
-) -> Option<(FittedEffect, f64)> {
+) -> Option<FittedEffect> {
     let mut starts = starts(candidate);
-    if starts.len() > 1 {
-        let locals = study.sample.locals(&fitted.fit.locals);
-        let best = match has_switch(candidate) {
-            true => best_by_switches(study, fitted, &starts, &locals)?,
-            false => best_by_cost(study, fitted, starts, &locals)?,
-        };
-        starts = vec![best];
+    if starts.len() < 2 {
+        return starts.pop();
     }
-    let start = starts.pop()?;
-    let cost = promise(study, fitted, &start)?;
-    Some((start, cost))
+    let locals = study.sample.locals(&fitted.fit.locals);
+    match has_switch(candidate) {
+        true => best_by_switches(study, fitted, &starts, &locals),
+        false => best_by_cost(study, fitted, starts, &locals),
+    }
 }
 
 /// The predicted cost of all windows of a candidate at its values beside a model.

@@ -57,9 +57,10 @@ fn in_place_of(
     old: &FittedEffect,
     new: &FittedEffect,
 ) -> Option<FittedEffect> {
-    let (absent, promised) = best_start(study, rest, new)?;
+    let absent = best_start(study, rest, new)?;
     let promises_more = |carried: &FittedEffect| {
-        promise(study, rest, carried).is_some_and(|carried| carried < promised)
+        let [carried, absent] = [carried, &absent].map(|start| promise(study, rest, start));
+        carried.is_some_and(|carried| absent.is_none_or(|absent| carried < absent))
     };
     let carried = carried_over(old, &absent).filter(promises_more);
     Some(carried.unwrap_or(absent))
@@ -79,12 +80,10 @@ fn with_numbers_beside(study: &Study<'_>, rest: &Fitted, old: &FittedEffect) -> 
         for number in below.into_iter().chain(above) {
             let mut single = old.clone();
             single.effect.parameters[k].starts = vec![number];
-            starts.extend(
-                best_start(study, rest, &single).map(|(start, _)| FittedEffect {
-                    effect: old.effect.clone(),
-                    ..start
-                }),
-            );
+            starts.extend(best_start(study, rest, &single).map(|start| FittedEffect {
+                effect: old.effect.clone(),
+                ..start
+            }));
         }
     }
     starts

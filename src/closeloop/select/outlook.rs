@@ -61,7 +61,7 @@ impl Outlook {
                 {
                     return Some(candidate.clone());
                 }
-                Some(best_start(study, &beside, candidate)?.0)
+                best_start(study, &beside, candidate)
             })
             .collect();
         let model = fitted.model.with_effects(fitted.effects_and(&options));

@@ -236,7 +236,7 @@ impl<'a, 'p> Search<'a, 'p> {
                 .filter(|c| !has_switch(c))
                 .filter_map(|candidate| {
                     let beside = beside(study, &from.fitted, candidate)?;
-                    let (start, _) = best_start(study, &beside, candidate)?;
+                    let start = best_start(study, &beside, candidate)?;
                     let mut set = beside.model.effects[declared..].to_vec();
                     set.push(start);
                     Some(set)
