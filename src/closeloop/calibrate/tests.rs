@@ -54,12 +54,15 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
     assert_eq!(before.windows.len(), after.windows.len());
     // The motion is the accepted model's, and each residual has its old size: only signs were drawn.
     let residuals = |study: &Study<'_>| {
-        let states = study.shooting.initial_locals(0);
+        // What the rows of a neighbouring window tell of a start has that window's sign.
+        let windows = study.shooting.windows.clone();
+        let shooting = study.shooting.over(windows).with_free_starts();
+        let states = shooting.initial_locals(0);
         let scale = Some(accepted.fit.scale);
         let dynamics = &accepted.model.dynamics();
         let (values, found) =
-            crate::identify::fit(&study.shooting, dynamics, &[], states, scale).unwrap();
-        study.shooting.residuals(dynamics, &values, &found.locals)
+            crate::identify::fit(&shooting, dynamics, &[], states, scale).unwrap();
+        shooting.residuals(dynamics, &values, &found.locals)
     };
     let mut turned = 0;
     for (window, (old, new)) in residuals(&study).iter().zip(residuals(&again)).enumerate() {
@@ -71,8 +74,8 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
         };
         let off = old.iter().zip(&new).map(|(a, b)| (a - sign * b).abs());
         let off = off.fold(0.0, f64::max);
-        // Both fits end when a step gains less than 1e-4 of the loss: within a hundredth of the noise.
-        assert!(off < 0.03, "window {window}: {off}");
+        // Both fits end when a step gains less than 1e-4 of the loss.
+        assert!(off < 1e-3, "window {window}: {off}");
     }
     assert!(turned > 5 && turned < after.windows.len() - 5, "{turned}");
 }
