@@ -1,13 +1,16 @@
 use rand::Rng;
+use rayon::prelude::*;
 
 use super::error::StudyError;
 use super::establish::{Standing, establish, without_each};
+use super::every_log::fits_as_well_without;
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
 use super::select::{Losses, Rival, Round, Search, Trial, candidates, starts};
 use super::space::Space;
 use super::stage::{Observer, Stage};
 use super::study::Study;
+use crate::data::Log;
 use crate::identify::{FitError, Identifiability};
 use crate::model::{FittedEffect, Library, Status};
 
@@ -63,15 +66,23 @@ impl Chosen {
         });
     }
 
+    /// Effects are not established without which the torques of some log fit as well.
+    fn ask_every_log(&mut self, logs: &[&Log]) {
+        let after = &self.after;
+        demote_where(&mut self.standings, |standing| {
+            let log = fits_as_well_without(logs, after, standing)?;
+            Some(format!(
+                "the torques of {} fit as well without it",
+                log.name()
+            ))
+        });
+    }
+
     /// Effects of which `is_meant` holds are not established, for this reason.
-    fn demote(&mut self, reason: &str, is_meant: impl Fn(&Standing) -> bool) {
-        let established = |standing: &&mut Standing| standing.status == Status::Established;
-        for standing in self.standings.iter_mut().filter(established) {
-            if is_meant(standing) {
-                standing.status = Status::Supported;
-                standing.reason = Some(reason.into());
-            }
-        }
+    fn demote(&mut self, reason: &str, is_meant: impl Fn(&Standing) -> bool + Sync) {
+        demote_where(&mut self.standings, |standing| {
+            is_meant(standing).then(|| reason.into())
+        });
     }
 
     /// Note in the model how each of the effects stands.
@@ -84,13 +95,29 @@ impl Chosen {
     }
 }
 
+/// Established effects are no more than supported where there is a reason why not.
+fn demote_where(standings: &mut [Standing], reason: impl Fn(&Standing) -> Option<String> + Sync) {
+    let established = |standing: &&mut Standing| standing.status == Status::Established;
+    standings
+        .par_iter_mut()
+        .filter(established)
+        .for_each(|standing| {
+            if let Some(reason) = reason(standing) {
+                standing.status = Status::Supported;
+                standing.reason = Some(reason);
+            }
+        });
+}
+
 /// Stages 3 to 5: fit the declared model, choose the set of effects that explains the logs best, judge each of them and
-/// test the residuals.
+/// test the residuals. Where torques are compared, those of the logs that are set apart have to be fitted better by an effect
+/// as well, though nothing is fitted to them.
 ///
 /// # Errors
 /// As [`Study::fit_declared`].
 pub fn find(
     study: &mut Study<'_>,
+    apart: &[Log],
     library: &Library,
     rng: &mut impl Rng,
     progress: &mut Observer<'_>,
@@ -130,11 +157,13 @@ pub fn find(
     if left.is_significant() {
         chosen.doubt(study, &before, &left);
     }
-    if study.space == Space::Torque
-        && let Some((after, standing)) = study.with_payload(&chosen.after, library.effects())
-    {
-        chosen.after = after;
-        chosen.standings.push(standing);
+    if study.space == Space::Torque {
+        let every: Vec<&Log> = study.logs.iter().chain(apart).collect();
+        chosen.ask_every_log(&every);
+        if let Some((after, standing)) = study.with_payload(&chosen.after, library.effects()) {
+            chosen.after = after;
+            chosen.standings.push(standing);
+        }
     }
     chosen.mark(study);
     if chosen.established() == 0 && !chosen.standings.is_empty() {

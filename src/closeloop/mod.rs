@@ -9,6 +9,7 @@ mod choose;
 mod discriminate;
 mod error;
 mod establish;
+mod every_log;
 mod find;
 mod fit;
 mod fitted;

@@ -70,7 +70,7 @@ pub fn close_loop(
     // Where nothing moves, anything could be found.
     let nothing = Library::empty();
     let library = if study.moves() { library } else { &nothing };
-    let found = find(&mut study, library, rng, progress)?;
+    let found = find(&mut study, &tested, library, rng, progress)?;
     let alternatives = discriminate(&study, &found, progress);
     progress(Stage::Refine.into());
     let refined = refine(&study, &found.before, &found.chosen.after);

@@ -67,7 +67,7 @@ fn diverging(mut fitted: Fitted) -> Fitted {
 
 fn search(study: &mut Study<'_>) -> Found {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    find(study, &Library::built_in(), &mut rng, &mut |_| {}).unwrap()
+    find(study, &[], &Library::built_in(), &mut rng, &mut |_| {}).unwrap()
 }
 
 #[test]

@@ -161,7 +161,7 @@ impl Repeat<'_> {
             ..self.study.on(logs)
         };
         let (number, of) = (self.done, self.of);
-        let found = find(&mut study, self.library, rng, &mut |within| {
+        let found = find(&mut study, &[], self.library, rng, &mut |within| {
             let text = format!("{text}: {}", within.text);
             (self.progress)(Repetition {
                 number,

@@ -125,7 +125,7 @@ fn friction_is_named_above_its_detection_limit() {
             let logs = logs(&coulomb(level), 100 + seed);
             let mut study = Study::new(&declared, &logs, &settings);
             let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
-            let found = find(&mut study, &library, rng, &mut |_| {}).unwrap();
+            let found = find(&mut study, &[], &library, rng, &mut |_| {}).unwrap();
             let standings = found.chosen.standings.iter();
             let established = standings.filter(|s| s.status == Status::Established);
             let labels = established.map(|s| s.effect.label());

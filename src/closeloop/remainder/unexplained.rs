@@ -95,7 +95,7 @@ pub fn unexplained(
         .iter()
         .filter(|p| p.gain > study.settings.remainder.noteworthy);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
-    let (place, joint) = place(&omnibus, &probed, &study.settings.remainder);
+    let (place, joint) = place(study, &omnibus, &probed);
     Unexplained {
         fraction: omnibus.fraction,
         p_value: (2.0 * omnibus.p_value.min(least * asked)).min(1.0),
@@ -120,19 +120,22 @@ fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &Losses) 
 }
 
 /// The variable and the joint of the probe that lowers the loss most; one test among all probes and the omnibus test.
-fn place(omnibus: &Omnibus, probed: &[Probed], settings: &RemainderSettings) -> (String, Joint) {
+fn place(study: &Study<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
     let RemainderSettings {
         significance,
         noteworthy,
         located,
         unlocated,
         ..
-    } = *settings;
+    } = study.settings.remainder;
     #[allow(clippy::cast_precision_loss)] // few probes
     let level = 0.5 * significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
     let matters = noteworthy.max(located * share);
-    let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters;
+    // What friction leaves of low-passed torques near its reversals is located by the velocity.
+    let is_smoothing =
+        |joint: Joint| study.space == Space::Torque && omnibus.fractions[joint] <= unlocated;
+    let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters && !is_smoothing(p.joint);
     let most = probed.iter().filter(stands_out);
     let structured =
         omnibus.p_value < 0.5 * significance && share > noteworthy && omnibus.fraction > unlocated;
