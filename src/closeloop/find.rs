@@ -128,9 +128,8 @@ pub fn find(
         search.select(before.clone())
     });
     if study.space == Space::Motion
-        && let Some(widths) = study.wider_reversal(&chosen.after)
+        && let Some((widths, narrowest)) = study.wider_reversal(&chosen.after)
     {
-        let narrowest = Loss::of(study, &chosen.after).total();
         let narrow = std::mem::replace(&mut study.sign_widths, widths);
         let wide = study.fit_declared(library.effects())?;
         let other = choose(study, library, &wide, progress, |search| {

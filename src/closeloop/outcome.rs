@@ -12,7 +12,7 @@ use super::stage::Stage;
 use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
-use crate::identify::{FitError, Identifiability};
+use crate::identify::{BodiesTold, FitError, Identifiability};
 use crate::model::{Model, Parameter};
 
 /// Everything that closing the loop found out.
@@ -65,6 +65,8 @@ pub struct Models {
     pub moved_to: Vec<Parameter>,
     /// What the logs determine of the declared parameters.
     pub identifiability: Identifiability,
+    /// What they tell of the bodies of a chain, where torques were compared.
+    pub bodies: BodiesTold,
     /// Values in the model file that the fit of `after` contradicts.
     pub contradicted: Vec<Contradicted>,
 }

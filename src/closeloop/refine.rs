@@ -4,7 +4,7 @@ use super::fitted::Fitted;
 use super::settings::RefineSettings;
 use super::space::Space;
 use super::study::Study;
-use crate::identify::{FitError, Identifiability, Values, uncertainty};
+use crate::identify::{BodiesTold, FitError, Identifiability, Values, bodies_told, uncertainty};
 use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
@@ -18,6 +18,8 @@ pub(super) struct Refined<'a> {
     pub after: Fitted,
     /// What the logs determine.
     pub identifiability: Identifiability,
+    /// Of the bodies of a chain, where torques were compared.
+    pub bodies: BodiesTold,
     /// Why the steps are not fine, if they are not.
     pub failure: Option<FitError>,
 }
@@ -45,8 +47,10 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
             }
         }
     };
+    let bodies = study.told_of_bodies(&after);
     after.model = with_intervals(&study, &after, &chosen.model);
     Refined {
+        bodies,
         study,
         before,
         after,
@@ -82,6 +86,17 @@ impl Study<'_> {
 }
 
 impl Study<'_> {
+    /// What the logs tell of the bodies of a chain.
+    fn told_of_bodies(&self, fitted: &Fitted) -> BodiesTold {
+        if self.space == Space::Motion {
+            return BodiesTold::default();
+        }
+        let dynamics = self.compiled(&fitted.model);
+        let values = Values::of(&dynamics, self.logs);
+        let uncertainty = uncertainty(&self.shooting, &fitted.fit);
+        bodies_told(&dynamics, self.declared, &values, &fitted.fit, &uncertainty)
+    }
+
     /// The same study where the noise of each joint is what a model leaves.
     fn weighed_by(&self, fitted: &Fitted) -> Self {
         let dynamics = self.compiled(&fitted.model);

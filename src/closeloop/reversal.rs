@@ -8,8 +8,9 @@ use crate::data::Joint;
 
 impl Study<'_> {
     /// The widths of the joints' reversals with which a fitted model explains the logs better than with those of the study, by
-    /// the share that a round of the search must; `None` where there are none, or the model file gives them.
-    pub(super) fn wider_reversal(&self, fitted: &Fitted) -> Option<Vec<f64>> {
+    /// the share that a round of the search must, and the loss with those of the study; `None` where there are none, or the
+    /// model file gives them.
+    pub(super) fn wider_reversal(&self, fitted: &Fitted) -> Option<(Vec<f64>, f64)> {
         if self.declared.sign_width.is_some() {
             return None;
         }
@@ -31,7 +32,7 @@ impl Study<'_> {
                 }
             }
         }
-        (least < first).then_some(best)
+        (least < first).then_some((best, first))
     }
 
     /// The loss of a model, fitted again with these widths.

@@ -153,6 +153,7 @@ fn models_of(study: &Study<'_>, refined: Refined<'_>) -> Models {
         contradicted: contradicted(&study.declared.all_parameters(), &fitted),
         before: refined.before,
         after: refined.after,
+        bodies: refined.bodies,
         moved_to: study.moved_to.clone(),
         identifiability: study.identifiability.clone(),
     }

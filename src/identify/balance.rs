@@ -51,7 +51,7 @@ impl Acting {
         };
         for (index, (log, rows)) in logs.iter().zip(rows).enumerate() {
             let own = values.of_log(index);
-            let commands = Commands::of_log(&Point::new(dynamics, &own), log);
+            let commands = Commands::of_log(Point::new(dynamics, &own), log);
             let smoothed = |channel: &[f64]| rows.smoothing.channel(channel);
             let filtered: Vec<Option<sim::Acting>> = Joint::all(dynamics.joints)
                 .map(|joint| commands.acting(joint))

@@ -146,7 +146,19 @@ impl Uncertainty {
     /// Half width of the 95 % interval of the i-th column: Student's t with one degree of freedom less than blocks that
     /// depend on it.
     pub fn half_width(&self, i: usize) -> f64 {
-        self.student(i).inverse_cdf(0.975) * self.covariance[(i, i)].max(0.0).sqrt()
+        self.half_width_of(&[(i, 1.0)])
+    }
+
+    /// The same of a sum of columns with these weights.
+    pub fn half_width_of(&self, sum: &[(usize, f64)]) -> f64 {
+        let part = |(i, weight): &(usize, f64)| -> f64 {
+            sum.iter()
+                .map(|(j, other)| weight * other * self.covariance[(*i, *j)])
+                .sum()
+        };
+        let variance: f64 = sum.iter().map(part).sum();
+        let quantiles = sum.iter().map(|(i, _)| self.student(*i).inverse_cdf(0.975));
+        quantiles.fold(0.0, f64::max) * variance.max(0.0).sqrt()
     }
 
     /// Two-sided p-value of the hypothesis that the i-th column is `null`, given `value`.

@@ -6,6 +6,7 @@
 //! them.
 
 mod balance;
+mod combinations;
 mod declared_body;
 mod eigen;
 mod fit;
@@ -25,6 +26,7 @@ mod torques;
 mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
+pub use combinations::{BodiesTold, Combination, bodies_told};
 pub use eigen::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};

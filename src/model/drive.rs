@@ -7,6 +7,7 @@ use super::reader::{Document, FileError, Located, Section};
 use super::system::{Equations, Model};
 use crate::data::{Joint, Log, Quantity};
 use crate::expr::{Formula, Graph, Node, Program, Scope};
+use crate::lanes::Row;
 
 /// The torque of each joint's drive, as formulas in the commands `cmd1..cmdn`, the measured motion `q1..`, `qd1..`, time `t` and
 /// the parameters of the model.
@@ -78,16 +79,20 @@ impl Model {
             return log.tau.clone();
         };
         let mut torques = vec![Vec::with_capacity(log.rows()); self.joints];
-        let values: Vec<f64> = self.parameters.iter().map(|p| p.value).collect();
+        let channels = || (log.q.iter().chain(&log.qd).chain(&log.tau)).chain([&log.time]);
+        let moving = channels().count();
+        let mut tape = program.tape_with_held::<f64, 1>(moving);
+        let values = self.parameters.iter().map(|parameter| parameter.value);
+        for (slot, value) in tape.inputs()[moving..].iter_mut().zip(values) {
+            *slot = Row([value]);
+        }
         for row in 0..log.rows() {
-            let channels = log.q.iter().chain(&log.qd).chain(&log.tau);
-            let moving = channels.map(|channel| channel[row]);
-            let inputs: Vec<f64> = moving
-                .chain([log.time[row]])
-                .chain(values.iter().copied())
-                .collect();
-            for (torques, torque) in torques.iter_mut().zip(program.eval(&inputs)) {
-                torques.push(torque);
+            for (slot, channel) in tape.moving().iter_mut().zip(channels()) {
+                *slot = Row([channel[row]]);
+            }
+            tape.run();
+            for (joint, torques) in torques.iter_mut().enumerate() {
+                torques.push(tape.output(joint)[0]);
             }
         }
         torques

@@ -64,8 +64,8 @@ impl OwnValue {
 /// A compiled model: first-order differential equations as one program, with the values of its parameters.
 ///
 /// Inputs of the program, in this order: `q1..qn`, `qd1..qdn` (rad or m, and per second), `tau1..taun`
-/// (N m or N) or the commands of the drives `cmd1..cmdn`, `t` (s), then the parameters in the order of `parameters`. Outputs: `dq/dt` (n values),
-/// then `dqd/dt` (n values). Torques or commands are those that act, after `filters`.
+/// (N m or N) or the commands of the drives `cmd1..cmdn`, `t` (s), then the parameters in the order of `parameters`. Outputs:
+/// `dq/dt` (n values), then `dqd/dt` (n values). Torques or commands are those that act, after `filters`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dynamics {
     /// Name of the system, for messages and files.

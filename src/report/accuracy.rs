@@ -7,7 +7,7 @@ use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
 use crate::closeloop::{Outcome, Space, TorqueErrors};
-use crate::data::{Joint, Quantity};
+use crate::data::{Audit, Joint, Quantity};
 use crate::identify::Identifiability;
 use crate::sim::metric::{Summary, TorqueError, summarise};
 
@@ -110,7 +110,25 @@ pub(super) fn torques(outcome: &Outcome) -> String {
         after / before.max(f64::MIN_POSITIVE)
     );
     out += &removed(*reduction_ci95, "error");
-    out + "\n"
+    out + &repeated(outcome) + "\n"
+}
+
+/// What an error on test logs says that have the motion of others once more.
+fn repeated(outcome: &Outcome) -> String {
+    let of_test = &outcome.given.audits[outcome.given.train.len()..];
+    let is_repeat = |audit: &&Audit| audit.repeats.is_some();
+    let repeats: Vec<String> = (of_test.iter().filter(is_repeat))
+        .map(|audit| audit.log.clone())
+        .collect();
+    if repeats.is_empty() {
+        return String::new();
+    }
+    format!(
+        "\nThe motion of {} is that of another log once more: the error there says how well torques repeat, and nothing of other \
+         motions. Those are predicted no better than with the declared bodies and fitted friction where they need what these \
+         logs do not tell of the bodies (see below).\n",
+        listed(&repeats)
+    )
 }
 
 /// How much of an error of the fitted declared model the effects remove, where an interval is known.

@@ -2,15 +2,16 @@
 
 use super::calibration::CalibrationEntry;
 use super::schema::{
-    AlternativeEntry, AuditEntry, ContenderEntry, ContradictedEntry, EffectEntry, EffectName,
-    ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry, LogsEntry,
-    ModelError, NormEntry, ParameterEntry, Report, TorqueEntry, TriedEntry, UnexplainedEntry,
+    AlternativeEntry, AuditEntry, CombinationEntry, ContenderEntry, ContradictedEntry, EffectEntry,
+    EffectName, ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry,
+    LogsEntry, ModelError, NormEntry, ParameterEntry, Report, TorqueEntry, TriedEntry,
+    UnexplainedEntry,
 };
 use crate::closeloop::{
     Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, TorqueErrors, Tried,
 };
 use crate::data::{Audit, Joint, Log};
-use crate::identify::{Fit, FitError};
+use crate::identify::{Combination, Fit, FitError};
 use crate::model::{FittedEffect, Model, Origin, OwnValue, Parameter};
 use crate::sim::metric::{Assessment, Summary, summarise};
 
@@ -191,7 +192,7 @@ fn ended(fit: &Fit) -> FitEntry {
 }
 
 fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
-    let verdict = &outcome.models.identifiability;
+    let (verdict, bodies) = (&outcome.models.identifiability, &outcome.models.bodies);
     let name = |k: &usize| {
         outcome.models.before.model.all_parameters()[*k]
             .name
@@ -202,6 +203,19 @@ fn identifiability(outcome: &Outcome) -> IdentifiabilityEntry {
         determined: verdict.determined,
         undetermined: verdict.undetermined.clone(),
         held: verdict.hold.iter().map(name).collect(),
+        bodies: bodies.told.iter().map(combination).collect(),
+        tellable: bodies.tellable,
+    }
+}
+
+fn combination(one: &Combination) -> CombinationEntry {
+    CombinationEntry {
+        body: one.body + 1,
+        sum: one.parts.clone(),
+        declared: one.declared,
+        value: one.value,
+        ci95: one.ci95,
+        unit: one.unit.clone(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! What closing the loop found, for people and for programs.
 
 mod accuracy;
+mod bodies;
 mod calibration;
 mod film;
 mod folder;

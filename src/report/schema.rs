@@ -200,6 +200,25 @@ pub(super) struct IdentifiabilityEntry {
     pub undetermined: Vec<Vec<(String, f64)>>,
     /// parameters held for that reason
     pub held: Vec<String>,
+    /// what the logs tell of the bodies of a chain, where torques were compared
+    pub bodies: Vec<CombinationEntry>,
+    /// how many sums of the bodies' parameters any motion could tell
+    pub tellable: usize,
+}
+
+/// a sum of bodies' parameters that the logs tell
+#[derive(Debug, Serialize, JsonSchema)]
+pub(super) struct CombinationEntry {
+    /// number of its first body, 1 next to the base
+    pub body: usize,
+    /// parameters with their weights
+    pub sum: Vec<(String, f64)>,
+    /// at the values in the model file
+    pub declared: f64,
+    pub value: f64,
+    /// 95 % interval, lower end first
+    pub ci95: [f64; 2],
+    pub unit: String,
 }
 
 /// error of the torques that the logged motion needs, on the test logs

@@ -1,6 +1,7 @@
 use std::fmt::Write;
 
 use super::accuracy::{compared, contradicted, errors, parameters, torques};
+use super::bodies::bodies;
 use super::calibration::section;
 use super::remainder::remainder;
 use super::wording::{capitalised, listed, probability, reduction, values};
@@ -17,6 +18,7 @@ pub fn text(outcome: &Outcome, seed: u64) -> String {
         torques(outcome),
         errors(outcome),
         parameters(outcome),
+        bodies(outcome),
         contradicted(outcome),
         alternatives(outcome),
         remainder(outcome),

@@ -64,12 +64,17 @@ pub(super) fn value(parameter: &Parameter) -> String {
 
 /// `0.1598 N m (0.1593 to 0.1603)`
 pub(super) fn amount(parameter: &Parameter) -> String {
-    let (value, ends) = digits(parameter);
+    amount_of(parameter.value, parameter.ci95, &parameter.unit)
+}
+
+/// The same of a number with its interval and unit.
+pub(super) fn amount_of(value: f64, ci95: Option<[f64; 2]>, unit: &str) -> String {
+    let (value, ends) = digits_of(value, ci95);
     let interval = ends.map_or_else(
         || "not fitted".to_owned(),
         |[low, high]| format!("{low} to {high}"),
     );
-    format!("{} ({interval})", with_unit(value, &parameter.unit))
+    format!("{} ({interval})", with_unit(value, unit))
 }
 
 /// A number with its unit; a pure number has the unit `1`.
@@ -82,15 +87,16 @@ pub(super) fn with_unit(number: String, unit: &str) -> String {
 
 /// A parameter's value and the ends of its interval, rounded to a twentieth of the interval's width.
 pub(crate) fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
-    let resolution = match parameter.ci95 {
+    digits_of(parameter.value, parameter.ci95)
+}
+
+fn digits_of(value: f64, ci95: Option<[f64; 2]>) -> (String, Option<[String; 2]>) {
+    let resolution = match ci95 {
         Some([low, high]) => 0.05 * (high - low),
-        None => 1e-4 * parameter.value.abs(),
+        None => 1e-4 * value.abs(),
     };
     let number = |x: f64| rounded(x, resolution);
-    (
-        number(parameter.value),
-        parameter.ci95.map(|ends| ends.map(number)),
-    )
+    (number(value), ci95.map(|ends| ends.map(number)))
 }
 
 /// A number with as many decimals as the resolution needs.

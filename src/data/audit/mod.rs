@@ -75,6 +75,7 @@ fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
         dropped_rows: dropped(log).iter().map(|dropped| dropped.count).sum(),
         driven_by: log.driven_by,
         joints,
+        repeats: None,
         findings: vec![],
     }
 }

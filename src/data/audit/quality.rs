@@ -35,6 +35,8 @@ pub struct Audit {
     pub driven_by: Quantity,
     /// One entry a joint.
     pub joints: Vec<JointAudit>,
+    /// The log before it whose motion it has once more, among those that it was compared with.
+    pub repeats: Option<String>,
     /// What an engineer should know before fitting, the most serious first.
     pub findings: Vec<Finding>,
 }

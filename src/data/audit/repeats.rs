@@ -24,6 +24,7 @@ pub fn tell_repeats<'l>(logs: impl IntoIterator<Item = &'l Log>, audits: &mut [A
                 short(100.0 * share)
             );
             audit.add(Finding::new(Severity::Warning, text));
+            audit.repeats = Some(name);
         }
         before.push(log);
     }
