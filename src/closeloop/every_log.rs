@@ -4,27 +4,39 @@
 use super::establish::Standing;
 use super::fitted::Fitted;
 use crate::data::Log;
-use crate::model::FittedEffect;
 use crate::sim::metric::torque_error;
 
-/// The first of these logs whose torques, on the joints of an effect, a model with it does not fit better than the one fitted
-/// without it. None is fitted here.
-pub(super) fn fits_as_well_without<'l>(
-    logs: &[&'l Log],
-    with: &Fitted,
-    standing: &Standing,
-) -> Option<&'l Log> {
-    let without = standing.without.as_ref().ok()?;
-    let helps = |log: &&&Log| {
-        let error = |model: &Fitted| error(model, log, &standing.effect);
-        matches!((error(with), error(without)), (Some(with), Some(without)) if with < without)
-    };
-    logs.iter().find(|log| !helps(log)).copied()
+/// Torque errors of a model on each of some logs.
+pub(super) struct EveryLog<'l> {
+    /// Per joint in N m (or N); `None` for a log that is too short.
+    errors: Vec<(&'l Log, Option<Vec<f64>>)>,
 }
 
-/// Sum of the mean squares of the torque error on an effect's joints, (N m)^2; `None` for a log that is too short.
-fn error(model: &Fitted, log: &Log, effect: &FittedEffect) -> Option<f64> {
-    let found = torque_error(&model.model, std::slice::from_ref(log))?;
-    let joints = effect.joints().into_iter();
-    Some(joints.map(|joint| found.rms[joint].powi(2)).sum())
+impl<'l> EveryLog<'l> {
+    pub fn of(logs: impl Iterator<Item = &'l Log>, model: &Fitted) -> Self {
+        Self {
+            errors: logs.map(|log| (log, errors(model, log))).collect(),
+        }
+    }
+
+    /// The first log whose torques, on the joints of an effect, the model does not fit better than the one without the effect.
+    /// Neither is fitted here.
+    pub fn fits_as_well_without(&self, standing: &Standing) -> Option<&'l Log> {
+        let without = standing.without.as_ref().ok()?;
+        let joints = standing.effect.joints();
+        let of_effect =
+            |rms: &[f64]| -> f64 { joints.iter().map(|joint| rms[*joint].powi(2)).sum() };
+        let helps = |(log, with): &&(&Log, Option<Vec<f64>>)| {
+            let without = errors(without, log);
+            matches!((with, without), (Some(with), Some(without)) if of_effect(with) < of_effect(&without))
+        };
+        self.errors
+            .iter()
+            .find(|of_log| !helps(of_log))
+            .map(|(log, _)| *log)
+    }
+}
+
+fn errors(model: &Fitted, log: &Log) -> Option<Vec<f64>> {
+    Some(torque_error(&model.model, std::slice::from_ref(log))?.rms)
 }

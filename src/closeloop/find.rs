@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::error::StudyError;
 use super::establish::{Standing, establish, without_each};
-use super::every_log::fits_as_well_without;
+use super::every_log::EveryLog;
 use super::fitted::Fitted;
 use super::remainder::{Unexplained, unexplained};
 use super::select::{Losses, Rival, Round, Search, Trial, candidates, starts};
@@ -53,35 +53,32 @@ impl Chosen {
         let left = |of: &Loss, effect: &FittedEffect| {
             of.on(effect) / declared.on(effect).max(f64::MIN_POSITIVE)
         };
-        self.demote(MASKING, |standing| {
-            let effect = &standing.effect;
+        let masks = |effect: &FittedEffect| {
             remainder.matters_on(study, effect.joint) && left(&with, effect) > settings.masking
-        });
-        self.demote(OUTWEIGHED, |standing| {
+        };
+        let is_outweighed = |standing: &Standing| {
             let effect = &standing.effect;
             let least = settings.outweighed * remainder.fraction_on(study, effect.joint);
             let without = standing.without.as_ref();
             let without = without.map(|without| Loss::of(study, without));
             without.is_ok_and(|without| left(&without, effect) - left(&with, effect) < least)
+        };
+        demote(&mut self.standings, |standing| {
+            let masks = masks(&standing.effect).then_some(MASKING);
+            let reason = masks.or_else(|| is_outweighed(standing).then_some(OUTWEIGHED))?;
+            Some(reason.into())
         });
     }
 
     /// Effects are not established without which the torques of some log fit as well.
-    fn ask_every_log(&mut self, logs: &[&Log]) {
-        let after = &self.after;
-        demote_where(&mut self.standings, |standing| {
-            let log = fits_as_well_without(logs, after, standing)?;
+    fn ask_every_log<'l>(&mut self, logs: impl Iterator<Item = &'l Log>) {
+        let logs = EveryLog::of(logs, &self.after);
+        demote(&mut self.standings, |standing| {
+            let log = logs.fits_as_well_without(standing)?;
             Some(format!(
                 "the torques of {} fit as well without it",
                 log.name()
             ))
-        });
-    }
-
-    /// Effects of which `is_meant` holds are not established, for this reason.
-    fn demote(&mut self, reason: &str, is_meant: impl Fn(&Standing) -> bool + Sync) {
-        demote_where(&mut self.standings, |standing| {
-            is_meant(standing).then(|| reason.into())
         });
     }
 
@@ -96,7 +93,7 @@ impl Chosen {
 }
 
 /// Established effects are no more than supported where there is a reason why not.
-fn demote_where(standings: &mut [Standing], reason: impl Fn(&Standing) -> Option<String> + Sync) {
+fn demote(standings: &mut [Standing], reason: impl Fn(&Standing) -> Option<String> + Sync) {
     let established = |standing: &&mut Standing| standing.status == Status::Established;
     standings
         .par_iter_mut()
@@ -157,8 +154,7 @@ pub fn find(
         chosen.doubt(study, &before, &left);
     }
     if study.space == Space::Torque {
-        let every: Vec<&Log> = study.logs.iter().chain(apart).collect();
-        chosen.ask_every_log(&every);
+        chosen.ask_every_log(study.logs.iter().chain(apart));
         if let Some((after, standing)) = study.with_payload(&chosen.after, library.effects()) {
             chosen.after = after;
             chosen.standings.push(standing);

@@ -5,6 +5,7 @@ use super::find::Loss;
 use super::fitted::Fitted;
 use super::study::Study;
 use crate::data::Joint;
+use crate::expr::Program;
 
 impl Study<'_> {
     /// The widths of the joints' reversals with which a fitted model explains the logs better than with those of the study, by
@@ -19,11 +20,12 @@ impl Study<'_> {
         let (mut best, mut least) = (self.sign_widths.clone(), first);
         for joint in Joint::all(self.declared.joints) {
             let before = best.clone();
+            let reverses = reversing(fitted, &before);
             for share in self.settings.fit.sign_widths {
                 let mut widths = before.clone();
                 widths[joint] = share * self.top_speed[joint].max(1e-6);
                 let is_wider = widths[joint] > before[joint];
-                if !is_wider || !self.has_time() || !matters(fitted, &before, &widths) {
+                if !is_wider || !self.has_time() || reversing(fitted, &widths) == reverses {
                     continue;
                 }
                 let loss = self.loss_with(fitted, &widths).unwrap_or(f64::INFINITY);
@@ -47,14 +49,8 @@ impl Study<'_> {
     }
 }
 
-/// Whether a model has friction that reverses in another way with these widths than with those.
-fn matters(fitted: &Fitted, these: &[f64], those: &[f64]) -> bool {
-    let program = |widths: &[f64]| {
-        fitted
-            .model
-            .with_sign_widths(widths.to_vec())
-            .dynamics()
-            .program
-    };
-    program(these) != program(those)
+/// The program of a model whose friction reverses over these speeds: the same as with others where it has none on a joint.
+fn reversing(fitted: &Fitted, widths: &[f64]) -> Program {
+    let model = fitted.model.with_sign_widths(widths.to_vec());
+    model.dynamics().program
 }

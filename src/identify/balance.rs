@@ -8,7 +8,7 @@ use crate::data::{Joint, Log, Smooth, Smoothing};
 use crate::expr::Tape;
 use crate::lanes::Row;
 use crate::model::Dynamics;
-use crate::sim::{self, Commands, Point, Window};
+use crate::sim::{Commands, Delivered, Point, Window};
 
 /// A log as the error of torques reads it, thinned out.
 pub(super) struct Rows {
@@ -53,17 +53,21 @@ impl Acting {
             let own = values.of_log(index);
             let commands = Commands::of_log(Point::new(dynamics, &own), log);
             let smoothed = |channel: &[f64]| rows.smoothing.channel(channel);
-            let filtered: Vec<Option<sim::Acting>> = Joint::all(dynamics.joints)
-                .map(|joint| commands.acting(joint))
+            let filtered: Vec<Option<Delivered>> = Joint::all(dynamics.joints)
+                .map(|joint| commands.delivered(joint))
                 .collect();
             let tau = (rows.smooth.tau.iter().zip(&filtered)).map(|(tau, filtered)| {
-                let filtered = filtered.as_ref().map(|acting| smoothed(&acting.tau));
+                let filtered = filtered.as_ref().map(|delivered| smoothed(&delivered.tau));
                 filtered.unwrap_or_else(|| tau.clone())
             });
             acting.tau.push(tau.collect());
             let slopes = dynamics.filters.iter().map(|filter| {
-                let acting = filtered[filter.joint].as_ref();
-                smoothed(acting.expect("the joint has a filter").slopes(filter.kind))
+                let delivered = filtered[filter.joint].as_ref();
+                smoothed(
+                    delivered
+                        .expect("the joint has a filter")
+                        .slopes(filter.kind),
+                )
             });
             acting.slopes.push(slopes.collect());
         }
@@ -215,14 +219,12 @@ impl Balance {
         let first = tangent.first_parameter();
         let tape = tangent.program.tape_with_held(first);
         self.over_rows(tape, first, values, data, |lanes, tape| {
-            let mut slopes = tangent.joints;
-            for (j, (sums, weight)) in sums.iter_mut().zip(&self.weight).enumerate() {
+            let of_joints = sums.iter_mut().zip(&self.weight).zip(tangent.slopes());
+            for (j, ((sums, weight), (_, slopes))) in of_joints.enumerate() {
                 let weight: Lane = Row(lanes.map(|at| at.map_or(0.0, |_| weight / scale)));
                 let out = tape.output(j);
                 let residual = Row(std::array::from_fn(|l| out[l] * weight[l]));
-                let own = slopes..slopes + tangent.columns_of[j].len();
-                slopes = own.end;
-                sums.add(&residual, own.map(|output| tape.output(output)), &weight);
+                sums.add(&residual, slopes.map(|output| tape.output(output)), &weight);
             }
         });
         let mut all = vec![WindowTerms::zeros(tangent.columns()); self.windows.len()];

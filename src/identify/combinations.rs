@@ -30,7 +30,8 @@ pub struct Combination {
     pub ci95: [f64; 2],
 }
 
-/// A parameter is told apart if the logs alone give it a standard deviation below what its body has of its kind.
+/// A parameter is told apart if the logs alone give it a standard deviation below what its body has of its kind: this much
+/// information, in units of that.
 const TOLD: f64 = 1.0;
 /// It is not if its information is smaller than this share of what it has alone: then it is rounding.
 const ROUNDING: f64 = 1e-9;
@@ -87,6 +88,48 @@ impl<'a> Columns<'a> {
         })
     }
 
+    /// A column that is told, and those of bodies that join it in a sum, with their weights in the columns' own units.
+    fn joined(&self, weights: &Weights, row: usize, first: usize) -> Vec<(usize, f64)> {
+        let others = weights.others.iter().enumerate();
+        let joins = others
+            .map(|(k, other)| (*other, weights.of[(row, k)]))
+            .filter(|(other, weight)| self.places[*other].is_some() && weight.abs() > LISTED)
+            .map(|(other, weight)| {
+                let unit = self.magnitude(first) / self.magnitude(other);
+                (other, weight * unit)
+            });
+        [(first, 1.0)].into_iter().chain(joins).collect()
+    }
+
+    /// The sum of these columns; `None` for one that no body is in, or a parameter of an effect, which nothing declares.
+    fn sum(
+        &self,
+        weighed: &[(usize, f64)],
+        (declared, found): (&Model, &Values),
+        uncertainty: &Uncertainty,
+    ) -> Option<Combination> {
+        let (first, _) = weighed[0];
+        let (body, _) = weighed.iter().find_map(|(i, _)| self.places[*i])?;
+        let declared: Option<f64> = (weighed.iter())
+            .map(|(i, weight)| {
+                let parameter = declared.parameters.get(self.fit.columns[*i].parameter)?;
+                Some(weight * parameter.value)
+            })
+            .sum();
+        let fitted = |(i, weight): &(usize, f64)| weight * found.get(self.fit.columns[*i]);
+        let value: f64 = weighed.iter().map(fitted).sum();
+        let half_width = uncertainty.half_width_of(weighed);
+        let named = |(i, weight): &(usize, f64)| (self.parameter(*i).name.clone(), *weight);
+        Some(Combination {
+            body,
+            parts: weighed.iter().map(named).collect(),
+            unit: self.parameter(first).unit.clone(),
+            declared: declared?,
+            value,
+            ci95: [value - half_width, value + half_width],
+        })
+    }
+
     /// Those of the declared equations that are of no body, those of each body, and those of effects: a load at the tip is told
     /// beside the bodies, and not they beside it.
     fn groups(&self, declared: &Model) -> Vec<Vec<usize>> {
@@ -119,38 +162,13 @@ pub fn bodies_told(
         return BodiesTold::default();
     }
     let relative = columns.relative(&fit.equations().hessian);
-    let told = told_apart(&relative, &columns.groups(declared), 1.0 / (TOLD * TOLD));
+    let told = told_apart(&relative, &columns.groups(declared), TOLD);
     let Some(weights) = weights(&relative, &told) else {
         return BodiesTold::default();
     };
     let sum = |(row, &first): (usize, &usize)| {
-        let own = weights.of.row(row);
-        let others = weights.others.iter().zip(own.iter());
-        let joins = others
-            .filter(|(other, weight)| columns.places[**other].is_some() && weight.abs() > LISTED);
-        let unit = |other: usize| columns.magnitude(first) / columns.magnitude(other);
-        let joins = joins.map(|(other, weight)| (*other, weight * unit(*other)));
-        let parts: Vec<(usize, f64)> = [(first, 1.0)].into_iter().chain(joins).collect();
-        let (body, _) = parts.iter().find_map(|(i, _)| columns.places[*i])?;
-        let declared = |i: usize| Some(declared.parameters.get(fit.columns[i].parameter)?.value);
-        // An effect's parameter has no declared value.
-        declared(first)?;
-        let sum = |value: &dyn Fn(usize) -> f64| -> f64 {
-            parts.iter().map(|(i, weight)| weight * value(*i)).sum()
-        };
-        let value = sum(&|i| found.get(fit.columns[i]));
-        let half_width = uncertainty.half_width_of(&parts);
-        let named = parts.iter();
-        Some(Combination {
-            body,
-            parts: named
-                .map(|(i, weight)| (columns.parameter(*i).name.clone(), *weight))
-                .collect(),
-            unit: columns.parameter(first).unit.clone(),
-            declared: sum(&|i| declared(i).unwrap_or(f64::NAN)),
-            value,
-            ci95: [value - half_width, value + half_width],
-        })
+        let weighed = columns.joined(&weights, row, first);
+        columns.sum(&weighed, (declared, found), uncertainty)
     };
     let mut told: Vec<Combination> = told.iter().enumerate().filter_map(sum).collect();
     told.sort_by_key(|combination| combination.body);
@@ -165,8 +183,8 @@ const ROWS: usize = 64;
 
 /// How many sums of the bodies' parameters show in torques of states drawn at random.
 fn tellable(columns: &Columns<'_>) -> usize {
-    let of_bodies = |i: &usize| columns.places[*i].is_some();
-    let own: Vec<usize> = (0..columns.places.len()).filter(of_bodies).collect();
+    let is_of_body = |i: &usize| columns.places[*i].is_some();
+    let own: Vec<usize> = (0..columns.places.len()).filter(is_of_body).collect();
     let active: Vec<usize> = own
         .iter()
         .map(|i| columns.fit.columns[*i].parameter)
@@ -181,29 +199,25 @@ fn tellable(columns: &Columns<'_>) -> usize {
         *slot = Row::splat(value);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut information = DMatrix::<f64>::zeros(active.len(), active.len());
+    // Of all columns: none for those that are of no body.
+    let mut information = DMatrix::<f64>::zeros(columns.places.len(), columns.places.len());
     for _ in 0..ROWS {
         for slot in &mut tape.inputs()[..first] {
             *slot = Row(std::array::from_fn(|_| StandardNormal.sample(&mut rng)));
         }
         tape.run();
-        let mut output = tangent.joints;
-        for own in &tangent.columns_of {
-            for lane in 0..LANES {
-                let slope = |k: usize| tape.output(output + k)[lane];
-                for (k, row) in own.iter().enumerate() {
-                    for (l, column) in own.iter().enumerate() {
-                        information[(*row, *column)] += slope(k) * slope(l);
-                    }
+        for (places, outputs) in tangent.slopes() {
+            let slopes = || places.iter().zip(outputs.clone());
+            for (row, by_row) in slopes() {
+                for (column, by_column) in slopes() {
+                    let [a, b] = [by_row, by_column].map(|output| tape.output(output));
+                    let product: f64 = (0..LANES).map(|lane| a[lane] * b[lane]).sum();
+                    information[(own[*row], own[*column])] += product;
                 }
             }
-            output += own.len();
         }
     }
-    let relative = DMatrix::from_fn(own.len(), own.len(), |i, j| {
-        information[(i, j)] * columns.magnitude(own[i]) * columns.magnitude(own[j])
-    });
-    told_apart(&relative, &[(0..own.len()).collect()], 0.0).len()
+    told_apart(&columns.relative(&information), &[own], 0.0).len()
 }
 
 /// What a body has of each kind: its mass, and that with its radius of gyration and its square.
@@ -217,7 +231,8 @@ fn sizes(declared: &Model, body: &[usize; PARTS]) -> [f64; PARTS] {
     })
 }
 
-/// Columns that are told apart, with at least this information; those of the first group before those of the next, in each the one that is told best first.
+/// Columns that are told apart, with at least this information; those of the first group before those of the next, in each
+/// the one that is told best first.
 fn told_apart(relative: &DMatrix<f64>, groups: &[Vec<usize>], least: f64) -> Vec<usize> {
     let mut left = relative.clone();
     let mut told = Vec::new();

@@ -117,6 +117,17 @@ impl Tangent {
         moving * self.joints + 1 + self.filters
     }
 
+    /// Of a balance of torques: for each joint the columns that its difference depends on, and the outputs with its slopes by
+    /// them.
+    pub fn slopes(&self) -> impl Iterator<Item = (&[usize], std::ops::Range<usize>)> {
+        let mut next = self.joints;
+        self.columns_of.iter().map(move |columns| {
+            let first = next;
+            next += columns.len();
+            (columns.as_slice(), first..next)
+        })
+    }
+
     /// Number of free values of one window.
     pub fn locals(&self) -> usize {
         match self.local {

@@ -123,10 +123,16 @@ fn repeated(outcome: &Outcome) -> String {
     if repeats.is_empty() {
         return String::new();
     }
+    let of_bodies = match outcome.models.bodies.told.is_empty() {
+        true => "",
+        false => {
+            " Those are predicted no better than with the declared bodies and fitted friction where they need what these logs do \
+             not tell of the bodies (see below)."
+        }
+    };
     format!(
         "\nThe motion of {} is that of another log once more: the error there says how well torques repeat, and nothing of other \
-         motions. Those are predicted no better than with the declared bodies and fitted friction where they need what these \
-         logs do not tell of the bodies (see below).\n",
+         motions.{of_bodies}\n",
         listed(&repeats)
     )
 }

@@ -20,8 +20,8 @@ pub struct Commands<'l> {
     histories: Vec<Option<History<'l>>>,
 }
 
-/// Mean torques that act on a joint from each row of a log to the next.
-pub struct Acting {
+/// Mean torques that the drive of a joint delivers from each row of a log to the next.
+pub struct Delivered {
     /// N m (or N).
     pub tau: Vec<f64>,
     /// Derivatives with respect to the delay and the time constant, per s.
@@ -29,7 +29,7 @@ pub struct Acting {
     by_lag: Vec<f64>,
 }
 
-impl Acting {
+impl Delivered {
     /// The derivatives with respect to the parameter of a filter.
     pub fn slopes(&self, kind: CommandFilter) -> &[f64] {
         match kind {
@@ -113,15 +113,15 @@ impl<'l> Commands<'l> {
     pub fn acting_on(&self, log: &Log) -> Log {
         let mut acting = log.clone();
         for (joint, tau) in Joint::all(self.joints).zip(&mut acting.tau) {
-            if let Some(filtered) = self.acting(joint) {
+            if let Some(filtered) = self.delivered(joint) {
                 *tau = filtered.tau;
             }
         }
         acting
     }
 
-    /// What acts on a joint, if it has a filter.
-    pub fn acting(&self, joint: Joint) -> Option<Acting> {
+    /// What the drive of a joint delivers, if it has a filter.
+    pub fn delivered(&self, joint: Joint) -> Option<Delivered> {
         let history = self.histories[joint].as_ref()?;
         let ends = self.time.iter().map(|time| history.at(*time));
         let ends: Vec<Instant> = ends.collect();
@@ -133,7 +133,7 @@ impl<'l> Commands<'l> {
             ..Mean::default()
         };
         let each = |part: fn(&Mean) -> f64| means.iter().chain([&last]).map(part).collect();
-        Some(Acting {
+        Some(Delivered {
             tau: each(|mean| mean.value),
             by_delay: each(|mean| mean.by_delay),
             by_lag: each(|mean| mean.by_lag),

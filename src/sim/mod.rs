@@ -13,7 +13,7 @@ mod stepper;
 mod substeps;
 mod window;
 
-pub use command::{Acting, Commands, StepTorque};
+pub use command::{Commands, Delivered, StepTorque};
 pub use environment::Environment;
 pub use integrator::Integrator;
 pub use point::Point;

@@ -19,6 +19,11 @@ struct Link {
     inertia: Matrix3<f64>,
 }
 
+/// The inertia tensor, kg m^2, of a point of this mass (kg) at a place (m).
+fn of_point(mass: f64, at: Vector3<f64>) -> Matrix3<f64> {
+    (Matrix3::identity() * at.norm_squared() - at * at.transpose()) * mass
+}
+
 /// An arm whose joints turn.
 #[derive(Debug, Clone)]
 pub(super) struct Bodies {
@@ -35,13 +40,12 @@ impl Bodies {
         let link = |joint: &crate::model::chain::Joint| {
             let (pose, of) = (joint.at_zero(), joint.inertia);
             let centre = of.moment / of.mass;
-            let spread = Matrix3::identity() * centre.norm_squared() - centre * centre.transpose();
             Link {
                 rotation: pose.rotation,
                 origin: pose.origin,
                 mass: of.mass,
                 centre,
-                inertia: of.tensor - spread * of.mass,
+                inertia: of.tensor - of_point(of.mass, centre),
             }
         };
         Some(Self {
@@ -84,11 +88,7 @@ impl Bodies {
         };
         let whole = last.mass + mass;
         let centre = (last.centre * last.mass + at * mass) / whole;
-        let moved = |inertia: &mut Matrix3<f64>, mass: f64, by: Vector3<f64>| {
-            *inertia += (Matrix3::identity() * by.norm_squared() - by * by.transpose()) * mass;
-        };
-        moved(&mut last.inertia, last.mass, last.centre - centre);
-        moved(&mut last.inertia, mass, at - centre);
+        last.inertia += of_point(last.mass, last.centre - centre) + of_point(mass, at - centre);
         (last.mass, last.centre) = (whole, centre);
     }
 

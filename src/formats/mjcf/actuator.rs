@@ -31,7 +31,8 @@ pub(super) fn drives<'s, 'x>(
         let kind = node.tag_name().name();
         let drive = classes.element(node, classes.outermost(), &["general", kind])?;
         let name = drive.text("name").unwrap_or(kind);
-        let servo = servo(&drive, kind)?;
+        let gear = gear(&drive)?;
+        let servo = servo(&drive, kind, gear)?;
         let is_known = servo.is_some() || is_plain(&drive, kind);
         let Some(joint) = drive.text("joint").filter(|_| is_known) else {
             drive.note(format!(
@@ -44,7 +45,6 @@ pub(super) fn drives<'s, 'x>(
             first.effort = None;
             continue;
         }
-        let gear = gear(&drive)?;
         #[allow(clippy::float_cmp)] // as written
         if gear != 1.0 && servo.is_none() {
             drive.note(format!("`{name}` has the gear {gear}: tau is the torque or force at `{joint}`, {gear} times the control"));
@@ -67,11 +67,10 @@ fn gear(drive: &Element<'_, '_>) -> Result<f64, FileError> {
 }
 
 /// The position loop that an actuator is: `position`, or a `general` one whose bias is that of a position loop.
-fn servo(drive: &Element<'_, '_>, kind: &str) -> Result<Option<Servo>, FileError> {
+fn servo(drive: &Element<'_, '_>, kind: &str, gear: f64) -> Result<Option<Servo>, FileError> {
     let number = |key: &str, place: usize| -> Result<Option<f64>, FileError> {
         Ok(drive.list(key)?.and_then(|list| list.get(place).copied()))
     };
-    let gear = gear(drive)?;
     let (stiffness, damping) = match kind {
         "position" => {
             if drive.text("dampratio").is_some() || drive.text("timeconst").is_some() {
