@@ -1,6 +1,7 @@
 //! A load at the tip of an arm. Where the bodies of a chain are free, the last of them can stand for any load, and no torque
 //! tells the two apart; but a body that is drawn is off by shares, and a load that it lacks makes it another one.
 
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::establish::Standing;
@@ -9,6 +10,10 @@ use super::study::Study;
 use crate::data::Joint;
 use crate::identify::Fit;
 use crate::model::{Effect, Entry, FittedEffect, Status};
+
+/// Masses of loads that fits start from, in those of the last body: a fit from a light one may end where the bodies stand for
+/// the load.
+const MASSES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// What a fit costs, with what the declared values do.
 fn whole(fit: &Fit) -> f64 {
@@ -42,7 +47,11 @@ impl Study<'_> {
         if is_there || self.declared.can_carry(effect, tip).is_err() {
             return None;
         }
-        let with = self.fitted_with(chosen, effect, tip)?;
+        let starts = self.loads(chosen, effect, tip)?;
+        let fits = starts
+            .into_par_iter()
+            .filter_map(|load| self.loaded(chosen, load));
+        let with = fits.min_by(|a, b| whole(&a.fit).total_cmp(&whole(&b.fit)))?;
         let saved = whole(&chosen.fit) - whole(&with.fit);
         let settings = &self.settings.establish;
         let p_value = p_of(2.0 * saved, effect.parameters.len());
@@ -62,22 +71,41 @@ impl Study<'_> {
         })
     }
 
-    /// The chosen model with a load that starts as heavy as the last body, where that is.
-    fn fitted_with(&self, chosen: &Fitted, effect: &Effect, tip: Joint) -> Option<Fitted> {
+    /// Loads of some masses, at the place where they change the last body's first moments as the chosen model did.
+    fn loads(
+        &self,
+        chosen: &Fitted,
+        effect: &Effect,
+        tip: Joint,
+    ) -> Option<[FittedEffect; MASSES.len()]> {
         let last = *self.declared.inertias().last()?;
-        let of = |part: usize| self.declared.parameters[last[part]].value;
-        let mass = of(0).max(f64::MIN_POSITIVE);
-        let mut load = FittedEffect::absent(effect, tip);
-        for (value, parameter) in load.values.iter_mut().zip(&effect.parameters) {
-            value.0 = match parameter.name.as_str() {
-                "x" => of(1) / mass,
-                "y" => of(2) / mass,
-                "z" => of(3) / mass,
-                _ => mass,
-            };
+        let declared = |part: usize| self.declared.parameters[last[part]].value;
+        let fitted = |part: usize| chosen.model.parameters[last[part]].value;
+        let load = |masses: f64| {
+            let mass = (masses * declared(0)).max(f64::MIN_POSITIVE);
+            let place = |part: usize| (fitted(part) - declared(part)) / mass;
+            let mut load = FittedEffect::absent(effect, tip);
+            for (value, parameter) in load.values.iter_mut().zip(&effect.parameters) {
+                value.0 = match parameter.name.as_str() {
+                    "x" => place(1),
+                    "y" => place(2),
+                    "z" => place(3),
+                    _ => mass,
+                };
+            }
+            load
+        };
+        Some(MASSES.map(load))
+    }
+
+    /// The chosen model with a load, fitted from the declared bodies: those of the chosen model stand for the load already.
+    fn loaded(&self, chosen: &Fitted, load: FittedEffect) -> Option<Fitted> {
+        let mut start = chosen.clone();
+        for part in self.declared.inertias().into_iter().flatten() {
+            start.model.parameters[part] = self.declared.parameters[part].clone();
         }
-        let effects = [chosen.model.effects.as_slice(), &[load]].concat();
-        self.with_effects(chosen, effects).ok()
+        let effects = start.effects_and(&[load]);
+        self.with_effects(&start, effects).ok()
     }
 }
 

@@ -56,7 +56,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
     let size = fit.columns.len();
     let blocks_of = blocks_of(shooting, fit, &blocks);
     // Bodies are declared within a spread, which adds to the variance what it takes from it elsewhere.
-    let all = fit.equations().hessian + &fit.bodies;
+    let all = fit.equations().hessian + &fit.bodies.hessian;
     let mut parts = fit.equations_by(&blocks);
     let count = parts.len();
     let alone: Vec<usize> = (0..size)
@@ -77,7 +77,7 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         .iter()
         .fold(DVector::zeros(size), |sum, step| sum + step)
         * share;
-    let mut spread = flat + &model * &fit.bodies * &model;
+    let mut spread = flat + &model * &fit.bodies.hessian * &model * excess(fit, &model);
     for step in &steps {
         let off = step - &mean;
         spread += &off * off.transpose() * (1.0 - share);
@@ -94,6 +94,17 @@ pub fn uncertainty(shooting: &Shooting<'_>, fit: &Fit) -> Uncertainty {
         blocks: count,
         blocks_of,
     }
+}
+
+/// By how much the variance of bodies about the declared ones exceeds what a fit takes it to be: twice the cost of the
+/// departures that the logs tell over their number (empirical Bayes; MacKay, Bayesian interpolation, 1992), at least 1. What
+/// logs do not tell stays at the declared values and says nothing of how good those are.
+fn excess(fit: &Fit, covariance: &DMatrix<f64>) -> f64 {
+    let bodies = &fit.bodies.hessian;
+    let of_bodies = (0..bodies.nrows()).filter(|i| bodies[(*i, *i)] > 0.0);
+    #[allow(clippy::cast_precision_loss)] // some tens
+    let told = of_bodies.count() as f64 - (covariance * bodies).trace();
+    (2.0 * fit.bodies.cost / told.max(1.0)).max(1.0)
 }
 
 fn blocks_of(shooting: &Shooting<'_>, fit: &Fit, blocks: &[usize]) -> Vec<usize> {

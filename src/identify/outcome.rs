@@ -1,6 +1,5 @@
 use std::fmt;
 
-use nalgebra::DMatrix;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -38,8 +37,8 @@ pub struct Fit {
     pub departure: f64,
     /// What the declared values add to the normal equations; no cost.
     pub(super) prior: WindowTerms,
-    /// The part of its matrix that is of bodies, which are known to be near those declared: like data.
-    pub(super) bodies: DMatrix<f64>,
+    /// The part of them that is of bodies, which are known to be near those declared: like data. With its cost.
+    pub(super) bodies: WindowTerms,
     /// The normal equations of each window in the free values, its own values eliminated.
     pub reduced: Vec<Reduced>,
     /// Steps that were taken.

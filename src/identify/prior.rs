@@ -110,7 +110,7 @@ impl Prior {
         terms
     }
 
-    /// What bodies add to them.
+    /// What bodies add to them, with its cost.
     pub fn terms_of_bodies(
         &self,
         columns: &[Column],
@@ -122,6 +122,7 @@ impl Prior {
             let Some((gradient, hessian)) = body.terms(&parts) else {
                 continue;
             };
+            terms.cost += residuals * body.cost(&parts);
             let free = || (0..PARTS).filter_map(|k| Some((k, places[k]?)));
             for (k, row) in free() {
                 terms.gradient[row] += residuals * gradient[k];

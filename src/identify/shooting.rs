@@ -1,6 +1,5 @@
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::balance::{Acting, Balance, Rows};
@@ -152,11 +151,9 @@ impl<'l> Shooting<'l> {
         (self.prior).terms(columns, values, self.residuals_of_a_window())
     }
 
-    /// What is declared of bodies, as information on the free values.
-    pub(super) fn declared_bodies(&self, columns: &[Column], values: &Values) -> DMatrix<f64> {
-        let residuals = self.residuals_of_a_window();
-        let terms = self.prior.terms_of_bodies(columns, values, residuals);
-        terms.hessian
+    /// What is declared of bodies, as information on the free values, with what the departure costs.
+    pub(super) fn declared_bodies(&self, columns: &[Column], values: &Values) -> WindowTerms {
+        (self.prior).terms_of_bodies(columns, values, self.residuals_of_a_window())
     }
 
     /// So many residuals say as much as the declared values do: they are correlated, and a few windows overrule what is
