@@ -3,10 +3,15 @@
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use residyn::closeloop::{Outcome, Request, Settings, Space, Split, Verdict, close_loop};
-use residyn::data::Log;
-use residyn::model::{Library, Model};
+use residyn::data::{Log, Smooth};
+use residyn::formats::{ExportModel, find};
+use residyn::model::{FittedEffect, Library, Model};
+use residyn::sim::Integrator;
+use residyn::sim::metric::torque_error;
+use serde_json::{Value, json};
 
 use crate::arms::{described, model, moved};
+use crate::clients::client;
 use crate::common::{fitted, rng};
 use crate::mechanism::{fixture, read_to};
 use crate::support::{measured, refuses, text};
@@ -200,8 +205,43 @@ fn torques_of_a_measured_panda_are_explained_to_a_part_in_sixty() {
     let Some(outcome) = of_measured("panda", [log, log], 0.7, 1.53) else {
         return;
     };
-    // As many base parameters as this arm is known to have (Gaz et al., IEEE RA-L 2019).
+    // 7n - 6 for n joints that turn about axes in general position, the first along gravity (Mayeda et al., IEEE T-RA 1990).
     assert_eq!(outcome.models.bodies.tellable, 43);
+    mujoco_follows(&outcome.models.after.model, "panda", log);
+}
+
+/// What MuJoCo has words for.
+const CARRIED: [&str; 5] = [
+    "coulomb_friction",
+    "viscous_friction",
+    "constant_torque",
+    "joint_spring",
+    "actuator_gain",
+];
+
+/// The model in MuJoCo needs the torques of a log as well as it does here.
+fn mujoco_follows(model: &Model, arm: &str, log: &str) {
+    let is_carried = |e: &&FittedEffect| CARRIED.contains(&e.effect.name.as_str());
+    let carried: Vec<FittedEffect> = model.effects.iter().filter(is_carried).cloned().collect();
+    let model = model.with_effects(carried);
+    let log = model.read_log(measured(arm).unwrap().join(log)).unwrap();
+    let error = torque_error(&model, std::slice::from_ref(&log)).unwrap();
+    let Smooth {
+        q, qd, qdd, tau, ..
+    } = Smooth::of(&log);
+    let folder = tempfile::tempdir().unwrap();
+    let [written, motion] = ["arm.xml", "motion.json"].map(|name| folder.path().join(name));
+    let exported = ExportModel::of_system(&model, Integrator::RK4, 0.01, Value::Null);
+    let mjcf = find("mjcf").unwrap();
+    let lost = (mjcf.not_carried)(&exported);
+    assert!(
+        !lost.iter().any(|part| part.contains("on joint")),
+        "{lost:?}"
+    );
+    mjcf.write(&exported, &written).unwrap();
+    let told = json!({ "q": q, "qd": qd, "qdd": qdd, "tau": tau, "relative": error.relative });
+    std::fs::write(&motion, told.to_string()).unwrap();
+    client("torques.py", &[&written, &motion]);
 }
 
 #[test]
