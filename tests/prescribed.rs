@@ -156,7 +156,10 @@ fn torques_without_gravity_are_told() {
         }
         log
     });
-    assert!(contradicts_gravity(&closed_on(bare, Some(Space::Torque))));
+    let outcome = closed_on(bare, Some(Space::Torque));
+    assert!(contradicts_gravity(&outcome));
+    assert_eq!(outcome.verdict, Verdict::Inconclusive, "{}", outcome.reason);
+    assert_eq!(named(&outcome), []);
 }
 
 /// Rows of a log from one time on and before another.

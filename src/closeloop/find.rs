@@ -5,6 +5,7 @@ use super::error::StudyError;
 use super::establish::{Standing, establish, without_each};
 use super::every_log::EveryLog;
 use super::fitted::Fitted;
+use super::gravity::against_gravity;
 use super::remainder::{Unexplained, unexplained};
 use super::select::{Losses, Rival, Round, Search, Trial, candidates, starts};
 use super::space::Space;
@@ -20,6 +21,8 @@ pub struct Found {
     pub before: Fitted,
     pub chosen: Chosen,
     pub unexplained: Unexplained,
+    /// Why effects say nothing, where the torques hold another gravity than the declared bodies need.
+    pub against_gravity: Option<String>,
 }
 
 /// The set of effects that was chosen.
@@ -160,6 +163,10 @@ pub fn find(
             chosen.standings.push(standing);
         }
     }
+    let against_gravity = against_gravity(study);
+    if against_gravity.is_some() {
+        demote(&mut chosen.standings, |_| Some(ANOTHER_GRAVITY.into()));
+    }
     chosen.mark(study);
     if chosen.established() == 0 && !chosen.standings.is_empty() {
         // What is not established explains nothing.
@@ -170,12 +177,16 @@ pub fn find(
         before,
         chosen,
         unexplained: left,
+        against_gravity,
     })
 }
 
 /// Why effects are not established that leave most of the loss and an unexplained remainder.
 const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
                        mask the real cause";
+
+/// Why effects are not established that are fitted to a part of the torques.
+const ANOTHER_GRAVITY: &str = "the torques hold another gravity than the declared bodies need, and it may imitate what they lack";
 
 /// Why an effect is not established beside a remainder that is larger.
 const OUTWEIGHED: &str =

@@ -18,22 +18,45 @@ const TELLS: f64 = 0.3;
 /// Where torques are compared, add to the audits of the study's logs which of them hold another gravity than the declared
 /// bodies need: a torque column that is only a part of the torque, a moment of another unit, another base.
 pub(super) fn tell_gravity(study: &Study<'_>, audits: &mut [Audit]) {
-    if study.space != Space::Torque {
-        return;
-    }
-    let bodies = study.declared.with_effects(Vec::new());
-    for (log, audit) in study.logs.iter().zip(audits) {
-        let share = share(&bodies, &Smooth::of(log));
-        if let Some(share) = share.filter(|share| !(LEAST..1.0 / LEAST).contains(share)) {
-            let text = format!(
-                "the logged torques hold {:.0} % of the gravity that the declared bodies need: they are not all of the joints' \
-                 torques (a command without the controller's gravity term, say), or masses, gravity's direction or the unit of \
-                 the torques are others. What is fitted to them imitates that",
-                100.0 * share
-            );
+    for (share, audit) in shares(study).into_iter().zip(audits) {
+        if let Some(share) = share.filter(contradicts) {
+            let text = format!("{}. What is fitted to them imitates that", told(share));
             audit.add(Finding::new(Severity::Serious, text));
         }
     }
+}
+
+/// Why nothing can be concluded from torques that hold another gravity, in a sentence: by the median of the logs that tell.
+pub(super) fn against_gravity(study: &Study<'_>) -> Option<String> {
+    let mut shares: Vec<f64> = shares(study).into_iter().flatten().collect();
+    shares.sort_by(f64::total_cmp);
+    let median = shares
+        .get(shares.len() / 2)
+        .filter(|share| contradicts(share))?;
+    Some(format!("{}; effects would imitate that", told(*median)))
+}
+
+fn contradicts(share: &f64) -> bool {
+    !(LEAST..1.0 / LEAST).contains(share)
+}
+
+fn told(share: f64) -> String {
+    format!(
+        "the logged torques hold {:.0} % of the gravity that the declared bodies need: they are not all of the joints' torques (a \
+         command without the controller's gravity term, say), or masses, gravity's direction or the unit of the torques are \
+         others",
+        100.0 * share
+    )
+}
+
+/// The share of the declared gravity in each log of a study by torques, where it tells.
+fn shares(study: &Study<'_>) -> Vec<Option<f64>> {
+    if study.space != Space::Torque {
+        return Vec::new();
+    }
+    let bodies = study.declared.with_effects(Vec::new());
+    let of_log = |log| share(&bodies, &Smooth::of(log));
+    study.logs.iter().map(of_log).collect()
 }
 
 /// The share of the declared gravity in the torques, by least squares beside acceleration, friction and an offset joint by

@@ -34,6 +34,7 @@ pub(super) fn verdict(
     let are_worse = after > study.settings.verdict.worse * before;
     match at_rest(study)
         .or_else(|| failure(found, refined))
+        .or_else(|| found.against_gravity.clone())
         .or_else(|| inconclusive(study))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
