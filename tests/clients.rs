@@ -9,7 +9,7 @@ use residyn::report::EventFile;
 use tempfile::TempDir;
 
 /// The folder that `residyn closeloop` writes for the demo rig; made once for all tests of this file.
-fn demo() -> &'static Path {
+pub fn demo() -> &'static Path {
     static FOLDER: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     let (_, report) = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");

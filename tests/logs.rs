@@ -8,8 +8,9 @@ use std::path::Path;
 use residyn::closeloop::{Fitted, Split, SplitMethod, Study, Unexplained, unexplained};
 use residyn::data::{Columns, Remedy, Severity, audit};
 use residyn::expr::SignForm;
+use residyn::model::Origin;
 use residyn::plant::Plant;
-use residyn::report::summary;
+use residyn::report::{Report, summary};
 use residyn::{Library, Log, Model, Outcome, Request, Settings, Verdict, close_loop};
 use serde_json::Value;
 
@@ -495,7 +496,8 @@ fn serious_findings_stand_before_the_answer() {
     let mut opposite = recorded("opposite.csv", 1);
     each(&mut opposite.tau[0], |tau| -tau);
     let outcome = closed(&whole_model(), vec![opposite], vec![recorded("b.csv", 2)]);
-    let printed = summary(&outcome, Path::new("report"));
+    let report = Report::new(&outcome, &Origin::of_seed(0));
+    let printed = summary(&report, &outcome.seconds, Path::new("report"));
     assert!(printed.starts_with("Serious findings"), "{printed}");
     let mended =
         r#"tau1 has the opposite sign ([columns] tau = [{ column = "tau1", factor = -1 }])"#;

@@ -5,7 +5,8 @@ use rand_distr::{Distribution, StandardNormal};
 use residyn::closeloop::{Outcome, Request, Settings, Space, Split, Verdict, close_loop};
 use residyn::data::{Log, Smooth};
 use residyn::formats::{ExportModel, find};
-use residyn::model::{FittedEffect, Library, Model};
+use residyn::model::{FittedEffect, Library, Model, Origin};
+use residyn::report::{self, Report};
 use residyn::sim::Integrator;
 use residyn::sim::metric::torque_error;
 use serde_json::{Value, json};
@@ -257,7 +258,7 @@ fn a_measured_kuka_is_explained_and_its_test_is_told_as_a_repeat() {
         &outcome,
         "the motion is that of measurements_1.csv once more"
     ));
-    let told = residyn::report::text(&outcome, 0);
+    let told = report::text(&Report::new(&outcome, &Origin::of_seed(0)));
     assert!(told.contains("The motion of measurements_2.csv is that of another log once more"));
 }
 

@@ -30,6 +30,7 @@ mod metric;
 mod models;
 mod network;
 mod oracles;
+mod page;
 mod parity;
 mod per_log;
 mod physics;

@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     /// Other models of the same rig to score as they are, without a fit: files or names of built-in systems
     #[arg(long, num_args = 1.., value_name = "MODEL")]
     against: Vec<PathBuf>,
-    /// Folder for report.json, report.md, model.toml, plots and checkpoint
+    /// Folder for report.html, report.md, report.json, model.toml, plots and checkpoint
     #[arg(long, default_value = "closeloop-report", value_name = "DIR")]
     out: PathBuf,
     /// Intervals to leave out, in the time of the log
@@ -132,7 +132,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if arguments.common.json {
         inputs::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
-        inputs::print(&report::summary(&outcome, &arguments.out))?;
+        inputs::print(&report::summary(&report, &outcome.seconds, &arguments.out))?;
     }
     Ok(answer(&outcome))
 }

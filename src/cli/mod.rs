@@ -15,6 +15,7 @@ mod mbrl;
 mod new;
 mod progress;
 mod remedy;
+mod report;
 mod simulate;
 mod sweep;
 mod train;
@@ -42,6 +43,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Closeloop(closeloop::Arguments),
+    Report(report::Arguments),
     Audit(audit::Arguments),
     Train(train::Arguments),
     Tune(tune::Arguments),
@@ -83,6 +85,7 @@ enum Answer {
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Audit(arguments) => audit::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Tune(arguments) => tune::run(&arguments),

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use rand::Rng;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::fitted::Fitted;
 use super::refine::Refined;
@@ -82,7 +82,7 @@ pub struct Learned {
 
 /// Open-loop position errors at the middle horizon on parts of the training logs, by networks that were trained on the
 /// other parts.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct NetworkCheck {
     /// of the model without a network in each part, rad (or m)
     pub without: Vec<f64>,

@@ -4,6 +4,7 @@
 //! establish, test what remains, tell alternatives apart, refine, learn, score, calibrate. [`close_loop`] goes
 //! through all of them.
 
+mod by_log;
 mod calibrate;
 mod choose;
 mod discriminate;
@@ -35,6 +36,7 @@ mod study;
 mod tests;
 mod verdict;
 
+pub use by_log::OfLog;
 pub use calibrate::{Calibration, DetectionLimit, Repetition, Smallest, calibrate};
 pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;

@@ -1,3 +1,4 @@
+use super::by_log::OfLog;
 use super::calibrate::Calibration;
 use super::discriminate::Alternative;
 use super::fitted::Fitted;
@@ -30,6 +31,8 @@ pub struct Outcome {
     pub errors: Errors,
     /// The residual network, where the logs suffice to train it.
     pub learned: Option<Learned>,
+    /// The chosen model fitted to each training log alone; empty for a single log and for very many.
+    pub by_log: Vec<OfLog>,
     /// What the training logs could show, where that was asked for: see [`calibrate`](super::calibrate()).
     pub calibration: Option<Calibration>,
     /// How long each stage took in s.
@@ -51,6 +54,8 @@ pub struct Given {
     pub unscored_s: Vec<f64>,
     /// For each joint whether it slides rather than turns.
     pub prismatic: Vec<bool>,
+    /// Values of the declared parameters in the model file.
+    pub declared: Vec<f64>,
 }
 
 /// The fitted models.

@@ -91,6 +91,7 @@ pub fn close_loop(
     tell_repeats(split.train.iter().chain(&split.test), &mut audits);
     let learned = learn(&refined, learner, rng, progress)?;
     progress(Stage::Score.into());
+    let by_log = study.by_log(&found.chosen.after);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
@@ -118,6 +119,7 @@ pub fn close_loop(
         remainder,
         errors,
         learned,
+        by_log,
         calibration: None,
         seconds: clock.stop(),
         given: Given {
@@ -128,6 +130,7 @@ pub fn close_loop(
             settings: settings.clone(),
             unscored_s,
             prismatic: model.prismatic.clone(),
+            declared: model.parameters.iter().map(|p| p.value).collect(),
             studied,
         },
     })

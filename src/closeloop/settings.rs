@@ -3,7 +3,7 @@
 use std::num::NonZeroUsize;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::sim::FINE_FIT_S;
 
@@ -13,7 +13,7 @@ macro_rules! settings {
         $($(#[$doc:meta])* $field:ident: $kind:ty = $default:expr,)*
     }) => {
         $(#[$about])*
-        #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[non_exhaustive]
         pub struct $name {
             $(
@@ -46,7 +46,7 @@ impl SelectSettings {
 }
 
 /// How the loop is closed.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[non_exhaustive]
 pub struct Settings {
     pub split: SplitSettings,

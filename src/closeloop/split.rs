@@ -1,7 +1,7 @@
 //! Stage 1: set apart the logs that models are scored on.
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::settings::SplitSettings;
 use crate::data::Log;
@@ -15,7 +15,7 @@ pub struct Split {
 }
 
 /// How the test logs were set apart.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitMethod {
     /// The user named them.

@@ -2,62 +2,51 @@
 
 use std::fmt::Write;
 
-use super::text::label;
+use super::schema::{IdentifiabilityEntry, ModelError, Report, TorqueEntry};
 use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
-use crate::closeloop::{Outcome, Space, TorqueErrors};
-use crate::data::{Audit, Joint, Quantity};
-use crate::identify::Identifiability;
-use crate::sim::metric::{Summary, TorqueError, summarise};
+use crate::closeloop::Space;
+use crate::data::{Joint, Quantity};
+use crate::sim::metric::TorqueError;
 
 /// More parameters than this that trade with one another are counted.
 const MOST_NAMED: usize = 6;
 
 /// The unit of positions: that of all joints, or both.
-fn position_unit(outcome: &Outcome) -> &'static str {
-    let sliding = outcome
-        .given
-        .prismatic
-        .iter()
-        .filter(|slides| **slides)
-        .count();
-    match sliding {
+pub(super) fn position_unit(report: &Report) -> &'static str {
+    match report.prismatic.iter().filter(|slides| **slides).count() {
         0 => "rad",
-        all if all == outcome.given.prismatic.len() => "m",
+        all if all == report.prismatic.len() => "m",
         _ => "rad or m",
     }
 }
 
 /// Every model that was scored on the test logs, with its name in a table.
-fn scored(outcome: &Outcome) -> Vec<(&str, Summary)> {
-    let errors = &outcome.errors;
+pub(super) fn scored(report: &Report) -> Vec<(&str, &ModelError)> {
+    let error = &report.error;
     let mut models = vec![
-        (AS_WRITTEN, &errors.declared),
-        (FITTED, &errors.before),
-        (WITH_EFFECTS, &errors.after),
+        (AS_WRITTEN, &error.declared),
+        (FITTED, &error.before),
+        (WITH_EFFECTS, &error.after),
     ];
-    models.extend(errors.zeroed.iter().map(|m| (ZEROED, m)));
-    let hybrid = errors.hybrid.iter();
-    models.extend(hybrid.map(|m| (WITH_NETWORK, m)));
-    models.extend(errors.against.iter().map(|(name, m)| (name.as_str(), m)));
-    let joints = outcome.models.after.model.joints;
+    models.extend(error.zeroed.iter().map(|m| (ZEROED, m)));
+    models.extend(error.hybrid.iter().map(|m| (WITH_NETWORK, m)));
+    let against = error.against.iter();
+    models.extend(against.map(|other| (other.name.as_str(), &other.error)));
     models
-        .into_iter()
-        .map(|(name, model)| (name, summarise(&model.horizons, joints)))
-        .collect()
 }
 
 const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zeros of each test log's sensors are estimated on \
                             its first second, and scored on the rest: what a rig gives that is zeroed before a run.";
 
 /// What was compared, as a sentence.
-pub(super) fn compared(outcome: &Outcome) -> String {
-    match outcome.space {
+pub(super) fn compared(report: &Report) -> String {
+    match report.compared {
         Space::Motion => {
-            let driving = match outcome.models.after.model.driven_by() {
-                Quantity::Command => "commands",
-                _ => "torques",
+            let driving = match report.driven_by == Quantity::Command.key() {
+                true => "commands",
+                false => "torques",
             };
             format!(
                 "Models are fitted to, selected and compared by the open-loop motion under the logged {driving}."
@@ -73,9 +62,8 @@ pub(super) fn compared(outcome: &Outcome) -> String {
 }
 
 /// Errors of the torques joint by joint, where they were compared.
-pub(super) fn torques(outcome: &Outcome) -> String {
-    let Some(errors) = (outcome.errors.torque.as_ref()).filter(|_| outcome.space == Space::Torque)
-    else {
+pub(super) fn torques(report: &Report) -> String {
+    let Some(errors) = (report.torque.as_ref()).filter(|_| report.compared == Space::Torque) else {
         return String::new();
     };
     let mut out = format!(
@@ -84,8 +72,8 @@ pub(super) fn torques(outcome: &Outcome) -> String {
          parameters fitted to the training logs and no effect added.\n\n\
          | joint | {AS_WRITTEN} | {FITTED} | {WITH_EFFECTS} | with effects / fitted |\n|---|---|---|---|---|\n"
     );
-    let TorqueErrors {
-        declared,
+    let TorqueEntry {
+        as_declared: declared,
         before,
         after,
         reduction_ci95,
@@ -95,7 +83,7 @@ pub(super) fn torques(outcome: &Outcome) -> String {
         let _ = writeln!(
             out,
             "| {} | {} | {} | {} | {:.2} |",
-            label(outcome, joint),
+            report.label(joint),
             small(declared),
             small(before),
             small(after),
@@ -110,20 +98,20 @@ pub(super) fn torques(outcome: &Outcome) -> String {
         after / before.max(f64::MIN_POSITIVE)
     );
     out += &removed(*reduction_ci95, "error");
-    out + &repeated(outcome) + "\n"
+    out + &repeated(report) + "\n"
 }
 
 /// What an error on test logs says that have the motion of others once more.
-fn repeated(outcome: &Outcome) -> String {
-    let of_test = &outcome.given.audits[outcome.given.train.len()..];
-    let is_repeat = |audit: &&Audit| audit.repeats.is_some();
-    let repeats: Vec<String> = (of_test.iter().filter(is_repeat))
+pub(super) fn repeated(report: &Report) -> String {
+    let of_test = report.audit.iter().skip(report.logs.train.len());
+    let repeats: Vec<String> = of_test
+        .filter(|audit| audit.repeats.is_some())
         .map(|audit| audit.log.clone())
         .collect();
     if repeats.is_empty() {
         return String::new();
     }
-    let of_bodies = match outcome.models.bodies.told.is_empty() {
+    let of_bodies = match report.identifiability.bodies.is_empty() {
         true => "",
         false => {
             " Those are predicted no better than with the declared bodies and fitted friction where they need what these logs do \
@@ -148,18 +136,18 @@ fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> String {
     })
 }
 
-pub(super) fn errors(outcome: &Outcome) -> String {
-    let models = scored(outcome);
+pub(super) fn errors(report: &Report) -> String {
+    let models = scored(report);
     let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let mut out = format!(
         "## Open-loop error on the test logs\n\nRoot mean square of the position error in {}; in brackets the median over \
          windows. \"Fitted\" is the declared model with its own parameters fitted to the training logs and no effect added: \
          the fair \"before\" of every comparison in this report.{}\n\n\
          | horizon | joint | windows | {} | with effects / fitted |\n|---|---|---|{}---|\n",
-        position_unit(outcome),
+        position_unit(report),
         [
-            outcome.errors.zeroed.as_ref().map_or("", |_| ABOUT_ZEROED),
-            if outcome.errors.against.is_empty() {
+            report.error.zeroed.as_ref().map_or("", |_| ABOUT_ZEROED),
+            if report.error.against.is_empty() {
                 ""
             } else {
                 " The last models are other files, scored as they are."
@@ -169,11 +157,11 @@ pub(super) fn errors(outcome: &Outcome) -> String {
         names.join(" | "),
         "---|".repeat(names.len())
     );
-    let (before, after) = (&models[1].1, &models[2].1);
-    for (h, horizon) in before.horizons_s.iter().enumerate() {
-        for joint in Joint::all(outcome.models.after.model.joints) {
-            let rmse = |s: &Summary| s.position_rmse[h][joint];
-            let cell = |(_, s): &(&str, Summary)| {
+    let (before, after) = (&report.error.before, &report.error.after);
+    for (h, horizon) in report.error.horizons_s.iter().enumerate() {
+        for joint in Joint::all(report.joints) {
+            let rmse = |s: &ModelError| s.position_rmse[h][joint];
+            let cell = |(_, s): &(&str, &ModelError)| {
                 format!(
                     "{} ({})",
                     small(rmse(s)),
@@ -184,7 +172,7 @@ pub(super) fn errors(outcome: &Outcome) -> String {
             let _ = writeln!(
                 out,
                 "| {horizon} s | {} | {} | {} | {:.2} |",
-                label(outcome, joint),
+                report.label(joint),
                 before.windows[h],
                 cells.join(" | "),
                 rmse(after) / rmse(before).max(f64::MIN_POSITIVE)
@@ -200,65 +188,56 @@ pub(super) fn errors(outcome: &Outcome) -> String {
             );
         }
     }
-    if let (Some(torque), Space::Motion) = (&outcome.errors.torque, outcome.space) {
+    if let (Some(torque), Space::Motion) = (&report.torque, report.compared) {
         let percent = |error: &TorqueError| 100.0 * error.relative;
         let _ = writeln!(
             out,
             "\nThe torques that the logged motion needs, low-passed, differ from the logged ones by {:.2} % ({AS_WRITTEN}), \
              {:.2} % ({FITTED}) and {:.2} % ({WITH_EFFECTS}), root mean square.",
-            percent(&torque.declared),
+            percent(&torque.as_declared),
             percent(&torque.before),
             percent(&torque.after)
         );
     }
-    for horizon in &outcome.given.unscored_s {
+    for horizon in &report.error.unscored_s {
         let _ = writeln!(
             out,
             "\nNo test log holds a window of {horizon} s, so no error is given at that horizon."
         );
     }
-    let middle_s = before.horizons_s[before.horizons_s.len() / 2];
-    let error = format!("error at {middle_s} s");
-    out += &removed(outcome.errors.reduction_ci95, &error);
+    let error = format!("error at {} s", report.error.middle().1);
+    out += &removed(report.error.reduction_ci95, &error);
     out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
 }
 
-pub(super) fn parameters(outcome: &Outcome) -> String {
+pub(super) fn parameters(report: &Report) -> String {
     let mut out = String::from("## Parameters of the declared equations\n\n");
-    let after = outcome.models.after.model.absorbed();
-    for (parameter, before) in after
-        .parameters
-        .iter()
-        .zip(&outcome.models.before.model.parameters)
-    {
+    for one in &report.parameters {
         let _ = writeln!(
             out,
             "- {}; fitted without the effects: {:.5}",
-            value(parameter),
-            before.value
+            value(&one.fitted),
+            one.before
         );
     }
-    let verdict = &outcome.models.identifiability;
+    let known = &report.identifiability;
     let _ = writeln!(
         out,
         "\nThe logs determine {} of {} free parameters.",
-        verdict.determined, verdict.free
+        known.determined, known.free
     );
-    for (name, model) in [
-        (FITTED, &outcome.models.before),
-        (WITH_EFFECTS, &outcome.models.after),
-    ] {
-        let (steps, termination) = (model.fit.steps, model.fit.termination);
-        let [as_is, scaled] = model.fit.condition();
+    let fits = &report.fits;
+    for (name, fit) in [(FITTED, &fits.before), (WITH_EFFECTS, &fits.after)] {
+        let [as_is, scaled] = fit.condition.map(|number| number.unwrap_or(f64::INFINITY));
         let _ = writeln!(
             out,
-            "- Fit ({name}): {termination} ({steps} steps; condition number {as_is:.1e}, {scaled:.1e} after scaling)."
+            "- Fit ({name}): {} ({} steps; condition number {as_is:.1e}, {scaled:.1e} after scaling).",
+            fit.termination, fit.steps
         );
     }
-    if !outcome.models.moved_to.is_empty() {
-        let all = outcome.models.moved_to.iter();
-        let all: Vec<String> = all
-            .map(|p| format!("`{}` = {:.3}", p.name, p.value))
+    if !fits.moved_to.is_empty() {
+        let all: Vec<String> = (fits.moved_to.iter())
+            .map(|(name, value)| format!("`{name}` = {value:.3}"))
             .collect();
         let _ = writeln!(
             out,
@@ -266,15 +245,14 @@ pub(super) fn parameters(outcome: &Outcome) -> String {
             listed(&all)
         );
     }
-    for &k in &verdict.hold {
-        let name = &outcome.models.before.model.all_parameters()[k].name;
-        let _ = writeln!(out, "- `{name}` is held: {}", why_held(verdict, name));
+    for name in &known.held {
+        let _ = writeln!(out, "- `{name}` is held: {}", why_held(known, name));
     }
     out + "\n"
 }
 
 /// What the logs do not tell of a parameter.
-fn why_held(verdict: &Identifiability, name: &str) -> String {
+fn why_held(verdict: &IdentifiabilityEntry, name: &str) -> String {
     let weight = |direction: &&Vec<(String, f64)>| {
         let own = direction.iter().find(|(other, _)| other == name);
         own.map_or(0.0, |(_, weight)| weight.abs())
@@ -297,29 +275,30 @@ fn why_held(verdict: &Identifiability, name: &str) -> String {
 }
 
 /// Which numbers of the model file do not hold for these logs.
-pub(super) fn contradicted(outcome: &Outcome) -> String {
-    if outcome.models.contradicted.is_empty() {
+pub(super) fn contradicted(report: &Report) -> String {
+    if report.contradicted.is_empty() {
         return String::new();
     }
-    let errors = &outcome.errors;
-    let (written, fitted) = (errors.declared.position_rms(), errors.before.position_rms());
+    let error = &report.error;
+    let (middle, horizon_s) = error.middle();
+    let [written, fitted] = [&error.declared, &error.before].map(|model| model.of_all(middle));
     let mut out = format!(
         "## Declared values that these logs contradict\n\nOn the test logs, {} s ahead, the position error of the declared model \
          is {} {unit} with the values in its file and {} {unit} with its parameters fitted to the training logs. These declared \
          values lie outside the 95 % intervals of the final fit, which includes the effects found:\n\n",
-        errors.before.middle().horizon_s,
+        horizon_s,
         small(written),
         small(fitted),
-        unit = position_unit(outcome),
+        unit = position_unit(report),
     );
-    for one in &outcome.models.contradicted {
+    for one in &report.contradicted {
         let _ = writeln!(
             out,
             "- {}: declared {}, fitted {}: {}",
             one.fitted.name,
             one.declared,
             amount(&one.fitted),
-            one.comparison()
+            one.comparison
         );
     }
     out + "\nmodel.toml holds the fitted values. If a declared value comes from another log, check that log with `residyn audit`; \

@@ -2,14 +2,16 @@
 
 use std::fmt::Write;
 
+use super::schema::{CombinationEntry, Report};
 use super::wording::amount_of;
-use crate::closeloop::Outcome;
-use crate::identify::{BodiesTold, Combination};
 
 /// The combinations of parameters that torques tell, body by body; empty for a model without free bodies.
-pub(super) fn bodies(outcome: &Outcome) -> String {
-    let BodiesTold { told, tellable } = &outcome.models.bodies;
-    if *tellable == 0 {
+pub(super) fn bodies(report: &Report) -> String {
+    let (told, tellable) = (
+        &report.identifiability.bodies,
+        report.identifiability.tellable,
+    );
+    if tellable == 0 {
         return String::new();
     }
     let mut out = format!(
@@ -17,13 +19,13 @@ pub(super) fn bodies(outcome: &Outcome) -> String {
          tell {}. Where the sums stay as they are, bodies are as near to the declared ones as they can be: another motion may need \
          what only the declared values tell.{}\n\n| body | sum | declared | fitted |\n|---|---|---|---|\n",
         told.len(),
-        poor(told.len(), *tellable)
+        poor(told.len(), tellable)
     );
     for one in told {
         let _ = writeln!(
             out,
-            "| {} | {} | {:.4} | {} |",
-            one.body + 1,
+            "| {} | `{}` | {:.4} | {} |",
+            one.body,
             sum(one),
             one.declared,
             amount_of(one.value, Some(one.ci95), &one.unit)
@@ -37,7 +39,7 @@ const WELL: f64 = 0.8;
 
 /// What to do where the motion tells little.
 #[allow(clippy::cast_precision_loss)] // few sums
-fn poor(told: usize, tellable: usize) -> &'static str {
+pub(super) fn poor(told: usize, tellable: usize) -> &'static str {
     match (told as f64) < WELL * tellable as f64 {
         true => {
             " That is poor excitation: move all joints at once, over more of their range and fast enough that their \
@@ -48,7 +50,7 @@ fn poor(told: usize, tellable: usize) -> &'static str {
 }
 
 /// `zz_2 + 0.3 m_3 - 1.2 mx_3`
-fn sum(one: &Combination) -> String {
+pub(super) fn sum(one: &CombinationEntry) -> String {
     let part = |(k, (name, weight)): (usize, &(String, f64))| {
         let sign = match (k, *weight < 0.0) {
             (0, _) => "",
@@ -61,6 +63,6 @@ fn sum(one: &Combination) -> String {
             false => format!("{sign}{size:.3} {name}"),
         }
     };
-    let parts: Vec<String> = one.parts.iter().enumerate().map(part).collect();
-    format!("`{}`", parts.concat())
+    let parts: Vec<String> = one.sum.iter().enumerate().map(part).collect();
+    parts.concat()
 }

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::wording::{listed, small, with_unit};
 use crate::closeloop::{Calibration, DetectionLimit, Smallest};
 use crate::data::Joint;
 use crate::model::{EffectParameter, FittedEffect};
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct CalibrationEntry {
     /// simulations of the accepted model that were searched like the logs
     #[schemars(range(min = 1))]
@@ -26,12 +26,14 @@ pub(super) struct CalibrationEntry {
     named: Vec<AlarmEntry>,
     /// runs in which something was left that nothing explains
     unexplained: usize,
+    /// effects were hidden in a simulation at so many times their smallest size
+    hidden_at: f64,
     /// for each effect that the accepted model lacks, the smallest size that the search would name in four of five such
     /// logs
     smallest: Vec<SmallestEntry>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct AlarmEntry {
     name: String,
     joint: Joint,
@@ -39,15 +41,17 @@ struct AlarmEntry {
     runs: usize,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct SmallestEntry {
     effect: String,
+    /// its name for people
+    title: String,
     joint: Joint,
     parameter: String,
     /// null where there is none; reason says why
     value: Option<f64>,
     unit: String,
-    reason: Option<&'static str>,
+    reason: Option<String>,
     /// value / highest torque of the joint, where the parameter is a torque
     share_of_top_torque: Option<f64>,
     /// the effect's inner parameters at that size; other levels and slopes are at zero
@@ -58,14 +62,14 @@ struct SmallestEntry {
     named_besides: Vec<EffectEntry>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct ValueEntry {
     name: String,
     value: f64,
     unit: String,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 struct EffectEntry {
     name: String,
     joint: Joint,
@@ -80,6 +84,7 @@ impl CalibrationEntry {
             rate_ci95: calibration.rate_ci95(),
             named: alarms(calibration),
             unexplained: calibration.unexplained,
+            hidden_at: calibration.hidden,
             smallest: calibration
                 .limits
                 .iter()
@@ -123,11 +128,12 @@ fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
         .filter(|(p, _)| !p.is_switch());
     SmallestEntry {
         effect: effect.effect.name.clone(),
+        title: effect.title(),
         joint: effect.joint,
         parameter: name.clone(),
         value,
         unit: unit.clone(),
-        reason: reason(&limit.smallest),
+        reason: reason(&limit.smallest).map(str::to_owned),
         share_of_top_torque: value
             .filter(|_| unit == "N m" && top > 0.0)
             .map(|value| value / top),
@@ -166,7 +172,7 @@ fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &FittedEffect> {
 }
 
 /// The section of `report.md`.
-pub(super) fn section(calibration: &Calibration) -> String {
+pub(super) fn section(calibration: &CalibrationEntry) -> String {
     let mut out = format!(
         "## What these logs could show\n\n{} were searched like the logs themselves, driven by the torques of the training logs \
          and with the residuals of the fit as noise. {}.\n\n\
@@ -175,12 +181,11 @@ pub(super) fn section(calibration: &Calibration) -> String {
          | effect | joint | smallest size | share of the top torque | hidden in a simulation |\n|---|---|---|---|---|\n",
         simulations(calibration),
         alarms_in_words(calibration),
-        calibration.hidden,
+        calibration.hidden_at,
     );
-    for limit in &calibration.limits {
-        let entry = smallest(limit, &calibration.top_torque);
+    for entry in &calibration.smallest {
         let size = entry.value.map_or_else(
-            || entry.reason.unwrap_or_default().to_owned(),
+            || entry.reason.clone().unwrap_or_default(),
             |value| {
                 let others = entry.with.iter();
                 std::iter::once(quantity(&entry.parameter, value, &entry.unit))
@@ -195,16 +200,16 @@ pub(super) fn section(calibration: &Calibration) -> String {
         let _ = writeln!(
             out,
             "| {} | {} | {size} | {share} | {} |",
-            limit.effect.title(),
+            entry.title,
             entry.joint,
-            hidden(limit)
+            hidden(entry)
         );
     }
     out + "\n"
 }
 
 /// The line for a terminal.
-pub(super) fn line(calibration: &Calibration) -> String {
+pub(super) fn line(calibration: &CalibrationEntry) -> String {
     format!(
         "  {}: {}\n",
         simulations(calibration),
@@ -212,24 +217,19 @@ pub(super) fn line(calibration: &Calibration) -> String {
     )
 }
 
-fn simulations(calibration: &Calibration) -> String {
-    format!(
-        "{} simulations of the accepted model",
-        calibration.named.len()
-    )
+fn simulations(calibration: &CalibrationEntry) -> String {
+    format!("{} simulations of the accepted model", calibration.runs)
 }
 
-fn alarms_in_words(calibration: &Calibration) -> String {
-    let [low, high] = calibration.rate_ci95().map(|share| 100.0 * share);
+fn alarms_in_words(calibration: &CalibrationEntry) -> String {
+    let [low, high] = calibration.rate_ci95.map(|share| 100.0 * share);
     let mut out = format!(
         "{} named an effect that is absent: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
-        calibration.alarms(),
-        100.0 * calibration.rate(),
+        calibration.alarms,
+        100.0 * calibration.rate,
     );
-    let named = alarms(calibration);
-    if !named.is_empty() {
-        let named: Vec<String> = named
-            .iter()
+    if !calibration.named.is_empty() {
+        let named: Vec<String> = (calibration.named.iter())
             .map(|alarm| format!("{} on joint {} ({})", alarm.name, alarm.joint, alarm.runs))
             .collect();
         let _ = write!(out, ": {}", listed(&named));
@@ -242,9 +242,10 @@ fn alarms_in_words(calibration: &Calibration) -> String {
     out
 }
 
-fn hidden(limit: &DetectionLimit) -> String {
-    let others: Vec<String> = besides(limit).map(FittedEffect::label).collect();
-    match (limit.verified(), others.is_empty()) {
+fn hidden(entry: &SmallestEntry) -> String {
+    let label = |other: &EffectEntry| format!("{} on joint {}", other.name, other.joint);
+    let others: Vec<String> = entry.named_besides.iter().map(label).collect();
+    match (entry.verified, others.is_empty()) {
         (None, _) => "not tried".to_owned(),
         (Some(true), true) => "named".to_owned(),
         (Some(true), false) => format!("named, together with {}", listed(&others)),

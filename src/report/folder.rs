@@ -1,11 +1,12 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use thiserror::Error;
 
-use super::json::{CHECKPOINT, MODEL, PLOTS, TEXT};
+use super::json::{CHECKPOINT, MODEL, PAGE, PLOTS, RANGES, REPORT, TEXT};
 use super::plot::PlotError;
 use super::schema::Report;
-use super::{model_file, picture, text};
+use super::{model_file, page, picture, text};
 use crate::closeloop::{LearnError, Outcome, Stage};
 use crate::files::{OutputError, folder_of, move_contents, write_whole};
 use crate::model::Origin;
@@ -21,7 +22,51 @@ pub enum WriteError {
     Checkpoint(#[from] LearnError),
 }
 
-/// Write report.json, report.md, model.toml, the plots and the checkpoint into `folder`, and return the report.
+/// Why the report of a folder could not be read.
+#[derive(Debug, Error)]
+pub enum ReadError {
+    #[error("{}: {error}; give a folder that `residyn closeloop` wrote", path.display())]
+    File {
+        path: PathBuf,
+        error: std::io::Error,
+    },
+    #[error(
+        "{}: {error}; a report of another version of the program is made again by the command in its `configuration`",
+        path.display()
+    )]
+    Shape {
+        path: PathBuf,
+        error: serde_json::Error,
+    },
+}
+
+impl Report {
+    /// The report of a folder.
+    ///
+    /// # Errors
+    /// A folder without report.json, or one of another form.
+    pub fn read(folder: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = folder.as_ref().join(REPORT);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) => return Err(ReadError::File { path, error }),
+        };
+        serde_json::from_str(&text).map_err(|error| ReadError::Shape { path, error })
+    }
+
+    /// Write report.html and report.md into a folder, and return their paths.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, or a full disk.
+    pub fn write_readable(&self, folder: impl AsRef<Path>) -> Result<[PathBuf; 2], OutputError> {
+        let [html, markdown] = [PAGE, TEXT].map(|name| folder.as_ref().join(name));
+        write_whole(&html, page(self).as_bytes())?;
+        write_whole(&markdown, text(self).as_bytes())?;
+        Ok([html, markdown])
+    }
+}
+
+/// Write report.json, report.html, report.md, model.toml, the plots and the checkpoint into `folder`, and return the report.
 /// All is written into a folder beside it first and moved when every file has somewhere to go: a failure leaves `folder`
 /// as it was.
 ///
@@ -50,12 +95,11 @@ fn put_all(
     origin: &Origin,
 ) -> Result<(), WriteError> {
     let put = |name: &str, contents: &str| write_whole(&folder.join(name), contents.as_bytes());
-    let json =
-        serde_json::to_string_pretty(report).expect("a report has only finite numbers and texts");
-    put("report.json", &(json + "\n"))?;
+    put(REPORT, &json(report))?;
+    put(RANGES, &json(&report.ranges))?;
     put(TIMINGS, &timings(outcome))?;
     put(MODEL, &model_file(outcome))?;
-    put(TEXT, &text(outcome, origin.seed))?;
+    report.write_readable(folder)?;
     let pictures = [
         picture::predictions(outcome)?,
         picture::residual(outcome)?,
@@ -72,6 +116,10 @@ fn put_all(
         learned.network.save(&folder.join(CHECKPOINT), &origin)?;
     }
     Ok(())
+}
+
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string_pretty(value).expect("a report has only finite numbers and texts") + "\n"
 }
 
 /// Apart from the report, which is the same each time.

@@ -1,12 +1,15 @@
 //! `report.json`: the outcome with fixed names, for other programs.
 
+use super::by_log::{by_log, ranges};
 use super::calibration::CalibrationEntry;
+use super::headline::{headline, place};
 use super::schema::{
     AlternativeEntry, AuditEntry, CombinationEntry, ContenderEntry, ContradictedEntry, EffectEntry,
     EffectName, ErrorEntry, FilesEntry, FitEntry, FitsEntry, IdentifiabilityEntry, LogEntry,
-    LogsEntry, ModelError, NormEntry, ParameterEntry, Report, TorqueEntry, TriedEntry,
-    UnexplainedEntry,
+    LogsEntry, ModelError, NormEntry, ParameterEntry, RefittedEntry, Report, TorqueEntry,
+    TriedEntry, UnexplainedEntry,
 };
+use super::shown::ShownEntry;
 use crate::closeloop::{
     Alternative, Contradicted, Finding, Outcome, ResidualForce, Round, TorqueErrors, Tried,
 };
@@ -17,7 +20,10 @@ use crate::sim::metric::{Assessment, Summary, summarise};
 
 /// Names of the files in the folder of a report.
 pub(super) const MODEL: &str = "model.toml";
+pub(super) const RANGES: &str = "ranges.json";
+pub(super) const REPORT: &str = "report.json";
 pub(super) const TEXT: &str = "report.md";
+pub(super) const PAGE: &str = "report.html";
 pub(super) const CHECKPOINT: &str = "checkpoint";
 pub(super) const PLOTS: [&str; 3] = ["predictions.svg", "residual.svg", "errors.svg"];
 
@@ -25,27 +31,31 @@ impl Report {
     /// The outcome of a run of this origin.
     pub fn new(outcome: &Outcome, origin: &Origin) -> Self {
         let model = outcome.models.after.model.absorbed();
+        let by_log = by_log(outcome);
         Self {
             schema: 1,
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: origin.seed,
             configuration: origin.config.clone(),
             settings: outcome.given.settings.clone(),
             system: model.name.clone(),
             joints: model.joints,
             joint_names: joint_names(&model),
+            prismatic: outcome.given.prismatic.clone(),
+            driven_by: model.driven_by().key().to_owned(),
             verdict: outcome.verdict,
+            headline: headline(outcome),
             reason: outcome.reason.clone(),
-            effects: outcome.effects.findings.iter().map(effect).collect(),
-            alternatives: outcome
-                .effects
-                .alternatives
-                .iter()
-                .map(alternative)
+            effects: effects(outcome, &outcome.effects.findings),
+            alternatives: (outcome.effects.alternatives.iter())
+                .map(|rival| alternative(outcome, rival))
                 .collect(),
-            supported: outcome.effects.supported.iter().map(effect).collect(),
+            supported: effects(outcome, &outcome.effects.supported),
             unexplained: left(outcome),
-            parameters: model.parameters.iter().map(parameter).collect(),
+            equations: model.latex(),
+            parameters: refitted(outcome, &model),
+            ranges: ranges(outcome, &by_log),
+            by_log,
             contradicted: outcome
                 .models
                 .contradicted
@@ -60,13 +70,11 @@ impl Report {
                 before: ended(&outcome.models.before.fit),
                 after: ended(&outcome.models.after.fit),
             },
+            sign_widths: outcome.models.after.model.sign_widths(),
             compared: outcome.space,
             error: errors(outcome),
             torque: outcome.errors.torque.clone().map(TorqueEntry::from),
-            residual_norm: NormEntry {
-                before: norm(&outcome.remainder.before),
-                after: norm(&outcome.remainder.after),
-            },
+            residual_norm: norms(&outcome.remainder.before, &outcome.remainder.after),
             logs: logs(outcome),
             audit: outcome
                 .given
@@ -75,31 +83,50 @@ impl Report {
                 .map(|audit| AuditEntry {
                     log: audit.log.clone(),
                     findings: audit.findings.clone(),
+                    repeats: audit.repeats.clone(),
                 })
                 .collect(),
             tried: tried(outcome),
+            candidates: (outcome.effects.rounds.iter())
+                .map(|round| round.candidates)
+                .collect(),
             stopped: outcome.effects.stopped,
             network: outcome
                 .learned
                 .as_ref()
                 .map(|learned| learned.check.clone()),
             calibration: outcome.calibration.as_ref().map(CalibrationEntry::new),
+            shown: ShownEntry::of(outcome),
             files: FilesEntry {
-                model: MODEL,
-                report: TEXT,
-                checkpoint: outcome.learned.as_ref().map(|_| CHECKPOINT),
-                plots: PLOTS.to_vec(),
+                model: MODEL.to_owned(),
+                report: TEXT.to_owned(),
+                page: PAGE.to_owned(),
+                checkpoint: (outcome.learned.as_ref()).map(|_| CHECKPOINT.to_owned()),
+                plots: PLOTS.map(str::to_owned).to_vec(),
             },
         }
     }
 }
 
-fn effect(finding: &Finding) -> EffectEntry {
+fn effects(outcome: &Outcome, findings: &[Finding]) -> Vec<EffectEntry> {
+    let each = findings.iter();
+    each.map(|finding| effect(outcome, finding)).collect()
+}
+
+fn effect(outcome: &Outcome, finding: &Finding) -> EffectEntry {
+    let names: Vec<String> = (finding.parameters.iter())
+        .map(|parameter| parameter.name.clone())
+        .collect();
+    let driven_by = outcome.models.after.model.driven_by();
     EffectEntry {
         name: finding.effect.effect.name.clone(),
         joint: finding.effect.joint,
         joints: both(&finding.effect),
+        title: finding.effect.title(),
+        place: place(outcome, &finding.effect),
         expression: finding.expression.clone(),
+        latex: (finding.effect.shifted().is_none())
+            .then(|| finding.effect.latex(&names, driven_by)),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
         error_reduction: finding.error_reduction.as_ref().ok().copied(),
@@ -121,7 +148,7 @@ fn row((of, own): &(Parameter, Option<&OwnValue>)) -> ParameterEntry {
 }
 
 /// A parameter is identifiable where the logs give it an interval narrower than its magnitude.
-fn parameter(parameter: &Parameter) -> ParameterEntry {
+pub(super) fn parameter(parameter: &Parameter) -> ParameterEntry {
     let magnitude = parameter.value.abs().max(parameter.scale);
     let narrow = |[low, high]: [f64; 2]| high - low < 2.0 * magnitude;
     ParameterEntry {
@@ -137,6 +164,7 @@ fn parameter(parameter: &Parameter) -> ParameterEntry {
 fn contradicted(contradicted: &Contradicted) -> ContradictedEntry {
     ContradictedEntry {
         declared: contradicted.declared,
+        comparison: contradicted.comparison(),
         fitted: parameter(&contradicted.fitted),
     }
 }
@@ -146,13 +174,16 @@ fn effect_name(effect: &FittedEffect) -> EffectName {
         name: effect.effect.name.clone(),
         joint: effect.joint,
         joints: both(effect),
+        label: effect.label(),
         parameter: shifted(effect),
     }
 }
 
-fn alternative(alternative: &Alternative) -> AlternativeEntry {
+fn alternative(outcome: &Outcome, alternative: &Alternative) -> AlternativeEntry {
     AlternativeEntry {
         effects: alternative.effects.iter().map(effect_name).collect(),
+        title: alternative.effect.title(),
+        place: place(outcome, &alternative.effect),
         reason: alternative.reason.clone(),
         experiment: alternative.experiment(),
         separation: alternative.separation.clone().ok(),
@@ -175,8 +206,31 @@ fn left(outcome: &Outcome) -> UnexplainedEntry {
     }
 }
 
-fn norm(force: &Result<ResidualForce, FitError>) -> Option<f64> {
-    force.as_ref().ok().map(ResidualForce::norm)
+fn norms(
+    before: &Result<ResidualForce, FitError>,
+    after: &Result<ResidualForce, FitError>,
+) -> NormEntry {
+    let norm =
+        |force: &Result<ResidualForce, FitError>| force.as_ref().ok().map(ResidualForce::norm);
+    let failure = before.as_ref().err().or(after.as_ref().err());
+    NormEntry {
+        before: norm(before),
+        after: norm(after),
+        failure: failure.map(ToString::to_string),
+    }
+}
+
+/// The parameters of the declared equations; `model` has the shifts among them.
+fn refitted(outcome: &Outcome, model: &Model) -> Vec<RefittedEntry> {
+    let before = &outcome.models.before.model.parameters;
+    let declared = &outcome.given.declared;
+    let entry = |((after, before), declared): ((&Parameter, &Parameter), &f64)| RefittedEntry {
+        fitted: parameter(after),
+        declared: *declared,
+        before: before.value,
+    };
+    let all = model.parameters.iter().zip(before).zip(declared);
+    all.map(entry).collect()
 }
 
 fn ended(fit: &Fit) -> FitEntry {
@@ -228,7 +282,7 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
     };
     let errors = &outcome.errors;
     ErrorEntry {
-        logs: "test",
+        logs: "test".to_owned(),
         horizons_s: errors.before.horizons.iter().map(|h| h.horizon_s).collect(),
         unscored_s: outcome.given.unscored_s.clone(),
         declared: model(&errors.declared),

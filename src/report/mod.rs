@@ -2,23 +2,28 @@
 
 mod accuracy;
 mod bodies;
+mod by_log;
 mod calibration;
 mod film;
 mod folder;
+mod headline;
 mod json;
 mod model_file;
+mod page;
 mod picture;
 pub mod plot;
 mod remainder;
 mod schema;
+mod shown;
 mod summary;
 mod tensorboard;
 mod text;
 mod wording;
 
 pub use film::film;
-pub use folder::{WriteError, write};
+pub use folder::{ReadError, WriteError, write};
 pub use model_file::model_file;
+pub use page::page;
 pub use schema::{Report, schema};
 pub use summary::summary;
 pub use tensorboard::EventFile;

@@ -1,10 +1,10 @@
 //! The report's plots: what of an outcome goes into which chart.
 
+use super::headline::label;
 use super::plot::{
     Bar, ErrorRow, JointKind, Panel, PlotError, Role, ShapeCurve, ShapeModel, ShapePanel,
     ShapeSample, Track,
 };
-use super::text::label;
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
 use crate::closeloop::{ForceSample, Outcome, ResidualForce, Space};
 use crate::data::{Joint, Log};

@@ -4,14 +4,16 @@
 
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::by_log::{OfLogEntry, RangeEntry};
 use super::calibration::CalibrationEntry;
+use super::shown::ShownEntry;
 use crate::closeloop::{
     Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, Unexplained, Verdict,
 };
-use crate::data::{Finding as AuditFinding, Joint};
+use crate::data::{Finding as AuditFinding, Joint, Severity};
 use crate::sim::metric::TorqueError;
 
 /// The JSON schema (draft 2020-12) of [`Report`].
@@ -26,13 +28,13 @@ pub fn schema() -> Value {
 }
 
 /// Fields listed here keep their names and meaning; further fields may be added.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub struct Report {
     /// version of these names
     #[schemars(range(min = 1, max = 1))]
     pub(super) schema: u32,
     /// version of the program
-    pub(super) version: &'static str,
+    pub(super) version: String,
     pub(super) seed: u64,
     /// the command with its arguments as resolved; of a program that calls the library, what it gives
     pub(super) configuration: Value,
@@ -44,7 +46,13 @@ pub struct Report {
     pub(super) joints: usize,
     /// as the model file or a URDF calls the joints, in their order; q1, q2 .. where they have no names
     pub(super) joint_names: Vec<String>,
+    /// for each joint whether it slides (m, N) rather than turns (rad, N m)
+    pub(super) prismatic: Vec<bool>,
+    /// the quantity that logs command the joints by: `tau`, or `cmd` of a drive
+    pub(super) driven_by: String,
     pub(super) verdict: Verdict,
+    /// the answer in a sentence
+    pub(super) headline: String,
     /// why, in a sentence
     pub(super) reason: String,
     /// what the model lacks: established effects
@@ -55,13 +63,21 @@ pub struct Report {
     /// their names are not to be relied on
     pub(super) supported: Vec<EffectEntry>,
     pub(super) unexplained: UnexplainedEntry,
+    /// the declared equations in LaTeX, one a line; of a chain of bodies, their form
+    pub(super) equations: Vec<String>,
     /// parameters of the declared equations, as refitted
-    pub(super) parameters: Vec<ParameterEntry>,
+    pub(super) parameters: Vec<RefittedEntry>,
+    /// the model with effects, fitted to each training log alone; empty for a single log and for more than 32
+    pub(super) by_log: Vec<OfLogEntry>,
+    /// where the values of this rig lie from run to run; also in ranges.json
+    pub(super) ranges: Vec<RangeEntry>,
     /// values in the model file that lie outside the 95 % interval of the final fit
     pub(super) contradicted: Vec<ContradictedEntry>,
     pub(super) identifiability: IdentifiabilityEntry,
     /// how the fits ended that the errors and the verdict rest on
     pub(super) fits: FitsEntry,
+    /// speeds over which the sign of each joint's velocity is smoothed in fits and predictions, rad/s or m/s
+    pub(super) sign_widths: Vec<f64>,
     /// which errors fits lower, effects are selected by, and `error_reduction` is of
     pub(super) compared: Space,
     pub(super) error: ErrorEntry,
@@ -74,25 +90,56 @@ pub struct Report {
     pub(super) audit: Vec<AuditEntry>,
     /// sets of effects that were fitted, one list a round of the search
     pub(super) tried: Vec<Vec<TriedEntry>>,
+    /// number of candidates in each round
+    pub(super) candidates: Vec<usize>,
     /// whether the search was stopped because its time was spent (--budget)
     pub(super) stopped: bool,
     /// errors by which the residual network is used or not; null where none is trained
     pub(super) network: Option<NetworkCheck>,
     /// what the training logs could show (--calibrate); null where it was not asked for
     pub(super) calibration: Option<CalibrationEntry>,
+    pub(super) shown: ShownEntry,
     /// paths in the folder of this report
     pub(super) files: FilesEntry,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+impl Report {
+    /// What makes results wrong unless something is done about it, each with its log.
+    pub(super) fn serious(&self) -> impl Iterator<Item = (&str, &AuditFinding)> {
+        self.audit
+            .iter()
+            .flat_map(|audit| {
+                let findings = audit.findings.iter();
+                findings.map(|finding| (audit.log.as_str(), finding))
+            })
+            .filter(|(_, finding)| finding.severity == Severity::Serious)
+    }
+
+    /// A joint for people: its number, with its name where it has one.
+    pub(super) fn label(&self, joint: Joint) -> String {
+        let name = &self.joint_names[joint.index()];
+        match *name == joint.name("q") {
+            true => joint.to_string(),
+            false => format!("{joint} ({name})"),
+        }
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct EffectEntry {
     pub name: String,
     pub joint: Joint,
     /// both joints, where the effect couples two
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<Vec<Joint>>,
+    /// the name for people
+    pub title: String,
+    /// the joint or joints for people, with their names
+    pub place: String,
     /// what is added, with the names of this model's parameters; of a shift, the new value
     pub expression: String,
+    /// the same in LaTeX; null for a shift
+    pub latex: Option<String>,
     #[schemars(length(min = 1))]
     pub parameters: Vec<ParameterEntry>,
     #[schemars(range(min = 0, max = 1))]
@@ -109,7 +156,7 @@ pub(super) struct EffectEntry {
     pub not_established: Option<String>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ParameterEntry {
     pub name: String,
     /// of a parameter with one value per log: the log in which this one holds
@@ -123,31 +170,49 @@ pub(super) struct ParameterEntry {
     pub identifiable: bool,
 }
 
+/// value and ci95 are those of the final fit
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
+pub(super) struct RefittedEntry {
+    #[serde(flatten)]
+    pub fitted: ParameterEntry,
+    /// the value in the model file
+    pub declared: f64,
+    /// the value fitted without the effects
+    pub before: f64,
+}
+
 /// value and ci95 are the fitted ones
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ContradictedEntry {
     /// the value in the model file
     pub declared: f64,
+    /// how the two compare, in words
+    pub comparison: String,
     #[serde(flatten)]
     pub fitted: ParameterEntry,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct EffectName {
     pub name: String,
     pub joint: Joint,
     /// both joints, where the effect couples two
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints: Option<Vec<Joint>>,
+    /// for people, with the joint
+    pub label: String,
     /// of a parameter_shift: the parameter that has another value
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter: Option<String>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct AlternativeEntry {
     #[schemars(length(min = 1))]
     pub effects: Vec<EffectName>,
+    /// the name of the effect that the others do without, and its joint or joints, for people
+    pub title: String,
+    pub place: String,
     pub reason: String,
     /// the experiment that would tell, in a sentence
     pub experiment: String,
@@ -155,7 +220,7 @@ pub(super) struct AlternativeEntry {
     pub separation: Option<Separation>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct UnexplainedEntry {
     #[serde(flatten)]
     pub left: Unexplained,
@@ -166,7 +231,7 @@ pub(super) struct UnexplainedEntry {
 }
 
 /// the fit of the declared model, and the final one with the effects
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct FitsEntry {
     /// values that the fit of the declared parameters began with, as pairs of parameter and value, where the model
     /// diverges with those in its file; else empty
@@ -175,7 +240,7 @@ pub(super) struct FitsEntry {
     pub after: FitEntry,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct FitEntry {
     pub converged: bool,
     /// why the fit ended
@@ -190,7 +255,7 @@ pub(super) struct FitEntry {
 }
 
 /// what the logs determine of the declared parameters
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct IdentifiabilityEntry {
     /// number of parameters that are not fixed
     pub free: usize,
@@ -207,7 +272,7 @@ pub(super) struct IdentifiabilityEntry {
 }
 
 /// a sum of bodies' parameters that the logs tell
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct CombinationEntry {
     /// number of its first body, 1 next to the base
     pub body: usize,
@@ -222,7 +287,7 @@ pub(super) struct CombinationEntry {
 }
 
 /// error of the torques that the logged motion needs, on the test logs
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct TorqueEntry {
     pub as_declared: TorqueError,
     pub before: TorqueError,
@@ -231,10 +296,10 @@ pub(super) struct TorqueEntry {
     pub reduction_ci95: Option<[f64; 2]>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ErrorEntry {
     #[schemars(extend("const" = "test"))]
-    pub logs: &'static str,
+    pub logs: String,
     #[schemars(length(min = 1), extend("items" = json!({"type": "number", "exclusiveMinimum": 0})))]
     pub horizons_s: Vec<f64>,
     /// horizons that were asked for, but are longer than any stretch of the test logs
@@ -259,7 +324,15 @@ pub(super) struct ErrorEntry {
     pub integrator_step_s: f64,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+impl ErrorEntry {
+    /// Place of the middle horizon, and the horizon in s.
+    pub fn middle(&self) -> (usize, f64) {
+        let place = self.horizons_s.len() / 2;
+        (place, self.horizons_s[place])
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ContenderEntry {
     /// as given on the command line
     pub name: String,
@@ -268,7 +341,7 @@ pub(super) struct ContenderEntry {
 }
 
 /// open-loop errors; one inner list a horizon, one number a joint
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct ModelError {
     /// root mean square over all rows of all windows, rad or m
     #[schemars(length(min = 1), inner(length(min = 1), inner(range(min = 0))))]
@@ -287,8 +360,16 @@ pub(super) struct ModelError {
     pub diverged: Vec<usize>,
 }
 
+impl ModelError {
+    /// Position error of all joints together at a horizon: root of the mean over rows of the sum over joints, rad (or m).
+    pub fn of_all(&self, horizon: usize) -> f64 {
+        let squares = self.position_rmse[horizon].iter().map(|rmse| rmse * rmse);
+        squares.sum::<f64>().sqrt()
+    }
+}
+
 /// null where the fit of the force failed
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct NormEntry {
     /// of the declared model, fitted
     #[schemars(range(min = 0))]
@@ -296,16 +377,19 @@ pub(super) struct NormEntry {
     /// of the model with the effects
     #[schemars(range(min = 0))]
     pub after: Option<f64>,
+    /// why the first of them that is null was not computed
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct LogsEntry {
     pub train: Vec<LogEntry>,
     pub test: Vec<LogEntry>,
     pub split: SplitMethod,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct LogEntry {
     pub name: String,
     pub rows: usize,
@@ -319,13 +403,16 @@ pub(super) struct LogEntry {
     pub dropped_rows: usize,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct AuditEntry {
     pub log: String,
     pub findings: Vec<AuditFinding>,
+    /// the log whose motion this one has once more
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeats: Option<String>,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct TriedEntry {
     pub effects: Vec<EffectName>,
     /// relative fall of the loss on held-out stretches, from that of the set which the round began with
@@ -335,12 +422,14 @@ pub(super) struct TriedEntry {
     pub chosen: bool,
 }
 
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct FilesEntry {
-    pub model: &'static str,
-    pub report: &'static str,
-    pub checkpoint: Option<&'static str>,
-    pub plots: Vec<&'static str>,
+    pub model: String,
+    pub report: String,
+    /// the report for a browser, in one file
+    pub page: String,
+    pub checkpoint: Option<String>,
+    pub plots: Vec<String>,
 }
 
 #[cfg(test)]

@@ -2,57 +2,52 @@ use std::fmt::Write;
 
 use super::calibration::line;
 use super::remainder::proposal_line;
-use super::text::{headline, label, place, serious};
+use super::schema::{ModelError, Report, TorqueEntry};
+use super::text::serious;
 use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
-use crate::closeloop::{Outcome, Space, TorqueErrors};
+use crate::closeloop::{Space, Stage};
 use crate::data::Joint;
-use crate::sim::metric::{Assessment, Summary, summarise};
 
-/// The answer for a terminal: a few lines, and where the rest is.
-pub fn summary(outcome: &Outcome, folder: &std::path::Path) -> String {
-    let mut out = format!(
-        "{}: {}\n",
-        headline(outcome).replace("**", ""),
-        outcome.reason
-    );
-    out = serious(outcome).replace("**", "") + &out;
-    for finding in &outcome.effects.findings {
-        let name = finding.effect.title();
-        let joint = place(outcome, &finding.effect);
+/// The answer for a terminal: a few lines, and where the rest is. `seconds` is how long each stage took.
+pub fn summary(report: &Report, seconds: &[(Stage, f64)], folder: &std::path::Path) -> String {
+    let mut out = serious(report).replace("**", "");
+    let _ = writeln!(out, "{}: {}", report.headline, report.reason);
+    for effect in &report.effects {
         let _ = writeln!(
             out,
-            "  {name} on joint {joint}: {}\n    {}",
-            finding.expression,
-            values(finding).join("\n    ")
+            "  {} on joint {}: {}\n    {}",
+            effect.title,
+            effect.place,
+            effect.expression,
+            values(&effect.parameters).join("\n    ")
         );
     }
-    if let Some(proposal) = &outcome.remainder.proposal {
+    if let Some(proposal) = &report.unexplained.proposal {
         let _ = writeln!(out, "  {}", proposal_line(proposal));
     }
-    for &k in &outcome.models.identifiability.hold {
-        let name = &outcome.models.before.model.all_parameters()[k].name;
+    for name in &report.identifiability.held {
         let _ = writeln!(
             out,
             "  {name} is held, since the logs do not determine it: the other values are relative to it"
         );
     }
-    out += &match (outcome.space, &outcome.errors.torque) {
+    out += &match (report.compared, &report.torque) {
         (Space::Torque, Some(torque)) => torques(torque),
-        _ => open_loop(outcome),
+        _ => open_loop(report),
     };
-    out += &outcome.calibration.as_ref().map_or_else(String::new, line);
-    let _ = writeln!(out, "  {}", took(outcome));
+    out += &report.calibration.as_ref().map_or_else(String::new, line);
+    let _ = writeln!(out, "  {}", took(seconds));
     let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
     out
 }
 
 /// The errors of the torques, one model a line.
-fn torques(errors: &TorqueErrors) -> String {
+fn torques(errors: &TorqueEntry) -> String {
     let mut out = String::from(
         "  torques that the motion of the test logs needs, share of the logged ones that differs:\n",
     );
     let models = [
-        (AS_WRITTEN, &errors.declared),
+        (AS_WRITTEN, &errors.as_declared),
         (FITTED, &errors.before),
         (WITH_EFFECTS, &errors.after),
     ];
@@ -63,68 +58,60 @@ fn torques(errors: &TorqueErrors) -> String {
 }
 
 /// The open-loop errors, one joint and horizon a line, and those of models that were not fitted.
-fn open_loop(outcome: &Outcome) -> String {
-    let mut out = String::new();
-    let joints = outcome.models.after.model.joints;
-    let numbers = |model: &Assessment| summarise(&model.horizons, joints).position_rmse;
-    let (before, after) = (
-        numbers(&outcome.errors.before),
-        numbers(&outcome.errors.after),
-    );
-    out += "  open-loop position error on the test logs, root mean square:\n";
-    for (h, horizon) in outcome.errors.before.horizons.iter().enumerate() {
-        for joint in Joint::all(joints) {
-            let unit = if outcome.given.prismatic[joint] {
-                "m"
-            } else {
-                "rad"
-            };
-            let (before, after) = (small(before[h][joint]), small(after[h][joint]));
-            let (joint, seconds) = (label(outcome, joint), horizon.horizon_s);
+fn open_loop(report: &Report) -> String {
+    let error = &report.error;
+    let mut out = String::from("  open-loop position error on the test logs, root mean square:\n");
+    for (h, seconds) in error.horizons_s.iter().enumerate() {
+        for joint in Joint::all(report.joints) {
+            let [before, after] =
+                [&error.before, &error.after].map(|model| small(model.position_rmse[h][joint]));
+            let (joint, unit) = (report.label(joint), unit(report, joint));
             let _ = writeln!(
                 out,
                 "  joint {joint}, {seconds} s ahead: {FITTED} {before} {unit}; {WITH_EFFECTS} {after} {unit}"
             );
         }
     }
-    let declared = (AS_WRITTEN, &outcome.errors.declared);
-    let against = outcome.errors.against.iter();
-    let as_they_are = std::iter::once(declared).chain(against.map(|(name, m)| (name.as_str(), m)));
-    for (name, model) in as_they_are {
-        let _ = writeln!(out, "  {name}, no fit: {}", errors(outcome, model));
+    let declared = (AS_WRITTEN, &error.declared);
+    let against = error
+        .against
+        .iter()
+        .map(|other| (other.name.as_str(), &other.error));
+    for (name, model) in std::iter::once(declared).chain(against) {
+        let _ = writeln!(out, "  {name}, no fit: {}", errors(report, model));
     }
     out
 }
 
+fn unit(report: &Report, joint: Joint) -> &'static str {
+    match report.prismatic[joint] {
+        true => "m",
+        false => "rad",
+    }
+}
+
 /// `joint 1 0.00942, 0.157, 0.375 rad at 0.1, 0.5, 1 s`
-fn errors(outcome: &Outcome, model: &Assessment) -> String {
-    let joints = outcome.models.after.model.joints;
-    let Summary {
-        horizons_s,
-        position_rmse,
-        ..
-    } = summarise(&model.horizons, joints);
+fn errors(report: &Report, model: &ModelError) -> String {
     let list = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(", ");
     let of_joint = |joint: Joint| {
-        let unit = if outcome.given.prismatic[joint] {
-            "m"
-        } else {
-            "rad"
-        };
-        let errors = list(&mut position_rmse.iter().map(|row| small(row[joint])));
-        format!("joint {} {errors} {unit}", label(outcome, joint))
+        let errors = list(&mut model.position_rmse.iter().map(|row| small(row[joint])));
+        format!(
+            "joint {} {errors} {}",
+            report.label(joint),
+            unit(report, joint)
+        )
     };
-    let seconds = list(&mut horizons_s.iter().map(f64::to_string));
+    let seconds = list(&mut report.error.horizons_s.iter().map(f64::to_string));
     format!(
         "{} at {seconds} s",
-        list(&mut Joint::all(joints).map(of_joint))
+        list(&mut Joint::all(report.joints).map(of_joint))
     )
 }
 
 /// `took 48 s: selecting effects 31 s, scoring on the test logs 5 s`, the stages that took a tenth or more
-fn took(outcome: &Outcome) -> String {
-    let all: f64 = outcome.seconds.iter().map(|(_, seconds)| seconds).sum();
-    let long = outcome.seconds.iter().filter(|(_, s)| *s >= 0.1 * all);
+fn took(seconds: &[(Stage, f64)]) -> String {
+    let all: f64 = seconds.iter().map(|(_, seconds)| seconds).sum();
+    let long = seconds.iter().filter(|(_, s)| *s >= 0.1 * all);
     let stages: Vec<String> = long
         .map(|(stage, seconds)| format!("{} {seconds:.1} s", stage.text()))
         .collect();

@@ -2,7 +2,8 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use crate::closeloop::Finding;
+use super::schema::ParameterEntry;
+use crate::closeloop::{Finding, SplitMethod};
 use crate::model::{OwnValue, Parameter};
 
 /// The models that a report compares, by one name each in tables, plots and on the terminal.
@@ -41,29 +42,37 @@ pub(super) fn reduction(part: f64, quantity: &str) -> String {
     }
 }
 
-/// One text for each value of a finding; a value that holds in one log alone names it.
-pub(super) fn values(finding: &Finding) -> Vec<String> {
-    let row = |(parameter, log): &(Parameter, Option<&OwnValue>)| match log {
-        Some(own) => format!("{} in {}", value(parameter), own.log_name()),
+/// One text for each value of an effect; a value that holds in one log alone names it.
+pub(super) fn values(parameters: &[ParameterEntry]) -> Vec<String> {
+    let row = |parameter: &ParameterEntry| match &parameter.log {
+        Some(log) => format!("{} in {log}", value(parameter)),
         None => value(parameter),
     };
-    finding.rows().iter().map(row).collect()
+    parameters.iter().map(row).collect()
 }
 
 /// `coulomb_friction on joint 1: F_c1 = 0.1598 N m (0.1593 to 0.1603)`
 impl Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.effect.label(), values(self).join(", "))
+        let values: Vec<String> = self.rows().iter().map(own_value).collect();
+        write!(f, "{}: {}", self.effect.label(), values.join(", "))
     }
 }
 
+/// A value of a finding, with the log where it holds in one alone.
+fn own_value((parameter, own): &(Parameter, Option<&OwnValue>)) -> String {
+    let amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
+    let log = own.map_or_else(String::new, |own| format!(" in {}", own.log_name()));
+    format!("{} = {amount}{log}", parameter.name)
+}
+
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
-pub(super) fn value(parameter: &Parameter) -> String {
+pub(super) fn value(parameter: &ParameterEntry) -> String {
     format!("{} = {}", parameter.name, amount(parameter))
 }
 
 /// `0.1598 N m (0.1593 to 0.1603)`
-pub(super) fn amount(parameter: &Parameter) -> String {
+pub(super) fn amount(parameter: &ParameterEntry) -> String {
     amount_of(parameter.value, parameter.ci95, &parameter.unit)
 }
 
@@ -90,7 +99,8 @@ pub(crate) fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
     digits_of(parameter.value, parameter.ci95)
 }
 
-fn digits_of(value: f64, ci95: Option<[f64; 2]>) -> (String, Option<[String; 2]>) {
+/// The same of a number with its interval.
+pub(super) fn digits_of(value: f64, ci95: Option<[f64; 2]>) -> (String, Option<[String; 2]>) {
     let resolution = match ci95 {
         Some([low, high]) => 0.05 * (high - low),
         None => 1e-4 * value.abs(),
@@ -110,6 +120,22 @@ fn rounded(x: f64, resolution: f64) -> String {
     format!("{x:.digits$}")
 }
 
+/// How the test logs were set apart.
+pub(super) fn split(method: &SplitMethod) -> String {
+    match method {
+        SplitMethod::Given => "as given".to_owned(),
+        SplitMethod::LastLogs { count } => {
+            format!("the last {count} logs were kept for the test")
+        }
+        SplitMethod::EndOfEachLog { share, gap_s } => {
+            format!(
+                "the last {:.0} % of each log, after a gap of {gap_s} s, were kept for the test",
+                100.0 * share
+            )
+        }
+    }
+}
+
 /// A p-value.
 pub(super) fn probability(p: f64) -> String {
     if p < 1e-12 {
@@ -118,6 +144,15 @@ pub(super) fn probability(p: f64) -> String {
         format!("{p:.0e}")
     } else {
         format!("{p:.3}")
+    }
+}
+
+/// `p = 0.031`, `p < 1e-12`
+pub(super) fn p_value(p: f64) -> String {
+    let number = probability(p);
+    match number.starts_with('<') {
+        true => format!("p {number}"),
+        false => format!("p = {number}"),
     }
 }
 

@@ -1,5 +1,5 @@
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::comparison::{Comparison, Hypothesis, Trial};
 use crate::closeloop::fitted::Fitted;
@@ -9,7 +9,7 @@ use crate::closeloop::study::Study;
 use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Separation {
     /// What to do; `None` where nothing that was simulated tells them apart.
     pub experiment: Option<String>,

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::torque_noise::TorqueNoise;
 use crate::closeloop::fitted::Fitted;
@@ -17,7 +17,7 @@ use crate::data::{Audit, Joint};
 use crate::identify::Values;
 
 /// Whether the residuals of a model are more than the sensors' noise, whatever shape they have.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Omnibus {
     /// Probability of residuals so smooth in time if they were noise.
     #[schemars(range(min = 0, max = 1))]

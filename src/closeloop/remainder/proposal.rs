@@ -3,7 +3,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
@@ -13,7 +13,7 @@ use crate::data::{Joint, Quantity};
 use crate::model::{Effect, FittedEffect};
 
 /// A formula for the remainder: a proposal, not a finding. Supported only by its fit.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Proposal {
     pub joint: Joint,
     /// Force in N m (or N), such as `-0.0012 * qd1^3`.
@@ -22,7 +22,6 @@ pub struct Proposal {
     #[schemars(range(max = 1))]
     pub explains: f64,
     /// The formula as an effect file, for a folder of a library.
-    #[serde(skip)]
     pub file: String,
 }
 

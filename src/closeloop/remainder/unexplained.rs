@@ -1,7 +1,7 @@
 use rand::Rng;
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::omnibus::{Omnibus, omnibus};
 use crate::closeloop::fitted::Fitted;
@@ -13,7 +13,7 @@ use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
 /// The unexplained remainder: what the residuals hold beyond noise when no effect helps any more.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
     /// Share of the declared model's residual variance above the sensor's noise that remains.
     #[schemars(range(min = 0))]
@@ -27,7 +27,6 @@ pub struct Unexplained {
     #[serde(rename = "where")]
     pub place: String,
     /// The joint with the largest remainder.
-    #[serde(skip)]
     pub joint: Joint,
     pub omnibus: Omnibus,
     /// Flexible shapes, which name no effect.
@@ -35,12 +34,11 @@ pub struct Unexplained {
 }
 
 /// The result of one flexible probe.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Probed {
     /// The variables that it depends on.
     #[serde(rename = "where")]
     pub place: String,
-    #[serde(skip)]
     pub joint: Joint,
     /// Probability, by the cluster-robust Wald test, of such a shape where there is none.
     #[schemars(range(min = 0, max = 1))]

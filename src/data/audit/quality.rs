@@ -3,7 +3,7 @@
 use std::fmt;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::joint::JointAudit;
 use crate::data::Joint;
@@ -56,7 +56,9 @@ impl Audit {
 }
 
 /// How much a finding matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
     /// Results will be wrong or cannot be had from this log unless something is done.
@@ -68,7 +70,7 @@ pub enum Severity {
 }
 
 /// One plain sentence about a log, with its evidence, its place and what mends it.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Finding {
     /// How much it matters.
     pub severity: Severity,
@@ -76,7 +78,7 @@ pub struct Finding {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<Joint>,
     /// Where it is in the log: start and end of each stretch in s. Empty where it concerns the whole log.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spans_s: Vec<[f64; 2]>,
     /// The sentence.
     pub text: String,
@@ -85,7 +87,7 @@ pub struct Finding {
 }
 
 /// What to paste to mend what was found.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
     /// Arguments of `--leave-out`.

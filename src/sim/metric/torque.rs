@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::data::{Log, Smooth};
 use crate::lanes::Row;
@@ -13,7 +13,7 @@ use crate::sim::Commands;
 const LANES: usize = 8;
 
 /// The difference between the torques that a motion needs and those that act, over all rows of all logs.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TorqueError {
     /// Root mean square of each joint, N m (or N).
     pub rms: Vec<f64>,

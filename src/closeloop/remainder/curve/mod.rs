@@ -3,7 +3,7 @@ mod basis;
 
 use nalgebra::DVector;
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use self::additive::Additive;
 use self::basis::Basis;
@@ -13,13 +13,13 @@ use crate::data::Joint;
 use crate::identify::{BLOCK_S, stretches};
 
 /// The residual force of a joint as a smooth curve over one variable, without the shares of the other variables.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Curve {
     pub joint: Joint,
     /// `q1`, `qd1`, `tau1` or `t`.
     pub variable: String,
     /// Of the variable.
-    pub unit: &'static str,
+    pub unit: String,
     #[schemars(length(min = 2))]
     pub x: Vec<f64>,
     /// In N m (or N).
@@ -109,7 +109,7 @@ fn of_joint(
         let mut curve = Curve {
             joint,
             variable: numbered,
-            unit: variable.units[usize::from(prismatic)],
+            unit: variable.units[usize::from(prismatic)].to_owned(),
             x: Vec::new(),
             force: Vec::new(),
             low: Vec::new(),

@@ -1,0 +1,73 @@
+//! The chosen model fitted to each training log alone: on which values the logs agree, and how well what is fitted to one of them
+//! predicts the others.
+
+use std::slice::from_ref;
+
+use rayon::prelude::*;
+
+use super::fitted::Fitted;
+use super::refine::with_intervals;
+use super::score::Scorer;
+use super::study::Study;
+use crate::data::Log;
+use crate::identify::FitError;
+
+/// The chosen model, fitted to one training log alone.
+pub struct OfLog {
+    pub log: String,
+    /// With 95 % intervals.
+    pub fitted: Result<Fitted, FitError>,
+    /// The error that is compared, on each training log in their order; empty where it was not fitted or the logs are many.
+    pub errors: Vec<f64>,
+}
+
+/// More logs than this are not fitted one by one, and of more than this the errors of each on each are left out.
+const MOST_FITTED: usize = 32;
+const MOST_CROSSED: usize = 8;
+
+impl Study<'_> {
+    /// The chosen model by log; nothing for a single log.
+    pub(super) fn by_log(&self, chosen: &Fitted) -> Vec<OfLog> {
+        if !(2..=MOST_FITTED).contains(&self.logs.len()) || !self.has_time() {
+            return Vec::new();
+        }
+        let of_log = |log: &Log| {
+            let fitted = self.fitted_to(log, chosen);
+            OfLog {
+                log: log.name(),
+                errors: fitted
+                    .as_ref()
+                    .map_or_else(|_| Vec::new(), |f| self.crossed(f)),
+                fitted,
+            }
+        };
+        self.logs.par_iter().map(of_log).collect()
+    }
+
+    fn fitted_to(&self, log: &Log, chosen: &Fitted) -> Result<Fitted, FitError> {
+        let study = Study {
+            held: self.identifiability.hold.clone(),
+            ..self.on(from_ref(log))
+        };
+        let locals = study.shooting.initial_locals(0);
+        let mut fitted = study.refit(&chosen.model, locals, None)?;
+        fitted.model = with_intervals(&study, &fitted, &fitted.model);
+        Ok(fitted)
+    }
+
+    fn crossed(&self, fitted: &Fitted) -> Vec<f64> {
+        let logs = if self.logs.len() > MOST_CROSSED {
+            &[]
+        } else {
+            self.logs
+        };
+        let error = |log| {
+            let scorer = Scorer {
+                test: from_ref(log),
+                settings: &self.settings.score,
+            };
+            scorer.compared(self.space, fitted)
+        };
+        logs.iter().map(error).collect()
+    }
+}

@@ -1,0 +1,104 @@
+//! How much better: the errors on logs that were never fitted.
+
+use maud::{Markup, html};
+
+use super::Section;
+use crate::data::Joint;
+use crate::report::accuracy::{compared, position_unit, repeated, scored};
+use crate::report::schema::{Report, TorqueEntry};
+use crate::report::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small};
+
+pub(super) fn section(report: &Report) -> Section {
+    let torque = report
+        .torque
+        .as_ref()
+        .map(|torque| of_torques(report, torque));
+    let motion = of_motion(report);
+    let ordered = match report.compared {
+        crate::closeloop::Space::Motion => [Some(motion), torque],
+        crate::closeloop::Space::Torque => [torque, Some(motion)],
+    };
+    Section {
+        id: "better",
+        question: "How much better is it?",
+        answer: html! {
+            p { "All errors are on the test logs, to which nothing was fitted. \u{201c}" (FITTED) "\u{201d} has its own parameters "
+                "fitted and no effect added: the fair \u{201c}before\u{201d} of every comparison. " (compared(report)) }
+            @for table in ordered.iter().flatten() { (table) }
+        },
+    }
+}
+
+/// A share of the error before, as a bar of that length.
+fn ratio(after: f64, before: f64) -> Markup {
+    let share = after / before.max(f64::MIN_POSITIVE);
+    let width = 100.0 * share.clamp(0.0, 1.0);
+    html! { td.ratio { span.bar.worse[share > 1.0] style={ "--share:" (format!("{width:.1}%")) } { (format!("{share:.2}")) } } }
+}
+
+fn removed(interval: Option<[f64; 2]>) -> Markup {
+    html! {
+        @if let Some([low, high]) = interval {
+            p { "The effects remove " strong { (format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high)) }
+                " of the fitted declared model\u{2019}s error (95 % interval, bootstrap over parts of the test logs)." }
+        }
+    }
+}
+
+fn of_torques(report: &Report, errors: &TorqueEntry) -> Markup {
+    let models = [&errors.as_declared, &errors.before, &errors.after];
+    html! {
+        h3 { "Torques that the motion needs" }
+        p { "Root mean square of their difference from the logged ones, both low-passed, in N m (N where a joint slides)." }
+        div.table tabindex="0" { table {
+            thead { tr { th { "joint" } @for name in [AS_WRITTEN, FITTED, WITH_EFFECTS] { th { (name) } } th { "with effects / fitted" } } }
+            tbody {
+                @for joint in Joint::all(report.joints) {
+                    tr {
+                        th scope="row" { (report.label(joint)) }
+                        @for model in models { td { (small(model.rms[joint])) } }
+                        (ratio(errors.after.rms[joint], errors.before.rms[joint]))
+                    }
+                }
+                tr {
+                    th scope="row" { "all, share of the logged torques" }
+                    @for model in models { td { (format!("{:.2} %", 100.0 * model.relative)) } }
+                    (ratio(errors.after.relative, errors.before.relative))
+                }
+            }
+        } }
+        (removed(errors.reduction_ci95))
+        p { (repeated(report)) }
+    }
+}
+
+fn of_motion(report: &Report) -> Markup {
+    let error = &report.error;
+    let models = scored(report);
+    html! {
+        h3 { "Open-loop motion" }
+        p { "Root mean square of the position error, in " (position_unit(report)) "; in brackets the median over windows." }
+        div.table tabindex="0" { table {
+            thead { tr { th { "horizon" } th { "joint" } @for (name, _) in &models { th { (name) } } th { "with effects / fitted" } } }
+            tbody {
+                @for (h, horizon) in error.horizons_s.iter().enumerate() {
+                    @for joint in Joint::all(report.joints) {
+                        tr {
+                            th scope="row" { (horizon) " s" }
+                            th scope="row" { (report.label(joint)) }
+                            @for (_, model) in &models {
+                                td { (small(model.position_rmse[h][joint])) " (" (small(model.position_median[h][joint])) ")" }
+                            }
+                            (ratio(error.after.position_rmse[h][joint], error.before.position_rmse[h][joint]))
+                        }
+                    }
+                }
+            }
+        } }
+        (removed(error.reduction_ci95))
+        @for (name, model) in &models {
+            @let diverged: usize = model.diverged.iter().sum();
+            @if diverged > 0 { p { (name) ": " (diverged) " windows diverged; each counts with the error reached by then." } }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! How the report was made.
+
+use maud::{Markup, html};
+use serde::Serialize;
+
+use super::Section;
+use crate::report::schema::{LogEntry, Report};
+use crate::report::wording::split;
+
+pub(super) fn section(report: &Report) -> Section {
+    Section {
+        id: "made",
+        question: "How was it made?",
+        answer: html! {
+            p { "residyn " (report.version) ", seed " (report.seed) ". The same seed gives the same result on the same machine." }
+            p { "Test logs: " (split(&report.logs.split)) "." }
+            div.table tabindex="0" { table {
+                thead { tr { th { "log" } th { "role" } th { "rows" } th { "from, s" } th { "to, s" } th { "left out, s" } } }
+                tbody {
+                    @for log in &report.logs.train { (row(log, "fitted")) }
+                    @for log in &report.logs.test { (row(log, "test")) }
+                }
+            } }
+            details { summary { "Command and configuration" } pre tabindex="0" { (pretty(&report.configuration)) } }
+            details { summary { "Every tuning constant" } pre tabindex="0" { (pretty(&report.settings)) } }
+        },
+    }
+}
+
+fn pretty(value: &impl Serialize) -> String {
+    serde_json::to_string_pretty(value).expect("a report has only finite numbers and texts")
+}
+
+fn row(log: &LogEntry, role: &str) -> Markup {
+    let left_out: Vec<String> = (log.leave_out.iter())
+        .map(|[start, end]| format!("{start} to {end}"))
+        .collect();
+    html! {
+        tr {
+            th scope="row" { (log.name) } td { (role) } td { (log.rows) } td { (format!("{:.2}", log.start_s)) } td { (format!("{:.2}", log.end_s)) }
+            td { (left_out.join(", ")) }
+        }
+    }
+}

@@ -1,0 +1,100 @@
+"use strict";
+// Draws the pictures of the report from the data in the page.
+(() => {
+  const report = JSON.parse(document.getElementById("report").textContent);
+  const names = { measured: "measured", before: "declared model, fitted", after: "with effects", hybrid: "with effects and network" };
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+  const axis = () => ({ stroke: colour("faint"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line") }, size: 46 });
+  const options = (place, series, extra) => ({
+    width: Math.max(place.clientWidth, 200),
+    height: place.dataset.cloud === undefined ? 220 : 170,
+    series: [{}, ...series],
+    axes: [{ ...axis(), size: 32 }, axis()],
+    cursor: { drag: { x: true, y: false } },
+    legend: { show: true, live: false },
+    ...extra,
+  });
+
+  // Measured beside predicted.
+  const curves = (place) => {
+    const stretch = report.shown.stretches[place.dataset.stretch];
+    const tracks = stretch.joints[place.dataset.joint];
+    const kinds = ["measured", "before", "after", "hybrid"].filter((kind) => tracks[kind].length > 0);
+    const look = {
+      measured: { width: 4 },
+      before: { width: 1.5, dash: [6, 4] },
+      after: { width: 1.5 },
+      hybrid: { width: 2, dash: [2, 5] },
+    };
+    const series = kinds.map((kind) => ({ label: names[kind], stroke: colour(kind), points: { show: false }, ...look[kind] }));
+    return new uPlot(options(place, series, { scales: { x: { time: false } } }), [stretch.time, ...kinds.map((kind) => tracks[kind])], place);
+  };
+
+  // The mean over runs of equally many points, over the variable.
+  const mean = (x, y, runs) => {
+    const order = x.map((_, k) => k).sort((a, b) => x[a] - x[b]);
+    const average = (part, of) => part.reduce((sum, k) => sum + of[k], 0) / part.length;
+    const size = Math.max(1, Math.ceil(order.length / runs));
+    const means = [];
+    for (let k = 0; k < order.length; k += size) {
+      const part = order.slice(k, k + size);
+      means.push([average(part, x), average(part, y)]);
+    }
+    return means;
+  };
+
+  // What is left over a variable: points, and what the effects explain as the difference of the two, averaged.
+  const cloud = (place) => {
+    const data = report.shown.residuals[place.dataset.cloud];
+    const x = data[place.dataset.over];
+    const has_after = data.after.length > 0;
+    const explained = has_after ? mean(x, data.before.map((force, k) => force - data.after[k]), 24) : [];
+    const rows = x.map((value, k) => [value, data.before[k], has_after ? data.after[k] : null, null]);
+    rows.push(...explained.map(([value, force]) => [value, null, null, force]));
+    rows.sort((a, b) => a[0] - b[0]);
+    const columns = [0, 1, 2, 3].map((k) => rows.map((row) => row[k]));
+    const points = (kind) => ({ label: names[kind], stroke: colour(kind), paths: () => null, points: { show: true, size: 4, fill: colour(kind) } });
+    const line = { label: "explained by the effects", stroke: colour("ink"), width: 2, spanGaps: true, points: { show: false } };
+    return new uPlot(options(place, [points("before"), points("after"), line], { scales: { x: { time: false } } }), columns, place);
+  };
+
+  // Zoom by keys: uPlot knows the mouse.
+  const keys = (place, plot, event) => {
+    const { min, max } = plot.scales.x;
+    const [first, last] = [plot.data[0][0], plot.data[0][plot.data[0].length - 1]];
+    const width = max - min;
+    const to = {
+      "+": [min + width / 4, max - width / 4],
+      "-": [Math.max(first, min - width / 2), Math.min(last, max + width / 2)],
+      ArrowLeft: [min - width / 4, max - width / 4],
+      ArrowRight: [min + width / 4, max + width / 4],
+      0: [first, last],
+    }[event.key];
+    if (!to) return;
+    event.preventDefault();
+    plot.setScale("x", { min: to[0], max: to[1] });
+  };
+
+  const drawn = new Map();
+  const draw = (place) => {
+    if (place.clientWidth === 0) return;
+    drawn.get(place)?.destroy();
+    drawn.set(place, place.dataset.stretch === undefined ? cloud(place) : curves(place));
+  };
+  const places = [...document.querySelectorAll(".plot")];
+  const redraw = () => places.forEach(draw);
+  for (const place of places) {
+    draw(place);
+    place.addEventListener("keydown", (event) => drawn.has(place) && keys(place, drawn.get(place), event));
+  }
+  for (const details of document.querySelectorAll("details")) {
+    details.addEventListener("toggle", () => details.querySelectorAll(".plot").forEach((place) => drawn.has(place) || draw(place)));
+  }
+  let waiting;
+  addEventListener("resize", () => {
+    clearTimeout(waiting);
+    waiting = setTimeout(redraw, 150);
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  matchMedia("print").addEventListener("change", redraw);
+})();

@@ -1,0 +1,61 @@
+//! Pictures: places that the script fills from the data in the page.
+
+use maud::{Markup, html};
+
+use super::Section;
+use crate::report::schema::Report;
+use crate::report::shown::{CloudEntry, StretchEntry};
+
+pub(super) fn section(report: &Report) -> Section {
+    let shown = &report.shown;
+    Section {
+        id: "show",
+        question: "Show me",
+        answer: html! {
+            p.small.screen { "Drag over a curve to zoom in, double-click to see all of it; on the keyboard + and \u{2212} zoom, "
+                "arrows move, 0 shows all." }
+            @for (k, stretch) in shown.stretches.iter().enumerate() { (curves(k, stretch)) }
+            @if !shown.residuals.is_empty() {
+                h3 { "Residual force: what each model leaves unexplained" }
+                @for (k, cloud) in shown.residuals.iter().enumerate() { (clouds(report, k, cloud)) }
+            }
+        },
+    }
+}
+
+fn curves(k: usize, stretch: &StretchEntry) -> Markup {
+    html! {
+        details open[k < 3] {
+            summary { (stretch.about) " (" (stretch.log) ")" }
+            div.plots {
+                @for (j, tracks) in stretch.joints.iter().enumerate() {
+                    figure {
+                        figcaption { (tracks.quantity) }
+                        div.plot tabindex="0" role="img" aria-label=(tracks.quantity) data-stretch=(k) data-joint=(j) {}
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn clouds(report: &Report, k: usize, cloud: &CloudEntry) -> Markup {
+    let number = cloud.joint;
+    let axes = [
+        ("q", format!("q{number}, {}", cloud.units[0])),
+        ("qd", format!("qd{number}, {}", cloud.units[1])),
+        ("tau", format!("tau{number}, {}", cloud.units[2])),
+        ("time", "time, s".to_owned()),
+    ];
+    html! {
+        h4 { "Joint " (report.label(number)) }
+        div.plots.small-plots {
+            @for (key, axis) in axes {
+                figure {
+                    figcaption { "force, " (cloud.units[2]) ", over " (axis) }
+                    div.plot tabindex="0" role="img" aria-label={ "residual force over " (axis) } data-cloud=(k) data-over=(key) {}
+                }
+            }
+        }
+    }
+}
