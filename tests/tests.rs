@@ -22,6 +22,7 @@ mod front_door;
 mod functions;
 mod gradients;
 mod identify;
+mod log_formats;
 mod logs;
 mod measured;
 mod mechanism;

@@ -1,11 +1,33 @@
 //! What can be wrong with a log file, in words that let its owner repair it.
 
+use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
 use thiserror::Error;
 
 use crate::files::OutputError;
+
+/// Where in a file something is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Of a text, from 1 as an editor counts.
+    Line(usize),
+    /// Of a table without lines, from 1.
+    Row(usize),
+    /// The names of a file's arrays.
+    Arrays,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Row(row) => write!(f, "row {row}"),
+            Self::Arrays => f.write_str("arrays"),
+        }
+    }
+}
 
 /// Why a log could not be read or written.
 ///
@@ -32,6 +54,14 @@ pub enum LogError {
         /// Line of the first byte that is not text.
         line: usize,
     },
+    /// The file is not of the form that its beginning promises.
+    #[error("{path}: {fault}")]
+    Form {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        fault: String,
+    },
     /// There is nothing in the file.
     #[error("{path}: is empty; a log begins with a header such as time,q1,qd1,tau1")]
     Empty {
@@ -40,27 +70,14 @@ pub enum LogError {
     },
     /// The first line holds numbers.
     #[error(
-        "{path}, line {line}: has numbers where the header should be; put column names \
+        "{path}, {place}: has numbers where the header should be; put column names \
          such as time,q1,qd1,tau1 above them"
     )]
     NoHeader {
         /// The file.
         path: PathBuf,
-        /// Line where the header was expected.
-        line: usize,
-    },
-    /// The columns are not separated by commas.
-    #[error(
-        "{path}, line {line}: the columns seem to be separated by {separator:?}; \
-         separate them by commas and write decimal points"
-    )]
-    Separator {
-        /// The file.
-        path: PathBuf,
-        /// Line of the header.
-        line: usize,
-        /// What seems to separate the columns.
-        separator: char,
+        /// Where the header was expected.
+        place: Place,
     },
     /// There are too few rows below the header.
     #[error("{path}: has {rows} row(s) of numbers below its header; a log needs at least two")]
@@ -71,37 +88,37 @@ pub enum LogError {
         rows: usize,
     },
     /// A column that the model needs is not in the header.
-    #[error("{path}, line {line}: there is no column {column:?}; {remedy}")]
+    #[error("{path}, {place}: there is no column {column:?}; {remedy}")]
     MissingColumn {
         /// The file.
         path: PathBuf,
-        /// Line of the header.
-        line: usize,
+        /// Where the header is.
+        place: Place,
         /// The name looked for.
         column: String,
         /// The nearest name, or all names, and how to map them.
         remedy: String,
     },
     /// A column that the model needs is in the header more than once.
-    #[error("{path}, line {line}: column {column:?} occurs more than once; rename or delete one")]
+    #[error("{path}, {place}: column {column:?} occurs more than once; rename or delete one")]
     DuplicateColumn {
         /// The file.
         path: PathBuf,
-        /// Line of the header.
-        line: usize,
+        /// Where the header is.
+        place: Place,
         /// The name.
         column: String,
     },
     /// The log and the model have different numbers of joints.
     #[error(
-        "{path}, line {line}: the header has {header} joint(s) (q1 to q{header}) but the model has \
+        "{path}, {place}: the header has {header} joint(s) (q1 to q{header}) but the model has \
          {model}; use the model of this rig, or choose columns under [columns] in the model file"
     )]
     JointCount {
         /// The file.
         path: PathBuf,
-        /// Line of the header.
-        line: usize,
+        /// Where the header is.
+        place: Place,
         /// Joints in the header.
         header: usize,
         /// Joints of the model.
@@ -124,26 +141,26 @@ pub enum LogError {
     },
     /// A row has more or fewer cells than the header.
     #[error(
-        "{path}, line {line}: has {found} cell(s) where the header has {expected}; give every row one \
+        "{path}, {place}: has {found} cell(s) where the header has {expected}; give every row one \
          cell for each column (with decimal points, not commas)"
     )]
     Width {
         /// The file.
         path: PathBuf,
-        /// The row's line.
-        line: usize,
+        /// Where the row is.
+        place: Place,
         /// Cells in the row.
         found: usize,
         /// Cells in the header.
         expected: usize,
     },
     /// A cell does not hold a usable number.
-    #[error("{path}, line {line}, column {column:?}: {fault}")]
+    #[error("{path}, {place}, column {column:?}: {fault}")]
     Cell {
         /// The file.
         path: PathBuf,
-        /// The cell's line.
-        line: usize,
+        /// Where the cell is.
+        place: Place,
         /// The cell's column, as the header names it.
         column: String,
         /// What is wrong with it.
@@ -165,7 +182,7 @@ pub enum CellFault {
     NotFinite(String),
     /// A time that is not later than the one before.
     #[error(
-        "time {time} s does not come after {previous} s of line {previous_line}; sort the rows, \
+        "time {time} s does not come after {previous} s of {previous_place}; sort the rows, \
          drop repeated ones, or cut the file into one log per run"
     )]
     NotLater {
@@ -173,7 +190,7 @@ pub enum CellFault {
         time: f64,
         /// The previous row's time \[s\].
         previous: f64,
-        /// The previous row's line.
-        previous_line: usize,
+        /// Where the previous row is.
+        previous_place: Place,
     },
 }

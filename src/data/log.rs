@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::column::Quantity;
 use super::columns::Columns;
-use super::error::{CellFault, LogError};
+use super::error::{CellFault, LogError, Place};
 use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
 use super::statistics::median;
@@ -183,7 +183,7 @@ impl Log {
                 return Err(LogError::Cell {
                     path: path.to_owned(),
                     // The header is line 1.
-                    line: row + 2,
+                    place: Place::Line(row + 2),
                     column: column.name.clone(),
                     fault: CellFault::NotFinite(values[row].to_string()),
                 });

@@ -25,6 +25,7 @@ mod read;
 mod signal;
 mod smooth;
 pub(crate) mod statistics;
+mod table;
 mod trajectory;
 
 pub use audit::{
@@ -33,7 +34,7 @@ pub use audit::{
 };
 pub use column::{Column, Quantity};
 pub use columns::Columns;
-pub use error::{CellFault, LogError};
+pub use error::{CellFault, LogError, Place};
 pub use joint::Joint;
 pub use leave_out::{LeaveOut, LeaveOutError};
 pub use local_cubic::{LocalCubic, half_width_s, local_cubic};

@@ -1,218 +1,112 @@
-//! Reading a log from CSV text.
-//!
-//! Accepted silently: a byte order mark, CRLF line ends, spaces around cells, quoted cells and
-//! blank lines. Everything else that is not a complete table of finite numbers is an error.
+//! Reading a log from the table that a file holds.
 
 use std::f64::consts::TAU;
-use std::fs;
 use std::path::Path;
-
-use csv::{ReaderBuilder, StringRecord};
 
 use super::column::unwrap;
 use super::columns::{Cell, Columns, Header, Layout};
 use super::error::{CellFault, LogError};
 use super::local_cubic::slopes;
 use super::log::Log;
+use super::table::{Table, open};
 
 impl Log {
-    /// Reads one trajectory of a rig with `joints` joints from a CSV file.
+    /// Reads one trajectory of a rig with `joints` joints from a file of any format that is read.
     ///
     /// Columns may stand in any order. Columns that nothing asks for are ignored, and a note names
     /// them. A file without any torque column is the log of a passive rig: its torques are zero, and
     /// a note says so. Without any velocity column, velocities are the slopes of cubics fitted to the angles.
     ///
     /// # Errors
-    /// A [`LogError`] that names file, line, column, fault and remedy, for anything that is not a
+    /// A [`LogError`] that names file, place, column, fault and remedy, for anything that is not a
     /// table of finite numbers with strictly increasing time and the asked number of joints.
     pub fn read(path: impl AsRef<Path>, joints: usize, columns: &Columns) -> Result<Log, LogError> {
         let path = path.as_ref();
-        let text = &text_of(path)?;
-        Table { path, text }.log(joints, columns)
+        log(path, open(path)?.as_ref(), joints, columns)
     }
 
-    /// Reads a CSV file with the standard columns, of as many joints as its header has.
+    /// Reads a file with the standard columns, of as many joints as its header has.
     ///
     /// # Errors
     /// As [`Log::read`].
     pub fn read_standard(path: impl AsRef<Path>) -> Result<Log, LogError> {
         let path = path.as_ref();
-        let text = &text_of(path)?;
-        let table = Table { path, text };
-        let joints = table.rows()?.first().map_or(0, Row::joints);
+        let table = open(path)?;
+        let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
+        let joints = (1..).take_while(has).count();
         // A header of no joint lacks the first.
-        table.log(joints.max(1), &Columns::default())
+        log(path, table.as_ref(), joints.max(1), &Columns::default())
     }
 }
 
-/// The text of a file, without a byte order mark.
-fn text_of(path: &Path) -> Result<String, LogError> {
-    let bytes = fs::read(path).map_err(|why| LogError::Open {
-        path: path.to_owned(),
-        why,
-    })?;
-    let text = std::str::from_utf8(&bytes).map_err(|error| LogError::NotUtf8 {
-        path: path.to_owned(),
-        line: line_at(&bytes, error.valid_up_to()),
-    })?;
-    Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned())
-}
-
-/// The text of a log and its path.
-struct Table<'a> {
-    path: &'a Path,
-    text: &'a str,
-}
-
-impl Table<'_> {
-    fn log(&self, joints: usize, columns: &Columns) -> Result<Log, LogError> {
-        let mut rows = self.rows()?.into_iter();
-        let path = self.path.to_owned();
-        let Some(first) = rows.next() else {
-            return Err(LogError::Empty { path });
+/// The log that the table of a file is.
+pub(super) fn log(
+    path: &Path,
+    table: &dyn Table,
+    joints: usize,
+    columns: &Columns,
+) -> Result<Log, LogError> {
+    let header = Header {
+        path,
+        place: table.head(),
+        names: table.names().to_vec(),
+    };
+    let layout = header.layout(joints, columns)?;
+    let rows = table.rows();
+    let path = path.to_owned();
+    if rows < 2 {
+        return Err(LogError::TooFewRows { path, rows });
+    }
+    table.check()?;
+    let fault = |row: usize, column: usize, fault: CellFault| LogError::Cell {
+        path: path.clone(),
+        place: table.place(row),
+        column: header.names[column].clone(),
+        fault,
+    };
+    let column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
+        let number = |row: usize| {
+            let found = table.number(row, cell.index);
+            let found = found.map_err(|why| fault(row, cell.index, why))?;
+            Ok(cell.scale * found)
         };
-        let header = Header {
-            path: self.path,
-            line: first.line(),
-            names: first.names(),
+        (0..rows).map(number).collect()
+    };
+    let channel = |cells: &[Cell]| cells.iter().map(column).collect::<Result<Vec<_>, _>>();
+    let time = column(&layout.time)?;
+    if let Some(previous) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        let late = CellFault::NotLater {
+            time: time[previous + 1],
+            previous: time[previous],
+            previous_place: table.place(previous),
         };
-        let layout = header.layout(joints, columns)?;
-        let rows: Vec<Row> = rows.collect();
-        if rows.len() < 2 {
-            let rows = rows.len();
-            return Err(LogError::TooFewRows { path, rows });
-        }
-        rows.iter().try_for_each(|row| row.check_width(&header))?;
-        let column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
-            let number = |row: &Row| Ok(cell.scale * row.number(&header, cell.index)?);
-            rows.iter().map(number).collect()
-        };
-        let channel = |cells: &[Cell]| cells.iter().map(column).collect::<Result<Vec<_>, _>>();
-        let time = column(&layout.time)?;
-        check_time(&rows, &time, &header.names[layout.time.index])?;
-        let (mut q, mut notes) = (channel(&layout.q)?, notes(&layout));
-        for (angles, cell) in q.iter_mut().zip(&layout.q).filter(|(_, cell)| cell.wrapped) {
-            let (name, passed) = (&header.names[cell.index], unwrap(angles, TAU));
-            notes.push(format!(
-                "{name} passes the end of its turn {passed} times: full turns are counted"
-            ));
-        }
-        Ok(Log {
-            path,
-            qd: match &layout.qd {
-                Some(qd) => channel(qd)?,
-                None => q.iter().map(|q| slopes(&time, q)).collect(),
-            },
-            tau: match &layout.tau {
-                Some(tau) => channel(tau)?,
-                None => vec![vec![0.0; time.len()]; joints],
-            },
-            driven_by: columns.driven_by,
-            masked: vec![vec![]; joints],
-            filled: vec![],
-            q,
-            time,
-            leave_out: vec![],
-            notes,
-        })
+        return Err(fault(previous + 1, layout.time.index, late));
     }
-
-    /// All rows that are not blank, the header first.
-    fn rows(&self) -> Result<Vec<Row<'_>>, LogError> {
-        let mut reader = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .from_reader(self.text.as_bytes());
-        let mut rows = vec![];
-        for record in reader.records() {
-            let record = record.map_err(|why| LogError::Open {
-                path: self.path.to_owned(),
-                why: why.into(),
-            })?;
-            let blank = record.len() == 1 && bare(&record[0]).is_empty();
-            if !blank {
-                rows.push(Row {
-                    table: self,
-                    record,
-                });
-            }
-        }
-        Ok(rows)
+    let (mut q, mut notes) = (channel(&layout.q)?, notes(&layout));
+    for (angles, cell) in q.iter_mut().zip(&layout.q).filter(|(_, cell)| cell.wrapped) {
+        let (name, passed) = (&header.names[cell.index], unwrap(angles, TAU));
+        notes.push(format!(
+            "{name} passes the end of its turn {passed} times: full turns are counted"
+        ));
     }
-}
-
-/// One row of a table.
-struct Row<'a> {
-    table: &'a Table<'a>,
-    record: StringRecord,
-}
-
-impl Row<'_> {
-    /// The row's line, counted from 1. Found by counting, as only errors ask for it; the reader's own
-    /// count is behind by one after a CRLF or a blank line.
-    fn line(&self) -> usize {
-        let bytes = self.table.text.as_bytes();
-        let after_previous = self
-            .record
-            .position()
-            .map_or(0, |place| place.byte() as usize);
-        let line_ends = bytes[after_previous..]
-            .iter()
-            .take_while(|byte| matches!(byte, b'\r' | b'\n'));
-        line_at(bytes, after_previous + line_ends.count())
-    }
-
-    /// The cells as column names.
-    fn names(&self) -> Vec<String> {
-        let cells = self.record.iter();
-        cells.map(|cell| bare(cell).to_owned()).collect()
-    }
-
-    /// How many joints have an angle, as a header: `q1`, `q2` and so on.
-    fn joints(&self) -> usize {
-        let names = self.names();
-        let has = |joint: &usize| names.contains(&format!("q{joint}"));
-        (1..).take_while(has).count()
-    }
-
-    fn check_width(&self, header: &Header) -> Result<(), LogError> {
-        if self.record.len() == header.names.len() {
-            return Ok(());
-        }
-        Err(LogError::Width {
-            path: self.table.path.to_owned(),
-            line: self.line(),
-            found: self.record.len(),
-            expected: header.names.len(),
-        })
-    }
-
-    fn number(&self, header: &Header, index: usize) -> Result<f64, LogError> {
-        number(bare(&self.record[index])).map_err(|fault| self.fault(&header.names[index], fault))
-    }
-
-    fn fault(&self, column: &str, fault: CellFault) -> LogError {
-        LogError::Cell {
-            path: self.table.path.to_owned(),
-            line: self.line(),
-            column: column.to_owned(),
-            fault,
-        }
-    }
-}
-
-fn check_time(rows: &[Row], time: &[f64], column: &str) -> Result<(), LogError> {
-    match time.windows(2).position(|pair| pair[1] <= pair[0]) {
-        None => Ok(()),
-        Some(previous) => Err(rows[previous + 1].fault(
-            column,
-            CellFault::NotLater {
-                time: time[previous + 1],
-                previous: time[previous],
-                previous_line: rows[previous].line(),
-            },
-        )),
-    }
+    Ok(Log {
+        qd: match &layout.qd {
+            Some(qd) => channel(qd)?,
+            None => q.iter().map(|q| slopes(&time, q)).collect(),
+        },
+        tau: match &layout.tau {
+            Some(tau) => channel(tau)?,
+            None => vec![vec![0.0; time.len()]; joints],
+        },
+        driven_by: columns.driven_by,
+        masked: vec![vec![]; joints],
+        filled: vec![],
+        q,
+        time,
+        leave_out: vec![],
+        notes,
+        path,
+    })
 }
 
 fn notes(layout: &Layout) -> Vec<String> {
@@ -236,42 +130,21 @@ fn notes(layout: &Layout) -> Vec<String> {
     notes
 }
 
-/// A cell without the spaces around it, and without quotes that stand behind such spaces, where CSV
-/// itself does not take them for quotes.
-fn bare(cell: &str) -> &str {
-    cell.trim().trim_matches('"').trim()
-}
-
-fn number(cell: &str) -> Result<f64, CellFault> {
-    // The beginning of a long cell is enough to recognise it.
-    let shown = || cell.chars().take(40).collect::<String>();
-    match cell.parse::<f64>() {
-        _ if cell.is_empty() => Err(CellFault::Empty),
-        Err(_) => Err(CellFault::NotANumber(shown())),
-        Ok(value) if !value.is_finite() => Err(CellFault::NotFinite(shown())),
-        Ok(value) => Ok(value),
-    }
-}
-
-/// Line of a byte, counted from 1; LF, CRLF and a lone CR each end a line.
-fn line_at(bytes: &[u8], offset: usize) -> usize {
-    let before = &bytes[..offset];
-    let ends_line = |&index: &usize| match before[index] {
-        b'\n' => true,
-        b'\r' => bytes.get(index + 1) != Some(&b'\n'),
-        _ => false,
-    };
-    1 + (0..before.len()).filter(ends_line).count()
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::column::Column;
+    use super::super::table::Csv;
     use super::*;
 
     fn read(text: &str, joints: usize) -> Result<Log, LogError> {
+        read_as(text, joints, &Columns::default())
+    }
+
+    fn read_as(text: &str, joints: usize, columns: &Columns) -> Result<Log, LogError> {
         let path = Path::new("rig.csv");
-        Table { path, text }.log(joints, &Columns::default())
+        log(path, &Csv::of(path, text.to_owned())?, joints, columns)
     }
 
     fn message(text: &str) -> String {
@@ -333,11 +206,8 @@ mod tests {
             }],
             ..Columns::default()
         };
-        let (path, text) = (
-            Path::new("rig.csv"),
-            "time,q1,qd1,tau1\n0,170,1,5\n1e4,-170,1,6\n",
-        );
-        let log = Table { path, text }.log(1, &columns).unwrap();
+        let text = "time,q1,qd1,tau1\n0,170,1,5\n1e4,-170,1,6\n";
+        let log = read_as(text, 1, &columns).unwrap();
         assert!((log.time[1] - 0.01).abs() < 1e-15);
         assert!((log.q[0][1].to_degrees() - 190.0).abs() < 1e-9);
         assert_eq!((log.qd[0][1], log.tau[0][1]), (1.0, -12.0));
@@ -393,10 +263,16 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_counted_as_an_editor_does() {
-        assert_eq!(line_at(b"a\r\nb\nc\rd", 0), 1);
-        assert_eq!(line_at(b"a\r\nb\nc\rd", 3), 2);
-        assert_eq!(line_at(b"a\r\nb\nc\rd", 5), 3);
-        assert_eq!(line_at(b"a\r\nb\nc\rd", 7), 4);
+    fn other_separators_and_decimal_commas_are_found() {
+        for text in [
+            "time;q1;qd1;tau1\n0;1,5;2;3\n0,1;4;5;6\n",
+            "time\tq1\tqd1\ttau1\n0\t1,5\t2\t3\n0,1\t4\t5\t6\n",
+            "time|q1|qd1|tau1\n0|1.5|2|3\n0.1|4|5|6\n",
+        ] {
+            let log = read(text, 1).unwrap();
+            assert_eq!((log.time[1], log.q[0][0]), (0.1, 1.5), "{text}");
+        }
+        let both = message("time;q1;qd1;tau1\n0;1.234,5;2;3\n1;1;1;1\n");
+        assert!(both.contains("\"1.234,5\" is not a number"), "{both}");
     }
 }
