@@ -6,7 +6,7 @@ use std::path::Path;
 use super::verify::Client;
 use super::{ExportError, ExportModel, File, Format};
 use crate::expr::latex_name;
-use crate::model::{Angles, Entry, FittedEffect, MlpWeights, Parameter, ResidualOn};
+use crate::model::{Angles, MlpWeights, Parameter, ResidualOn};
 use crate::report::digits;
 
 pub(super) const FORMAT: Format = Format {
@@ -100,33 +100,11 @@ fn effects(out: &mut String, model: &ExportModel) {
             "\\item {} on joint {}, {}: ${}$",
             sentence(&carried.name.replace('_', " ")),
             carried.joint,
-            place(effect),
+            effect.enters(|name| format!("${}$", latex_name(name))),
             effect.latex(&carried.parameters, model.system.driven_by())
         );
     }
     *out += "\\end{itemize}\n\n";
-}
-
-/// How an effect enters the equations.
-fn place(effect: &FittedEffect) -> String {
-    let of_joint = |stem: &str| format!("${}$", latex_name(&effect.joint.name(stem)));
-    match &effect.effect.entry {
-        Entry::Force(_) => format!("added to {}", of_joint("tau")),
-        Entry::Torque(_) => format!("in place of {}", of_joint("tau")),
-        Entry::Angle(_) => format!("in place of {}", of_joint("q")),
-        Entry::Payload(_) => "a mass on the last body".to_owned(),
-        Entry::Coupling(_) => {
-            let next = latex_name(&effect.joint.next().name("tau"));
-            format!(
-                "added to {}, and times the ratio to ${next}$",
-                of_joint("tau")
-            )
-        }
-        Entry::Inertia(_) => "added to the joint's own entry of the mass matrix".to_owned(),
-        Entry::Shift(..) => "added to a parameter".to_owned(),
-        Entry::Command(_) => format!("between the command and {}", of_joint("tau")),
-        Entry::Reading(_) => format!("what the sensor shows for {}", of_joint("q")),
-    }
 }
 
 fn parameters(out: &mut String, parameters: &[Parameter]) {

@@ -1,4 +1,5 @@
 use super::drive::Drive;
+use super::effect::Entry;
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use super::system::{Model, Motion};
@@ -80,6 +81,28 @@ impl FittedEffect {
                 let driven = latex_name(&self.joint.name(driven_by.key()));
                 filter.latex(&driven, &latex_name(&names[0]))
             }
+        }
+    }
+}
+
+impl FittedEffect {
+    /// How it enters the equations, in words; `typeset` says how a quantity such as `tau1` is written.
+    pub fn enters(&self, typeset: impl Fn(&str) -> String) -> String {
+        let of_joint = |stem: &str| typeset(&self.joint.name(stem));
+        match &self.effect.entry {
+            Entry::Force(_) => format!("added to {}", of_joint("tau")),
+            Entry::Torque(_) => format!("in place of {}", of_joint("tau")),
+            Entry::Angle(_) => format!("in place of {}", of_joint("q")),
+            Entry::Payload(_) => "a mass on the last body".to_owned(),
+            Entry::Coupling(_) => format!(
+                "added to {}, and times the ratio to {}",
+                of_joint("tau"),
+                typeset(&self.joint.next().name("tau"))
+            ),
+            Entry::Inertia(_) => "added to the joint's own entry of the mass matrix".to_owned(),
+            Entry::Shift(..) => "added to a parameter".to_owned(),
+            Entry::Command(_) => format!("between the command and {}", of_joint("tau")),
+            Entry::Reading(_) => format!("what the sensor shows for {}", of_joint("q")),
         }
     }
 }

@@ -127,6 +127,7 @@ fn effect(outcome: &Outcome, finding: &Finding) -> EffectEntry {
         expression: finding.expression.clone(),
         latex: (finding.effect.shifted().is_none())
             .then(|| finding.effect.latex(&names, driven_by)),
+        enters: finding.effect.enters(str::to_owned),
         parameters: finding.rows().iter().map(row).collect(),
         p_value: finding.p_value,
         error_reduction: finding.error_reduction.as_ref().ok().copied(),

@@ -138,8 +138,10 @@ pub(super) struct EffectEntry {
     pub place: String,
     /// what is added, with the names of this model's parameters; of a shift, the new value
     pub expression: String,
-    /// the same in LaTeX; null for a shift
+    /// the expression in LaTeX; null for a shift
     pub latex: Option<String>,
+    /// how it enters the equations
+    pub enters: String,
     #[schemars(length(min = 1))]
     pub parameters: Vec<ParameterEntry>,
     #[schemars(range(min = 0, max = 1))]

@@ -31,6 +31,7 @@ fn card(report: &Report, effect: &EffectEntry) -> Markup {
         article.card {
             h3 { (effect.title) " on joint " (effect.place) }
             (added(effect))
+            p.small { (effect.enters) }
             ul { @for parameter in &effect.parameters { li { (value(parameter)) } } }
             p.small {
                 (p_value(effect.p_value)) ". "
@@ -83,7 +84,7 @@ fn equations(report: &Report) -> Markup {
         h3 { "The equations" }
         @for line in &report.equations { (formula(line)) }
         @for effect in report.effects.iter().filter(|effect| effect.latex.is_some()) {
-            div.new { span.small { "new: " (effect.title) " on joint " (effect.place) } (added(effect)) }
+            div.new { span.small { "new, " (effect.enters) ": " (effect.title) " on joint " (effect.place) } (added(effect)) }
         }
     }
 }

@@ -4,7 +4,9 @@
   const report = JSON.parse(document.getElementById("report").textContent);
   const names = { measured: "measured", before: "declared model, fitted", after: "with effects", hybrid: "with effects and network" };
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
-  const axis = () => ({ stroke: colour("faint"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line") }, size: 46 });
+  // Room for the longest number beside an axis.
+  const room = (plot, values) => 22 + 7.5 * Math.max(2, ...(values ?? []).map((value) => value.length));
+  const axis = () => ({ stroke: colour("faint"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line") }, size: room });
   const options = (place, series, extra) => ({
     width: Math.max(place.clientWidth, 200),
     height: place.dataset.cloud === undefined ? 220 : 170,
@@ -43,19 +45,26 @@
     return means;
   };
 
-  // What is left over a variable: points, and what the effects explain as the difference of the two, averaged.
+  // What is left over a variable: points, what the effects explain as the difference of the two, averaged, and the band in which
+  // the mean of what they leave lies.
   const cloud = (place) => {
     const data = report.shown.residuals[place.dataset.cloud];
     const x = data[place.dataset.over];
     const has_after = data.after.length > 0;
     const explained = has_after ? mean(x, data.before.map((force, k) => force - data.after[k]), 24) : [];
-    const rows = x.map((value, k) => [value, data.before[k], has_after ? data.after[k] : null, null]);
-    rows.push(...explained.map(([value, force]) => [value, null, null, force]));
+    const variable = place.dataset.over === "time" ? "t" : place.dataset.over + data.joint;
+    const band = report.unexplained.curves.find((curve) => curve.joint === data.joint && curve.variable === variable);
+    const rows = x.map((value, k) => [value, data.before[k], has_after ? data.after[k] : null, null, null, null]);
+    rows.push(...explained.map(([value, force]) => [value, null, null, force, null, null]));
+    if (band) rows.push(...band.x.map((value, k) => [value, null, null, null, band.high[k], band.low[k]]));
     rows.sort((a, b) => a[0] - b[0]);
-    const columns = [0, 1, 2, 3].map((k) => rows.map((row) => row[k]));
+    const columns = [0, 1, 2, 3, 4, 5].map((k) => rows.map((row) => row[k]));
     const points = (kind) => ({ label: names[kind], stroke: colour(kind), paths: () => null, points: { show: true, size: 4, fill: colour(kind) } });
     const line = { label: "explained by the effects", stroke: colour("ink"), width: 2, spanGaps: true, points: { show: false } };
-    return new uPlot(options(place, [points("before"), points("after"), line], { scales: { x: { time: false } } }), columns, place);
+    const end = (label) => ({ label, stroke: colour("after"), width: 0.5, spanGaps: true, points: { show: false } });
+    const series = [points("before"), points("after"), line, end("95 % band of what is left"), end("")];
+    const bands = [{ series: [4, 5], fill: colour("after") + "33" }];
+    return new uPlot(options(place, series, { bands, scales: { x: { time: false } } }), columns, place);
   };
 
   // Zoom by keys: uPlot knows the mouse.

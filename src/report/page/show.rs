@@ -42,15 +42,21 @@ fn curves(k: usize, stretch: &StretchEntry) -> Markup {
 fn clouds(report: &Report, k: usize, cloud: &CloudEntry) -> Markup {
     let number = cloud.joint;
     let axes = [
-        ("q", format!("q{number}, {}", cloud.units[0])),
-        ("qd", format!("qd{number}, {}", cloud.units[1])),
-        ("tau", format!("tau{number}, {}", cloud.units[2])),
-        ("time", "time, s".to_owned()),
+        ("q", &cloud.q, format!("q{number}, {}", cloud.units[0])),
+        ("qd", &cloud.qd, format!("qd{number}, {}", cloud.units[1])),
+        (
+            "tau",
+            &cloud.tau,
+            format!("tau{number}, {}", cloud.units[2]),
+        ),
+        ("time", &cloud.time, "time, s".to_owned()),
     ];
+    // Over what never changes there is nothing to see.
+    let varies = |values: &[f64]| values.iter().any(|value| *value != values[0]);
     html! {
         h4 { "Joint " (report.label(number)) }
         div.plots.small-plots {
-            @for (key, axis) in axes {
+            @for (key, _, axis) in axes.iter().filter(|(_, values, _)| varies(values)) {
                 figure {
                     figcaption { "force, " (cloud.units[2]) ", over " (axis) }
                     div.plot tabindex="0" role="img" aria-label={ "residual force over " (axis) } data-cloud=(k) data-over=(key) {}
