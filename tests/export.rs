@@ -281,21 +281,27 @@ fn a_refused_export_writes_nothing() {
     let same = export(&["--model", "pendulum", "--format", "safetensors"]);
     assert!(same.contains("both would be"), "{same}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-    let nowhere = residyn(&[
-        "export",
-        "--model",
-        "pendulum",
-        "--format",
-        "json",
-        "--out",
-        "no/such/folder/m.json",
-    ]);
+}
+
+#[test]
+fn the_folder_of_an_export_is_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let export = |out: &Path| {
+        let out = text(out);
+        [
+            "export", "--model", "pendulum", "--format", "json", "--out", out,
+        ]
+        .map(str::to_owned)
+    };
+    let run = |out: &Path| residyn(&export(out).each_ref().map(String::as_str));
+    let deep = folder.path().join("made/for/it/m.json");
+    assert_eq!(run(&deep).status.code(), Some(0));
+    assert!(deep.is_file());
+    // A file stands where a folder would have to be.
+    let nowhere = run(&deep.join("below/m.json"));
     assert_eq!(nowhere.status.code(), Some(2));
     let said = String::from_utf8(nowhere.stderr).unwrap();
-    assert!(
-        said.contains("m.json: cannot be written: its folder does not exist"),
-        "{said}"
-    );
+    assert!(said.contains("below: cannot be written"), "{said}");
 }
 
 #[test]

@@ -40,6 +40,7 @@ mod printers;
 mod recipes;
 mod rigs;
 mod runs;
+mod shell;
 mod shift;
 mod simulators;
 mod support;

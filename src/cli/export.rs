@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
 use super::{Answer, Common};
+use crate::files::{OutputError, folder_of};
 use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
 use crate::model::Library;
 use crate::sim::Integrator;
@@ -50,6 +51,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     for what in &not_carried {
         eprintln!("not carried: {what}");
     }
+    let folder = folder_of(&arguments.out);
+    std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?;
     let files = format.write(&model, &arguments.out)?;
     let measured = measure(format, &model, arguments);
     inputs::print(&match arguments.common.json {

@@ -16,6 +16,7 @@ mod new;
 mod progress;
 mod remedy;
 mod report;
+mod shell;
 mod simulate;
 mod sweep;
 mod train;
@@ -58,6 +59,8 @@ enum Command {
     New(new::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
+    Completions(shell::Completions),
+    Man(shell::Man),
 }
 
 /// Arguments of every command.
@@ -100,6 +103,8 @@ pub fn main() -> ExitCode {
         Command::New(arguments) => new::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::man(&arguments),
     };
     match result {
         Ok(Answer::Yes) => ExitCode::SUCCESS,

@@ -92,6 +92,17 @@ const USUAL_SENSOR: Sensor = Sensor {
     position_step: 0.0,
 };
 
+/// The error of what is no model, for who may have meant a plant.
+fn or_a_plant(mut error: FileError) -> FileError {
+    if error.place.is_none() {
+        error.message += &format!(
+            "; or a plant file, or one of the plants {}",
+            Plant::names().join(", ")
+        );
+    }
+    error
+}
+
 /// The embedded plants.
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/configs/plants");
 
@@ -106,7 +117,10 @@ impl Plant {
         match text_or_embedded(path, embedded) {
             Ok(text) if is_plant(&text) => Self::from_text(path, &text, library),
             // A model file, or one that cannot be read, for which the library has the error message.
-            _ => Ok(Self::of_system(library.model(path)?)),
+            _ => {
+                let system = library.model(path).map_err(or_a_plant)?;
+                Ok(Self::of_system(system))
+            }
         }
     }
 
