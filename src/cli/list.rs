@@ -34,11 +34,16 @@ enum What {
 
 /// Formats of the program's own files and of logs.
 const OTHERS: &[(&str, &str)] = &[
-    ("csv", "logs, in and out"),
+    (
+        "csv",
+        "logs, out; in with any separator, decimal commas, and packed with gzip",
+    ),
+    ("npz", "logs of NumPy, in"),
     (
         "toml",
         "models, effects, plants, tasks and recipes, in; fitted models, out",
     ),
+    ("html", "reports for a browser, out"),
     ("markdown", "reports, out"),
     ("svg", "plots and films of episodes, out"),
     ("jsonl", "rounds of the learning loop, in and out"),

@@ -1,6 +1,7 @@
 use std::fmt::Write;
 
 use super::calibration::line;
+use super::json::PAGE;
 use super::remainder::proposal_line;
 use super::schema::{ModelError, Report, TorqueEntry};
 use super::text::serious;
@@ -37,7 +38,12 @@ pub fn summary(report: &Report, seconds: &[(Stage, f64)], folder: &std::path::Pa
     };
     out += &report.calibration.as_ref().map_or_else(String::new, line);
     let _ = writeln!(out, "  {}", took(seconds));
-    let _ = writeln!(out, "Report, model and plots are in {}", folder.display());
+    let page = folder.join(PAGE);
+    let _ = writeln!(
+        out,
+        "Open {}; model and plots are beside it",
+        page.display()
+    );
     out
 }
 

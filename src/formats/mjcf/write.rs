@@ -14,7 +14,7 @@ use crate::model::chain::Joint;
 
 pub(in crate::formats) const FORMAT: Format = Format {
     name: "mjcf",
-    about: "a mechanism of one or two joints with its friction, springs and drives, for MuJoCo",
+    about: "a serial mechanism with its friction, springs and drives, for MuJoCo",
     extension: "xml",
     not_carried,
     files,
@@ -25,7 +25,7 @@ pub(in crate::formats) const FORMAT: Format = Format {
     }),
     tolerance: 1e-9,
     robots: Some(RobotReader {
-        about: "up to three hinge or slide joints, one carrying the next",
+        about: "up to twelve hinge or slide joints, one carrying the next",
         read: read_mjcf,
     }),
 };

@@ -16,7 +16,7 @@ use crate::model::chain::Joint;
 
 pub(in crate::formats) const FORMAT: Format = Format {
     name: "urdf",
-    about: "a mechanism of one or two joints with damping, dry friction and limits of the drives",
+    about: "a serial mechanism with damping, dry friction and limits of the drives",
     extension: "urdf",
     not_carried,
     files,
@@ -27,7 +27,7 @@ pub(in crate::formats) const FORMAT: Format = Format {
     }),
     tolerance: 1e-9,
     robots: Some(RobotReader {
-        about: "up to three revolute, continuous or prismatic joints, one carrying the next",
+        about: "up to twelve revolute, continuous or prismatic joints, one carrying the next",
         read: read_urdf,
     }),
 };
