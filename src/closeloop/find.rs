@@ -5,7 +5,7 @@ use super::error::StudyError;
 use super::establish::{Standing, establish, without_each};
 use super::every_log::EveryLog;
 use super::fitted::Fitted;
-use super::gravity::against_gravity;
+use super::gravity::{against_gravity, shares_of_gravity};
 use super::remainder::{Unexplained, unexplained};
 use super::select::{Losses, Rival, Round, Search, Trial, candidates, starts};
 use super::space::Space;
@@ -21,8 +21,8 @@ pub struct Found {
     pub before: Fitted,
     pub chosen: Chosen,
     pub unexplained: Unexplained,
-    /// Why effects say nothing, where the torques hold another gravity than the declared bodies need.
-    pub against_gravity: Option<String>,
+    /// The share of the declared gravity in the torques of each log, where they are compared and it tells.
+    pub gravity: Vec<Option<f64>>,
 }
 
 /// The set of effects that was chosen.
@@ -163,8 +163,8 @@ pub fn find(
             chosen.standings.push(standing);
         }
     }
-    let against_gravity = against_gravity(study);
-    if against_gravity.is_some() {
+    let gravity = shares_of_gravity(study);
+    if against_gravity(&gravity).is_some() {
         demote(&mut chosen.standings, |_| Some(ANOTHER_GRAVITY.into()));
     }
     chosen.mark(study);
@@ -177,7 +177,7 @@ pub fn find(
         before,
         chosen,
         unexplained: left,
-        against_gravity,
+        gravity,
     })
 }
 

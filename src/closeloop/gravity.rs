@@ -15,10 +15,10 @@ const LEAST: f64 = 0.5;
 /// A joint tells of gravity if it varies by this much of its torque, both as standard deviations.
 const TELLS: f64 = 0.3;
 
-/// Where torques are compared, add to the audits of the study's logs which of them hold another gravity than the declared
-/// bodies need: a torque column that is only a part of the torque, a moment of another unit, another base.
-pub(super) fn tell_gravity(study: &Study<'_>, audits: &mut [Audit]) {
-    for (share, audit) in shares(study).into_iter().zip(audits) {
+/// Add to the audits of logs which of them hold another gravity than the declared bodies need, by their shares: a torque column
+/// that is only a part of the torque, a moment of another unit, another base.
+pub(super) fn tell_gravity(shares: &[Option<f64>], audits: &mut [Audit]) {
+    for (share, audit) in shares.iter().zip(audits) {
         if let Some(share) = share.filter(contradicts) {
             let text = format!("{}. What is fitted to them imitates that", told(share));
             audit.add(Finding::new(Severity::Serious, text));
@@ -27,8 +27,8 @@ pub(super) fn tell_gravity(study: &Study<'_>, audits: &mut [Audit]) {
 }
 
 /// Why nothing can be concluded from torques that hold another gravity, in a sentence: by the median of the logs that tell.
-pub(super) fn against_gravity(study: &Study<'_>) -> Option<String> {
-    let mut shares: Vec<f64> = shares(study).into_iter().flatten().collect();
+pub(super) fn against_gravity(shares: &[Option<f64>]) -> Option<String> {
+    let mut shares: Vec<f64> = shares.iter().copied().flatten().collect();
     shares.sort_by(f64::total_cmp);
     let median = shares
         .get(shares.len() / 2)
@@ -50,7 +50,7 @@ fn told(share: f64) -> String {
 }
 
 /// The share of the declared gravity in each log of a study by torques, where it tells.
-fn shares(study: &Study<'_>) -> Vec<Option<f64>> {
+pub(super) fn shares_of_gravity(study: &Study<'_>) -> Vec<Option<f64>> {
     if study.space != Space::Torque {
         return Vec::new();
     }

@@ -5,7 +5,7 @@ use rand::Rng;
 use super::discriminate::discriminate;
 use super::error::StudyError;
 use super::find::{Found, find};
-use super::gravity::tell_gravity;
+use super::gravity::{shares_of_gravity, tell_gravity};
 use super::learn::learn;
 use super::outcome::{Effects, Given, Models, Outcome, Remainder};
 use super::pushes::tell_pushes;
@@ -77,13 +77,13 @@ pub fn close_loop(
     study.identifiability = refined.identifiability.clone();
     let remainder = remainder(&study, &found, &refined);
     let mut of_train = of_train;
-    tell_gravity(&study, &mut of_train);
+    tell_gravity(&found.gravity, &mut of_train);
     // Logs over which the model diverges tell of no push.
     if let Ok(residual) = &remainder.after {
         tell_pushes(&study, &residual.samples, &mut of_train);
     }
     let test_study = study.on(&tested);
-    tell_gravity(&test_study, &mut of_test);
+    tell_gravity(&shares_of_gravity(&test_study), &mut of_test);
     if let Ok(forces) = residual_force(&test_study, &found.chosen.after) {
         tell_pushes(&test_study, &forces, &mut of_test);
     }

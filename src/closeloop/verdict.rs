@@ -1,4 +1,5 @@
 use super::find::Found;
+use super::gravity::against_gravity;
 use super::refine::Refined;
 use super::remainder::{UNKNOWN, Unexplained};
 use super::score::Errors;
@@ -34,7 +35,7 @@ pub(super) fn verdict(
     let are_worse = after > study.settings.verdict.worse * before;
     match at_rest(study)
         .or_else(|| failure(found, refined))
-        .or_else(|| found.against_gravity.clone())
+        .or_else(|| against_gravity(&found.gravity))
         .or_else(|| inconclusive(study))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
