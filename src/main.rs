@@ -1,5 +1,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    residyn::cli::main()
+    residyn::cli::run(std::env::args_os()).into()
 }

@@ -22,7 +22,8 @@ mod sweep;
 mod train;
 mod tune;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
+use std::sync::OnceLock;
 
 use clap::{Args, Parser, Subcommand};
 
@@ -83,10 +84,14 @@ enum Answer {
     No,
 }
 
-/// Run the program on the arguments of this process: exit status 0 done, 1 ran and the answer is no, 2 could
-/// not run.
-pub fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+/// The command line that the program runs on.
+static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Run the program on a command line, the name of the program first: exit status 0 done, 1 ran and the answer is no, 2 could
+/// not run. Once in a process.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments = ARGUMENTS.get_or_init(|| arguments.into_iter().collect());
+    let result = match Cli::parse_from(arguments).command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Audit(arguments) => audit::run(&arguments),
@@ -107,18 +112,18 @@ pub fn main() -> ExitCode {
         Command::Man(arguments) => shell::man(&arguments),
     };
     match result {
-        Ok(Answer::Yes) => ExitCode::SUCCESS,
-        Ok(Answer::No) => ExitCode::from(1),
+        Ok(Answer::Yes) => 0,
+        Ok(Answer::No) => 1,
         Err(error) => {
             eprintln!("error: {}", told(&error));
-            ExitCode::from(2)
+            2
         }
     }
 }
 
-/// The command line of this process, as a shell takes it.
+/// The command line, as a shell takes it.
 fn command_line() -> String {
-    let words = std::env::args_os().skip(1);
+    let words = ARGUMENTS.get().into_iter().flatten().skip(1);
     let words = words.map(|word| quoted(&word.to_string_lossy()));
     let all: Vec<String> = std::iter::once("residyn".to_owned()).chain(words).collect();
     all.join(" ")

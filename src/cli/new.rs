@@ -1,14 +1,12 @@
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use serde_json::json;
 
 use super::{Answer, Common, inputs};
 use crate::files::write_whole;
 use crate::formats::{FORMATS, Format, RobotReader};
-use crate::model::chain::model_text;
-use crate::model::{Library, Model, ReadyDrive};
 
 /// Write a model file for a serial mechanism, its equations derived from a robot description
 #[derive(Debug, Args)]
@@ -83,21 +81,18 @@ impl FromArgMatches for Description {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let Description { reader, file } = &arguments.description;
-    let mut chain = (reader.read)(file, arguments.tip.as_deref())?;
-    if let Some(name) = &arguments.drive {
-        chain.drive = Some(ReadyDrive::find(Library::drives(), name).map_err(|why| anyhow!(why))?);
-    }
-    let text = model_text(&chain);
-    let name = Path::new(&chain.name);
-    let model = Model::from_text(name, &text, Library::built_in().effects())?;
-    for note in &chain.notes {
+    let (tip, drive) = (arguments.tip.as_deref(), arguments.drive.as_deref());
+    let (model, notes) = reader.model(file, tip, drive)?;
+    let text = &model.text;
+    for note in &notes {
         eprintln!("note: {note}");
     }
     if let Some(out) = &arguments.out {
         write_whole(out, text.as_bytes())?;
     }
     if arguments.common.json {
-        let value = json!({"model": text, "joints": model.joints, "notes": chain.notes, "out": arguments.out});
+        let value =
+            json!({"model": text, "joints": model.joints, "notes": notes, "out": arguments.out});
         inputs::print(&format!("{value:#}\n"))?;
     } else if let Some(out) = &arguments.out {
         inputs::print(&format!(
@@ -107,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             model.joints
         ))?;
     } else {
-        inputs::print(&text)?;
+        inputs::print(text)?;
     }
     Ok(Answer::Yes)
 }

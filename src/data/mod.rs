@@ -9,6 +9,7 @@
 //! The torque of row `i` acts from `time[i]` to `time[i + 1]` (zero-order hold).
 
 mod audit;
+mod channels;
 mod column;
 mod columns;
 mod dropped;
@@ -32,6 +33,7 @@ pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Response, Severity, TorqueDemand,
     TorqueLag, VelocityCheck, audit, tell_repeats,
 };
+pub use channels::Channels;
 pub use column::{Column, Quantity};
 pub use columns::Columns;
 pub use error::{CellFault, LogError, Place};

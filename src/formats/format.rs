@@ -7,8 +7,8 @@ use thiserror::Error;
 use super::ExportModel;
 use super::verify::{Client, ClientError, Predictions, Samples};
 use crate::files::{OutputError, write_whole};
-use crate::model::chain::Chain;
-use crate::model::{FileError, NetworkError};
+use crate::model::chain::{Chain, model_text};
+use crate::model::{FileError, Library, Model, NetworkError, ReadyDrive};
 
 /// A format of other programs.
 #[derive(Debug)]
@@ -38,6 +38,33 @@ pub struct RobotReader {
     pub about: &'static str,
     /// The chain that ends at a body; without one at the end of the longest branch.
     pub read: fn(&Path, Option<&str>) -> Result<Chain, FileError>,
+}
+
+impl RobotReader {
+    /// The model of the chain that ends at the body `tip`, without one at the end of the longest branch, and what of the
+    /// description is read differently or not at all. `drive` is what drives the joints, where that is not torques.
+    ///
+    /// # Errors
+    /// A description that cannot be read, or that is of no serial chain; an unknown drive.
+    pub fn model(
+        &self,
+        file: &Path,
+        tip: Option<&str>,
+        drive: Option<&str>,
+    ) -> Result<(Model, Vec<String>), FileError> {
+        let mut chain = (self.read)(file, tip)?;
+        if let Some(name) = drive {
+            let found = ReadyDrive::find(Library::drives(), name);
+            chain.drive = Some(found.map_err(|message| FileError {
+                path: file.to_owned(),
+                place: None,
+                message,
+            })?);
+        }
+        let name = Path::new(&chain.name);
+        let model = Model::from_text(name, &model_text(&chain), Library::built_in().effects())?;
+        Ok((model, chain.notes))
+    }
 }
 
 /// A file to be written.

@@ -1,5 +1,6 @@
 //! Files of logs, as named columns of numbers: one reader a format behind one function.
 
+mod arrays;
 mod csv;
 mod npy;
 mod npz;
@@ -10,8 +11,8 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
+pub(super) use self::arrays::Arrays;
 pub(super) use self::csv::Csv;
-use self::npz::Npz;
 use super::error::{CellFault, LogError, Place};
 
 /// Named columns of numbers.
@@ -84,7 +85,7 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn Table>, LogError> {
         });
     }
     if bytes.starts_with(ZIP) {
-        return Ok(Box::new(Npz::of(path, bytes)?));
+        return Ok(Box::new(npz::read(path, bytes)?));
     }
     Ok(Box::new(Csv::of_bytes(path, &bytes)?))
 }
