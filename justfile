@@ -5,13 +5,13 @@ _list:
 
 # Format the code
 fmt:
-    cargo fmt
+    cargo fmt --all
 
 # Lints, as errors
 lint:
     cargo clippy --release --workspace --all-targets -- -D warnings
 
-# All tests; arguments go to cargo test
+# All tests; arguments go to cargo test, which then runs alone
 test *arguments:
     tests/run {{arguments}}
 

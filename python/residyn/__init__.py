@@ -1,0 +1,35 @@
+"""Residyn: from a rig's log to the physical effect that its model lacks.
+
+    import residyn
+
+    model = residyn.Model.read("arm.toml")                      # or .from_urdf("arm.urdf")
+    logs = [model.read_log(path) for path in ["run1.csv", "run2.csv", "run3.csv"]]
+    report = residyn.close_loop(model, logs)
+    for effect in report.effects:
+        print(effect)                                           # name, joint, parameters with 95 % intervals
+    report.model.export("c", "arm.h")
+
+Angles are in rad, velocities in rad/s, torques in N m, times in s; of joints that slide, in m, m/s and N. Arrays of a log
+have the shape (rows, joints). Whatever cannot be done raises a `ResidynError` that says what is wrong, where, and what to
+do about it.
+"""
+
+from ._residyn import Log, Model, Parameter, ResidynError, Rig, __version__, names, read_log, simulate
+from .loop import close_loop
+from .report import Effect, EffectParameter, Report
+
+__all__ = [
+    "Effect",
+    "EffectParameter",
+    "Log",
+    "Model",
+    "Parameter",
+    "Report",
+    "ResidynError",
+    "Rig",
+    "__version__",
+    "close_loop",
+    "names",
+    "read_log",
+    "simulate",
+]

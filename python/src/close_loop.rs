@@ -1,0 +1,209 @@
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use residyn::closeloop::{Fits, Progress, Space, Split, Stage, StudyError};
+use residyn::report::{self, Report};
+use residyn::train::{Backend, ResidualTrainer};
+use residyn::{
+    Library, Log as Recorded, Model as Declared, Origin, Reference, Request, Settings, rng,
+};
+use serde_json::json;
+
+use crate::error::{OrRaise, ResidynError};
+use crate::log::Log;
+use crate::model::Model;
+use crate::work::{Listener, interruptible};
+
+/// Everything that closing the loop found out; `residyn.Report` shows it.
+#[pyclass(frozen, module = "residyn")]
+pub struct Outcome {
+    /// A lock, since a trained network may move between threads, but not be shared.
+    found: Mutex<residyn::Outcome>,
+    origin: Origin,
+    report: Report,
+    library: Library,
+}
+
+#[pymethods]
+impl Outcome {
+    /// The text of report.json.
+    fn json(&self) -> String {
+        serde_json::to_string(&self.report).expect("a report has only finite numbers and texts")
+    }
+
+    /// The report as a page for a browser, whole in itself.
+    fn html(&self) -> String {
+        report::page(&self.report)
+    }
+
+    /// The report as Markdown; its pictures are files of `write`.
+    fn markdown(&self) -> String {
+        report::text(&self.report)
+    }
+
+    /// The declared model with the effects that were found, refitted.
+    fn model(&self) -> PyResult<Model> {
+        let text = report::model_file(&self.lock());
+        let name = "model.toml".as_ref();
+        let inner = Declared::from_text(name, &text, self.library.effects()).or_raise()?;
+        let library = self.library.clone();
+        Ok(Model { inner, library })
+    }
+
+    /// Write report.html, report.md, report.json, model.toml, plots and the network into a folder.
+    #[allow(clippy::needless_pass_by_value)]
+    fn write(&self, folder: PathBuf) -> PyResult<()> {
+        report::write(folder, &self.lock(), &self.origin).or_raise()?;
+        Ok(())
+    }
+}
+
+impl Outcome {
+    fn lock(&self) -> std::sync::MutexGuard<'_, residyn::Outcome> {
+        self.found
+            .lock()
+            .expect("nothing that reads an outcome panics")
+    }
+}
+
+/// What is asked.
+struct Question {
+    model: Declared,
+    library: Library,
+    split: Split,
+    against: Vec<Reference>,
+    space: Option<Space>,
+    budget: Duration,
+    network: bool,
+    seed: u64,
+}
+
+/// A stage, what is being done in it, and how many fits of how many are done.
+type Told = (&'static str, String, Option<(usize, usize)>);
+
+impl Question {
+    fn answer(&self, listener: &Listener<Told>) -> Result<residyn::Outcome, StudyError> {
+        let learner = ResidualTrainer {
+            backend: Backend::default(),
+        };
+        let mut request = Request::new(&self.model, &self.library, self.split.clone());
+        request.against.clone_from(&self.against);
+        request.space = self.space;
+        request.budget = Some(self.budget);
+        if self.network {
+            request.learner = Some(&learner);
+        }
+        residyn::close_loop(request, &mut rng(self.seed), &mut |now: Progress<'_>| {
+            let fits = now.fits.map(|Fits { done, of }| (done, of));
+            listener.tell((now.stage.text(), now.text.to_owned(), fits));
+        })
+    }
+
+    fn origin(&self) -> Origin {
+        let names =
+            |logs: &[Recorded]| -> Vec<String> { logs.iter().map(Recorded::name).collect() };
+        let against: Vec<&str> = self
+            .against
+            .iter()
+            .map(|other| other.name.as_str())
+            .collect();
+        Origin {
+            config: json!({
+                "command": "close_loop",
+                "model": self.model.name,
+                "train": names(&self.split.train),
+                "test": names(&self.split.test),
+                "against": against,
+                "errors": self.space,
+                "budget_s": self.budget.as_secs_f64(),
+                "network": self.network,
+            }),
+            seed: self.seed,
+            model_toml: self.model.declaration.clone(),
+        }
+    }
+}
+
+/// See `residyn.close_loop`.
+#[pyfunction]
+#[pyo3(signature = (model, train, test, against, seed, budget_s, errors, network, progress))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // the Python function's own
+pub fn close_loop(
+    py: Python<'_>,
+    model: &Model,
+    train: Vec<PyRef<'_, Log>>,
+    test: Vec<PyRef<'_, Log>>,
+    against: Vec<(String, PyRef<'_, Model>)>,
+    seed: u64,
+    budget_s: f64,
+    errors: Option<&str>,
+    network: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Outcome> {
+    train
+        .iter()
+        .chain(&test)
+        .try_for_each(|log| model.check(log))?;
+    let recorded = |logs: &[PyRef<'_, Log>]| logs.iter().map(|log| log.0.clone()).collect();
+    let references = against.iter().map(|(name, other)| Reference {
+        name: name.clone(),
+        model: other.inner.clone(),
+    });
+    let question = Question {
+        model: model.inner.clone(),
+        library: model.library.clone(),
+        split: split(recorded(&train), recorded(&test))?,
+        against: references.collect(),
+        space: errors.map(space).transpose()?,
+        budget: Duration::try_from_secs_f64(budget_s)
+            .map_err(|why| ResidynError::new_err(format!("budget_s = {budget_s}: {why}")))?,
+        network,
+        seed,
+    };
+    let origin = question.origin();
+    let heard = |(stage, text, fits): Told| match &progress {
+        Some(callback) => {
+            let (done, of) = fits.unzip();
+            callback.call1(py, (stage, text, done, of)).map(drop)
+        }
+        None => Ok(()),
+    };
+    let found = interruptible(py, move |listener| question.answer(listener), heard)?.or_raise()?;
+    Ok(Outcome {
+        report: Report::new(&found, &origin),
+        found: Mutex::new(found),
+        origin,
+        library: model.library.clone(),
+    })
+}
+
+fn split(train: Vec<Recorded>, test: Vec<Recorded>) -> PyResult<Split> {
+    let split = match test.is_empty() {
+        true => Split::of(train, &Settings::default().split),
+        false => Split::given(train, test),
+    };
+    match split.test.is_empty() {
+        true => Err(ResidynError::new_err(
+            "the logs are too short to set any of them apart for the test; give test=",
+        )),
+        false => Ok(split),
+    }
+}
+
+fn space(errors: &str) -> PyResult<Space> {
+    match errors {
+        "motion" => Ok(Space::Motion),
+        "torque" => Ok(Space::Torque),
+        _ => Err(ResidynError::new_err(format!(
+            "errors = {errors:?}: give \"motion\", \"torque\", or None for those that say more about these logs"
+        ))),
+    }
+}
+
+/// The stages of closing the loop, in their order, as `progress` is told them.
+#[pyfunction]
+pub fn stages() -> Vec<&'static str> {
+    Stage::ALL.map(Stage::text).to_vec()
+}

@@ -1,0 +1,65 @@
+//! The compiled half of the Python package: `residyn._residyn`, on which the modules in `python/residyn` stand.
+
+mod arrays;
+mod close_loop;
+mod error;
+mod log;
+mod model;
+mod rig;
+mod work;
+
+/// What every class and function of the package is made of.
+#[pyo3::pymodule]
+mod _residyn {
+    use std::ffi::OsString;
+
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::close_loop::{Outcome, close_loop, stages};
+    #[pymodule_export]
+    use crate::error::ResidynError;
+    #[pymodule_export]
+    use crate::log::{Log, read_log};
+    #[pymodule_export]
+    use crate::model::{Model, Parameter};
+    #[pymodule_export]
+    use crate::rig::{Rig, simulate};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+
+    /// Run the command line `arguments`, the name of the program first, and return its exit status.
+    #[pyfunction]
+    fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+        py.detach(|| residyn::cli::run(arguments))
+    }
+
+    /// Names of what is built in: "systems", "plants", "tasks", "effects", "drives" or "formats".
+    #[pyfunction]
+    fn names(of: &str) -> PyResult<Vec<String>> {
+        let library = residyn::Library::built_in();
+        let owned = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect();
+        Ok(match of {
+            "systems" => residyn::Library::system_names(),
+            "plants" => owned(residyn::plant::Plant::names()),
+            "tasks" => owned(residyn::control::Task::names()),
+            "effects" => (library.effects().iter())
+                .map(|effect| effect.name.clone())
+                .collect(),
+            "drives" => (residyn::Library::drives().into_iter())
+                .map(|drive| drive.name)
+                .collect(),
+            "formats" => (residyn::formats::FORMATS.iter())
+                .map(|format| format.name.to_owned())
+                .collect(),
+            _ => {
+                return Err(ResidynError::new_err(format!(
+                    "there are no {of:?}; ask for systems, plants, tasks, effects, drives or formats"
+                )));
+            }
+        })
+    }
+}

@@ -1,0 +1,224 @@
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use residyn::control::Task;
+use residyn::data::Joint;
+use residyn::model::Dynamics;
+use residyn::plan::Objective;
+use residyn::plant::{self, Plant};
+use residyn::{Library, rng};
+use self_cell::self_cell;
+
+use crate::arrays::{ArrayLike, vector};
+use crate::error::{OrRaise, ResidynError};
+use crate::log::Log;
+
+type Controlled<'d> = plant::Rig<'d>;
+
+self_cell!(
+    /// A rig in motion, with the equations that it is moved by.
+    struct Moving {
+        owner: Dynamics,
+        #[not_covariant]
+        dependent: Controlled,
+    }
+);
+
+/// A simulated rig with a task, step by step: `residyn.environment.Environment` makes a Gymnasium environment of it.
+#[pyclass(module = "residyn")]
+pub struct Rig {
+    plant: Plant,
+    task: Task,
+    objective: Objective,
+    random: rand_chacha::ChaCha8Rng,
+    moving: Option<Moving>,
+}
+
+#[pymethods]
+#[allow(clippy::needless_pass_by_value)]
+impl Rig {
+    /// A plant and what it is to do.
+    ///
+    /// Args:
+    ///     plant: a plant or model file, or a built-in plant or system by its name.
+    ///     task: a task file, or a built-in task; by default a built-in one of the plant's system.
+    ///
+    /// Raises:
+    ///     ResidynError: files that cannot be read, or a task of another system.
+    #[new]
+    #[pyo3(signature = (plant, task=None))]
+    fn new(plant: PathBuf, task: Option<PathBuf>) -> PyResult<Self> {
+        let plant = Plant::read(&plant, &Library::built_in()).or_raise()?;
+        let system = &plant.system.name;
+        let task = match task {
+            Some(path) => Task::read(&path).or_raise()?,
+            None => Task::of_system(system).ok_or_else(|| {
+                let known = Task::names().join(", ");
+                ResidynError::new_err(format!(
+                    "no built-in task is for {system}; give a task file (built in: {known})"
+                ))
+            })?,
+        };
+        if task.system != *system {
+            return Err(ResidynError::new_err(format!(
+                "the task {} is for {}, but the plant is {system}; give a task for it",
+                task.name(),
+                task.system
+            )));
+        }
+        task.check_for(plant.system.joints).or_raise()?;
+        Ok(Self {
+            objective: task.objective(),
+            random: rng(0),
+            moving: None,
+            plant,
+            task,
+        })
+    }
+
+    /// The number of joints.
+    #[getter]
+    fn joints(&self) -> usize {
+        self.task.joints()
+    }
+
+    /// Lowest and highest torque (N m or N) or command of each joint.
+    #[getter]
+    fn torque(&self) -> Vec<(f64, f64)> {
+        self.task
+            .torque
+            .iter()
+            .map(|[low, high]| (*low, *high))
+            .collect()
+    }
+
+    /// How long a torque is held, in s.
+    #[getter]
+    fn step_s(&self) -> f64 {
+        self.task.step_s
+    }
+
+    /// Steps of an episode.
+    #[getter]
+    fn steps(&self) -> usize {
+        self.task.steps
+    }
+
+    /// Begin an episode; with a seed, everything random from here on is drawn anew from it.
+    ///
+    /// Returns:
+    ///     The measured state: positions, then velocities, shape (2 joints,).
+    #[pyo3(signature = (seed=None))]
+    fn reset<'py>(&mut self, py: Python<'py>, seed: Option<u64>) -> Bound<'py, PyArray1<f64>> {
+        if let Some(seed) = seed {
+            self.random = rng(seed);
+        }
+        let start = self.task.draw_start(&mut self.random);
+        let moving = Moving::new(self.plant.dynamics(), |dynamics| {
+            self.task.rig(&self.plant, dynamics, &start)
+        });
+        let moving = self.moving.insert(moving);
+        let random = &mut self.random;
+        moving
+            .with_dependent_mut(|_, rig| rig.measure(random))
+            .into_pyarray(py)
+    }
+
+    /// Hold a torque (or command) for a step.
+    ///
+    /// Returns:
+    ///     The measured state, and the reward of the step by the task.
+    ///
+    /// Raises:
+    ///     ResidynError: before `reset`, a torque of another size, or a plant that diverges.
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        tau: ArrayLike<'py>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, f64)> {
+        let tau = vector("tau", &tau)?;
+        if tau.len() != self.task.joints() {
+            return Err(ResidynError::new_err(format!(
+                "{} torque(s) for {} joint(s); give one each",
+                tau.len(),
+                self.task.joints()
+            )));
+        }
+        let (random, objective) = (&mut self.random, &self.objective);
+        let moving = self.moving.as_mut();
+        let moving = moving
+            .ok_or_else(|| ResidynError::new_err("the rig stands nowhere yet; call reset first"))?;
+        moving.with_dependent_mut(|_, rig| {
+            rig.step(&tau).or_raise()?;
+            let reward = objective.value(rig.state(), &tau, rig.time_s());
+            Ok((rig.measure(random).into_pyarray(py), reward))
+        })
+    }
+}
+
+/// The log of a simulated rig.
+///
+/// Args:
+///     plant: a plant or model file, or a built-in plant or system by its name.
+///     effects: what its model does not declare: the value of an effect's first parameter, or of several by their names;
+///         "coulomb_friction@2" is on joint 2.
+///     seed: of excitation and noise; the same seed gives the same log.
+///     duration_s: in place of the plant's own.
+///     name: what messages and reports call the log; by default the plant's name and the seed.
+///
+/// Raises:
+///     ResidynError: a plant or effect that is unknown, or a rig that diverges.
+#[pyfunction]
+#[pyo3(signature = (plant, *, effects=BTreeMap::new(), seed=0, duration_s=None, name=None))]
+#[allow(clippy::needless_pass_by_value)]
+pub fn simulate(
+    py: Python<'_>,
+    plant: PathBuf,
+    effects: BTreeMap<String, Values>,
+    seed: u64,
+    duration_s: Option<f64>,
+    name: Option<PathBuf>,
+) -> PyResult<Log> {
+    let library = Library::built_in();
+    let mut plant = Plant::read(&plant, &library).or_raise()?;
+    for (at, values) in effects {
+        let (effect, joint) = place(&at)?;
+        let first = library.effect(effect).map_err(ResidynError::new_err)?;
+        let values = match values {
+            Values::First(value) => vec![(first.parameters[0].name.clone(), value)],
+            Values::Named(values) => values.into_iter().collect(),
+        };
+        plant
+            .add_effect(&library, effect, joint, &values)
+            .or_raise()?;
+    }
+    plant.recording.duration_s = duration_s.unwrap_or(plant.recording.duration_s);
+    let named = || format!("{}-{seed}", plant.system.name).into();
+    let path = name.unwrap_or_else(named);
+    let log = py.detach(|| plant.record(&mut rng(seed))).or_raise()?;
+    Ok(Log(residyn::Log { path, ..log }))
+}
+
+/// Values of an effect's parameters.
+#[derive(FromPyObject)]
+pub enum Values {
+    First(f64),
+    Named(BTreeMap<String, f64>),
+}
+
+/// `name` or `name@joint`.
+fn place(at: &str) -> PyResult<(&str, Joint)> {
+    match at.split_once('@') {
+        None => Ok((at, Joint::at(0))),
+        Some((name, joint)) => {
+            let joint = joint.parse();
+            joint.map(|joint| (name, joint)).map_err(|why| {
+                ResidynError::new_err(format!(
+                    "{at:?}: {why}; write an effect as name or name@joint"
+                ))
+            })
+        }
+    }
+}

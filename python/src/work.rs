@@ -1,0 +1,67 @@
+//! Long work, while Python goes on hearing signals.
+
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+/// How long Ctrl-C may go unheard.
+const LISTEN_EVERY: Duration = Duration::from_millis(50);
+
+/// What long work tells of its progress to.
+#[derive(Clone)]
+pub struct Listener<M> {
+    messages: Sender<M>,
+    stopped: Arc<AtomicBool>,
+}
+
+/// What unwinds the thread of work that nobody waits for any more. No message is printed.
+struct Stopped;
+
+impl<M> Listener<M> {
+    /// Tell of progress; does not return where the work is to stop.
+    pub fn tell(&self, message: M) {
+        if self.stopped.load(Ordering::Relaxed) || self.messages.send(message).is_err() {
+            resume_unwind(Box::new(Stopped));
+        }
+    }
+}
+
+/// Work on a thread of its own without the interpreter's lock; `heard` gets what it tells, with the lock.
+///
+/// Where a signal comes (Ctrl-C), or `heard` raises, this returns at once, and the work ends at the next thing that it
+/// tells.
+pub fn interruptible<T, M>(
+    py: Python<'_>,
+    work: impl FnOnce(&Listener<M>) -> T + Send + 'static,
+    mut heard: impl FnMut(M) -> PyResult<()>,
+) -> PyResult<T>
+where
+    T: Send + 'static,
+    M: Send + 'static,
+{
+    let (messages, mut inbox) = channel();
+    let stopped = Arc::new(AtomicBool::new(false));
+    let listener = Listener {
+        messages,
+        stopped: Arc::clone(&stopped),
+    };
+    let worker = thread::spawn(move || work(&listener));
+    let mut listen = || -> PyResult<bool> {
+        // A receiver may move to where there is no lock, but not be shared with it.
+        let inbox = &mut inbox;
+        let next = py.detach(move || inbox.recv_timeout(LISTEN_EVERY));
+        py.check_signals()?;
+        match next {
+            Ok(message) => heard(message).map(|()| true),
+            Err(why) => Ok(why == RecvTimeoutError::Timeout),
+        }
+    };
+    while listen().inspect_err(|_| stopped.store(true, Ordering::Relaxed))? {}
+    let ended = py.detach(|| worker.join());
+    Ok(ended.unwrap_or_else(|panic| resume_unwind(panic)))
+}
