@@ -104,7 +104,7 @@ fn control_refuses_other_systems_tasks_and_settings() {
     );
     let none = message(&["--model", "cartpole", "--plant", "cartpole"]);
     assert!(
-        none.contains("no built-in task is for cartpole; give --task FILE"),
+        none.contains("no built-in task is for cartpole; give a task file"),
         "{none}"
     );
     let far = message(&[

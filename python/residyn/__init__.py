@@ -14,13 +14,26 @@ have the shape (rows, joints). Whatever cannot be done raises a `ResidynError` t
 do about it.
 """
 
-from ._residyn import Log, Model, Parameter, ResidynError, Rig, __version__, names, read_log, simulate
+from ._residyn import (
+    Episode,
+    Log,
+    Model,
+    Parameter,
+    ResidynError,
+    Rig,
+    __version__,
+    control,
+    names,
+    read_log,
+    simulate,
+)
 from .loop import close_loop
 from .report import Effect, EffectParameter, Report
 
 __all__ = [
     "Effect",
     "EffectParameter",
+    "Episode",
     "Log",
     "Model",
     "Parameter",
@@ -29,6 +42,7 @@ __all__ = [
     "Rig",
     "__version__",
     "close_loop",
+    "control",
     "names",
     "read_log",
     "simulate",

@@ -11,6 +11,7 @@ _Path = str | os.PathLike[str]
 __version__: str
 
 __all__ = [
+    "Episode",
     "Log",
     "Model",
     "Outcome",
@@ -19,6 +20,7 @@ __all__ = [
     "Rig",
     "__version__",
     "close_loop",
+    "control",
     "main",
     "names",
     "read_log",
@@ -120,6 +122,17 @@ class Outcome:
     def write(self, folder: _Path) -> None: ...
 
 @final
+class Episode:
+    @property
+    def log(self) -> Log: ...
+    @property
+    def rewards(self) -> _Array: ...
+    @property
+    def total(self) -> float: ...
+    @property
+    def success(self) -> bool: ...
+
+@final
 class Rig:
     def __new__(cls, plant: _Path, task: _Path | None = None) -> Rig: ...
     @property
@@ -142,6 +155,9 @@ def simulate(
     duration_s: float | None = None,
     name: _Path | None = None,
 ) -> Log: ...
+def control(
+    model: Model | _Path, plant: _Path, task: _Path | None = None, *, episodes: int = 1, seed: int = 0
+) -> list[Episode]: ...
 def names(of: str) -> list[str]: ...
 def stages() -> list[str]: ...
 def main(arguments: Sequence[str]) -> int: ...

@@ -2,6 +2,7 @@
 
 mod arrays;
 mod close_loop;
+mod control;
 mod error;
 mod log;
 mod model;
@@ -17,6 +18,8 @@ mod _residyn {
 
     #[pymodule_export]
     use crate::close_loop::{Outcome, close_loop, stages};
+    #[pymodule_export]
+    use crate::control::{Episode, control};
     #[pymodule_export]
     use crate::error::ResidynError;
     #[pymodule_export]

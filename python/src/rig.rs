@@ -51,24 +51,7 @@ impl Rig {
     #[pyo3(signature = (plant, task=None))]
     fn new(plant: PathBuf, task: Option<PathBuf>) -> PyResult<Self> {
         let plant = Plant::read(&plant, &Library::built_in()).or_raise()?;
-        let system = &plant.system.name;
-        let task = match task {
-            Some(path) => Task::read(&path).or_raise()?,
-            None => Task::of_system(system).ok_or_else(|| {
-                let known = Task::names().join(", ");
-                ResidynError::new_err(format!(
-                    "no built-in task is for {system}; give a task file (built in: {known})"
-                ))
-            })?,
-        };
-        if task.system != *system {
-            return Err(ResidynError::new_err(format!(
-                "the task {} is for {}, but the plant is {system}; give a task for it",
-                task.name(),
-                task.system
-            )));
-        }
-        task.check_for(plant.system.joints).or_raise()?;
+        let task = Task::for_plant(&plant, task.as_deref()).or_raise()?;
         Ok(Self {
             objective: task.objective(),
             random: rng(0),

@@ -17,6 +17,7 @@ use crate::plan::Method;
 use crate::plant::{Noise, Plant};
 use crate::report::film;
 use crate::runs::{Purpose, RunFolder, stream};
+use crate::train::Checkpoint;
 
 /// Control a simulated plant by model-predictive control with any model
 #[derive(Debug, Args)]
@@ -132,21 +133,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 
 /// The task, with the settings of the command line.
 fn task(arguments: &Arguments, plant: &Plant) -> Result<Task> {
-    let system = &plant.system.name;
-    let mut task = match &arguments.task {
-        Some(path) => Task::read(path)?,
-        None => Task::of_system(system).with_context(|| {
-            let known = Task::names().join(", ");
-            format!("no built-in task is for {system}; give --task FILE (built in: {known})")
-        })?,
-    };
-    if task.system != *system || task.joints() != plant.system.joints {
-        bail!(
-            "the task {} is for {}, but the plant is {system}; give a --task for it",
-            task.name(),
-            task.system
-        );
-    }
+    let mut task = Task::for_plant(plant, arguments.task.as_deref())?;
     let Arguments {
         replan,
         method,
@@ -182,7 +169,7 @@ fn predictor(arguments: &Arguments, library: &Library, task: &Task) -> Result<Pr
     match arguments.model.source() {
         Source::Checkpoint(dir) => {
             let device = arguments.common.device;
-            let (checkpoint, _, model) = inputs::checkpoint(dir, library, device)?;
+            let (checkpoint, _, model) = Checkpoint::open(dir, library, device)?;
             let integrator = checkpoint.manifest.settings.integrator;
             Ok(model.predictor(integrator))
         }

@@ -11,6 +11,7 @@ use crate::data::{Joint, LeaveOut, Log};
 use crate::identify::calibrate;
 use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Summary, TorqueError, assess, summarise, torque_error};
+use crate::train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
 #[derive(Debug, Args)]
@@ -126,8 +127,7 @@ fn model(arguments: &Arguments) -> Result<(Model, Dynamics)> {
             Ok((declared, dynamics))
         }
         Source::Checkpoint(dir) => {
-            let (_, declared, trained) =
-                inputs::checkpoint(dir, &library, arguments.common.device)?;
+            let (_, declared, trained) = Checkpoint::open(dir, &library, arguments.common.device)?;
             let dynamics = trained.to_dynamics()?;
             Ok((declared, dynamics))
         }

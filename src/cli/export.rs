@@ -13,7 +13,7 @@ use crate::files::{OutputError, folder_of};
 use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
 use crate::model::Library;
 use crate::sim::Integrator;
-use crate::train::Manifest;
+use crate::train::{Checkpoint, Manifest};
 
 /// Write a model for other programs, and compare their predictions with its own
 #[derive(Debug, Args)]
@@ -94,7 +94,7 @@ fn portable(arguments: &Arguments) -> Result<ExportModel> {
 
 fn of_checkpoint(arguments: &Arguments, dir: &Path, library: &Library) -> Result<ExportModel> {
     let device = arguments.common.device;
-    let (checkpoint, model, _) = inputs::checkpoint(dir, library, device)?;
+    let (checkpoint, model, _) = Checkpoint::open(dir, library, device)?;
     let Manifest {
         config,
         seed,

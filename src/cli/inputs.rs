@@ -8,7 +8,6 @@ use clap::Args;
 
 use crate::data::{Columns, LeaveOut, Log, audit, leave_out};
 use crate::model::{Library, Model};
-use crate::train::{Backend, Checkpoint, HybridModel};
 
 /// The effects that model files may name: the built-in ones and the user's own.
 #[derive(Debug, Args)]
@@ -54,20 +53,6 @@ impl ModelArguments {
             _ => unreachable!("clap asks for one of both"),
         }
     }
-}
-
-/// A checkpoint, the declared model in it, and the trained model.
-pub(super) fn checkpoint(
-    dir: &Path,
-    library: &Library,
-    backend: Backend,
-) -> Result<(Checkpoint, Model, HybridModel)> {
-    let checkpoint = Checkpoint::load(dir)?;
-    let file = dir.join("model.toml");
-    let declared = Model::from_text(&file, &checkpoint.model_toml, library.effects())?;
-    let physics = declared.dynamics();
-    let model = checkpoint.model(&physics, &backend.device())?;
-    Ok((checkpoint, declared, model))
 }
 
 /// Read logs for a system and leave out the given intervals; notes go to standard error.

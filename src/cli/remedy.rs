@@ -3,6 +3,7 @@ use std::io::ErrorKind;
 
 use crate::bench::GridError;
 use crate::bench::rigs::RigsError;
+use crate::control::NoTask;
 use crate::experiment::ExperimentError;
 use crate::files::OutputError;
 use crate::runs::RunFolderError;
@@ -12,6 +13,7 @@ use crate::train::recipe::RecipeError;
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
     None.or_else(|| error.downcast_ref().and_then(of_output))
         .or_else(|| error.downcast_ref().and_then(of_folder))
+        .or_else(|| error.downcast_ref().and_then(of_task))
         .or_else(|| error.downcast_ref().and_then(of_recipe))
         .or_else(|| error.downcast_ref().and_then(of_experiment))
         .or_else(|| error.downcast_ref().and_then(of_grid))
@@ -40,6 +42,11 @@ fn of_folder(error: &RunFolderError) -> Option<&'static str> {
         }
         RunFolderError::Output(_) => None,
     }
+}
+
+fn of_task(error: &NoTask) -> Option<&'static str> {
+    let may_be_given = !matches!(error, NoTask::Invalid(_));
+    may_be_given.then_some("name it with --task")
 }
 
 fn of_recipe(error: &RecipeError) -> Option<&'static str> {

@@ -10,4 +10,4 @@ pub use controller::{Controller, Policy, RandomTorque};
 pub use episode::{Episode, Stretch, drive, episode};
 pub use predictor::Predictor;
 pub use session::with_controller;
-pub use task::{Goal, PlantSettings, Task, TaskError};
+pub use task::{Goal, NoTask, PlantSettings, Task, TaskError};

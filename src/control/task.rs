@@ -76,6 +76,21 @@ pub struct TaskError {
     pub message: String,
 }
 
+/// Why there is no task for a plant.
+#[derive(Debug, Error)]
+pub enum NoTask {
+    #[error(transparent)]
+    Invalid(#[from] TaskError),
+    #[error("no built-in task is for {system}; give a task file (built in: {built_in})")]
+    None { system: String, built_in: String },
+    #[error("the task {task} is for {of}, but the plant is {system}; give a task for it")]
+    OtherSystem {
+        task: String,
+        of: String,
+        system: String,
+    },
+}
+
 /// The embedded tasks.
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/configs/tasks");
 
@@ -127,6 +142,29 @@ impl Task {
             .map(|task| task.expect("embedded tasks are read by a test"))
             .filter(|task| task.system == system)
             .max_by_key(|task| task.planner.horizon)
+    }
+
+    /// A task for a plant: of a file, or the embedded one of this name; without a name, that of the plant's system.
+    ///
+    /// # Errors
+    /// As [`Task::read`]; no task of the plant's system, or one of another.
+    pub fn for_plant(plant: &Plant, given: Option<&Path>) -> Result<Self, NoTask> {
+        let system = &plant.system.name;
+        let of_system = || {
+            Self::of_system(system).ok_or_else(|| NoTask::None {
+                system: system.clone(),
+                built_in: Self::names().join(", "),
+            })
+        };
+        let task = given.map_or_else(of_system, |path| Ok(Self::read(path)?))?;
+        match task.system == *system && task.joints() == plant.system.joints {
+            true => Ok(task),
+            false => Err(NoTask::OtherSystem {
+                task: task.name(),
+                system: system.clone(),
+                of: task.system,
+            }),
+        }
     }
 
     /// Its name: that of its file.

@@ -5,9 +5,9 @@ use burn::tensor::Device;
 
 use super::manifest::{FORMAT, Manifest};
 use super::optimizer::Moments;
-use super::{Best, CheckpointError, HybridModel, Training, moments};
+use super::{Backend, Best, CheckpointError, HybridModel, Training, moments};
 use crate::files::{content_id, end_of_links, folder_of, write_whole};
-use crate::model::{Dynamics, ModelWeights, Origin, SavedModelError, weights};
+use crate::model::{Dynamics, Library, Model, ModelWeights, Origin, SavedModelError, weights};
 
 const MANIFEST: &str = "checkpoint.json";
 const MODEL: &str = "model.toml";
@@ -161,6 +161,22 @@ impl Checkpoint {
             manifest,
             dir,
         })
+    }
+
+    /// A checkpoint, the declared model in it, and the trained model.
+    ///
+    /// # Errors
+    /// As [`Checkpoint::load`], or a model file that `library` cannot read.
+    pub fn open(
+        dir: &Path,
+        library: &Library,
+        backend: Backend,
+    ) -> Result<(Self, Model, HybridModel), CheckpointError> {
+        let checkpoint = Self::load(dir)?;
+        let text = &checkpoint.model_toml;
+        let declared = Model::from_text(&dir.join(MODEL), text, library.effects())?;
+        let trained = checkpoint.model(&declared.dynamics(), &backend.device())?;
+        Ok((checkpoint, declared, trained))
     }
 
     /// The checkpoint in `dir`, or none where `dir` does not exist or is empty.

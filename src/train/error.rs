@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use super::hybrid::HybridError;
-use crate::model::SavedModelError;
+use crate::model::{FileError, SavedModelError};
 
 /// Why a trajectory cannot be cut into segments.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -101,6 +101,8 @@ pub enum CheckpointError {
         source: std::io::Error,
         path: PathBuf,
     },
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error(transparent)]
     Files(#[from] SavedModelError),
     #[error(transparent)]
