@@ -26,6 +26,8 @@ from ._residyn import (
     names,
     read_log,
     simulate,
+    train,
+    tune,
 )
 from .loop import close_loop
 from .report import Effect, EffectParameter, Report
@@ -46,4 +48,6 @@ __all__ = [
     "names",
     "read_log",
     "simulate",
+    "train",
+    "tune",
 ]

@@ -26,6 +26,8 @@ __all__ = [
     "read_log",
     "simulate",
     "stages",
+    "train",
+    "tune",
 ]
 
 class ResidynError(ValueError): ...
@@ -158,6 +160,18 @@ def simulate(
 def control(
     model: Model | _Path, plant: _Path, task: _Path | None = None, *, episodes: int = 1, seed: int = 0
 ) -> list[Episode]: ...
+def train(
+    config: _Path, out: _Path, *, seed: int = 0, progress: Callable[[int, int, float], object] | None = None
+) -> dict[str, Any]: ...
+def tune(
+    checkpoint: _Path,
+    out: _Path,
+    *,
+    config: _Path | None = None,
+    logs: Sequence[_Path] = ...,
+    seed: int = 0,
+    progress: Callable[[int, int, float], object] | None = None,
+) -> dict[str, Any]: ...
 def names(of: str) -> list[str]: ...
 def stages() -> list[str]: ...
 def main(arguments: Sequence[str]) -> int: ...

@@ -7,6 +7,7 @@ mod error;
 mod log;
 mod model;
 mod rig;
+mod train;
 mod work;
 
 /// What every class and function of the package is made of.
@@ -28,6 +29,9 @@ mod _residyn {
     use crate::model::{Model, Parameter};
     #[pymodule_export]
     use crate::rig::{Rig, simulate};
+
+    #[pymodule_export]
+    use crate::train::{train, tune};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

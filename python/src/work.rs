@@ -1,16 +1,20 @@
 //! Long work, while Python goes on hearing signals.
 
+use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread;
-use std::time::Duration;
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
 /// How long Ctrl-C may go unheard.
 const LISTEN_EVERY: Duration = Duration::from_millis(50);
+
+/// How long to wait for work that is to stop, so that Ctrl-C has its effect within a second.
+const GRACE: Duration = Duration::from_millis(800);
 
 /// What long work tells of its progress to.
 #[derive(Clone)]
@@ -25,16 +29,24 @@ struct Stopped;
 impl<M> Listener<M> {
     /// Tell of progress; does not return where the work is to stop.
     pub fn tell(&self, message: M) {
-        if self.stopped.load(Ordering::Relaxed) || self.messages.send(message).is_err() {
+        if self.tell_or_stop(message).is_break() {
             resume_unwind(Box::new(Stopped));
+        }
+    }
+
+    /// Tell of progress, and hear whether to go on.
+    pub fn tell_or_stop(&self, message: M) -> ControlFlow<()> {
+        match !self.stopped.load(Ordering::Relaxed) && self.messages.send(message).is_ok() {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
         }
     }
 }
 
 /// Work on a thread of its own without the interpreter's lock; `heard` gets what it tells, with the lock.
 ///
-/// Where a signal comes (Ctrl-C), or `heard` raises, this returns at once, and the work ends at the next thing that it
-/// tells.
+/// Where a signal comes (Ctrl-C), or `heard` raises, the work ends at the next thing that it tells, and this returns then, or
+/// without it where that takes long.
 pub fn interruptible<T, M>(
     py: Python<'_>,
     work: impl FnOnce(&Listener<M>) -> T + Send + 'static,
@@ -61,7 +73,18 @@ where
             Err(why) => Ok(why == RecvTimeoutError::Timeout),
         }
     };
-    while listen().inspect_err(|_| stopped.store(true, Ordering::Relaxed))? {}
+    while listen().inspect_err(|_| stop(py, &stopped, &worker))? {}
     let ended = py.detach(|| worker.join());
     Ok(ended.unwrap_or_else(|panic| resume_unwind(panic)))
+}
+
+/// Tell the work to stop, and give it a moment to do so in order.
+fn stop<T>(py: Python<'_>, stopped: &AtomicBool, worker: &JoinHandle<T>) {
+    stopped.store(true, Ordering::Relaxed);
+    let end = Instant::now() + GRACE;
+    py.detach(|| {
+        while !worker.is_finished() && Instant::now() < end {
+            thread::sleep(Duration::from_millis(5));
+        }
+    });
 }

@@ -3,14 +3,13 @@
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use super::{Answer, Common, inputs, progress};
 use crate::runs::RunFolder;
-use crate::train::recipe::Job;
+use crate::train::recipe::{Job, Saves};
 use crate::train::{Progress, Training, save};
 
 /// Where and how often to save.
@@ -20,12 +19,9 @@ pub(super) struct Saving {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Epochs between checkpoints; one is also written when 10 s have passed
-    #[arg(long, default_value = "500", value_name = "EPOCHS")]
+    #[arg(long, default_value_t = Saves::EVERY, value_name = "EPOCHS")]
     save_every: NonZeroUsize,
 }
-
-/// The most work that an interruption can lose.
-const LONGEST_UNSAVED: Duration = Duration::from_secs(10);
 
 impl Saving {
     /// The folder asked for, or one named after the `source` of the run.
@@ -64,20 +60,16 @@ pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common)
 
 fn run(job: &Job, training: &mut Training, dir: &Path, saving: &Saving) -> Result<()> {
     let bar = progress::bar(training.settings().epochs);
-    let mut saved = Instant::now();
+    let mut saves = Saves::new(saving.save_every);
     let mut failed = None;
     let mut observer = |at: &Progress| {
         bar.set_position(at.epoch as u64);
         bar.set_message(format!("epochs, loss {:.3e}", at.loss));
-        let due = at.epoch.is_multiple_of(saving.save_every.get())
-            || at.epoch == at.epochs
-            || saved.elapsed() >= LONGEST_UNSAVED;
-        if due {
-            if let Err(error) = save(dir, at.training, &job.origin) {
-                failed = Some(error);
-                return ControlFlow::Break(());
-            }
-            saved = Instant::now();
+        if saves.are_due(at)
+            && let Err(error) = save(dir, at.training, &job.origin)
+        {
+            failed = Some(error);
+            return ControlFlow::Break(());
         }
         ControlFlow::Continue(())
     };
