@@ -9,7 +9,7 @@ use super::judge::{Estimate, Truth};
 use crate::closeloop::{Fitted, Settings, Split, Study, StudyError, with_intervals};
 use crate::data::Log;
 use crate::data::statistics::{mean, standard_error};
-use crate::identify::{Fit, blocks};
+use crate::identify::{Fit, blocks, uncertainty};
 use crate::model::{FittedEffect, Library, Model};
 use crate::sim::metric::assess;
 
@@ -166,7 +166,8 @@ impl<'a> Told<'a> {
     pub fn coverage(&self, truth: &Truth) -> Result<Vec<Coverage>, StudyError> {
         let fine = self.study.refined();
         let refined = fine.estimate(&self.fitted)?;
-        let model = with_intervals(&fine, &refined, &self.fitted.model);
+        let uncertainty = uncertainty(&fine.shooting, &refined.fit);
+        let model = with_intervals(&fine, &refined, &uncertainty, &self.fitted.model);
         let all = model.all_parameters();
         let declared: Vec<Estimate> = all[..model.parameters.len()]
             .iter()

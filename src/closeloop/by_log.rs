@@ -10,7 +10,7 @@ use super::refine::with_intervals;
 use super::score::Scorer;
 use super::study::Study;
 use crate::data::Log;
-use crate::identify::FitError;
+use crate::identify::{FitError, uncertainty};
 
 /// The chosen model, fitted to one training log alone.
 pub struct OfLog {
@@ -51,7 +51,8 @@ impl Study<'_> {
         };
         let locals = study.shooting.initial_locals(0);
         let mut fitted = study.refit(&chosen.model, locals, None)?;
-        fitted.model = with_intervals(&study, &fitted, &fitted.model);
+        let uncertainty = uncertainty(&study.shooting, &fitted.fit);
+        fitted.model = with_intervals(&study, &fitted, &uncertainty, &fitted.model);
         Ok(fitted)
     }
 

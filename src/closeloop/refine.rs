@@ -4,7 +4,9 @@ use super::fitted::Fitted;
 use super::settings::RefineSettings;
 use super::space::Space;
 use super::study::Study;
-use crate::identify::{BodiesTold, FitError, Identifiability, Values, bodies_told, uncertainty};
+use crate::identify::{
+    BodiesTold, FitError, Identifiability, Uncertainty, Values, bodies_told, uncertainty,
+};
 use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
@@ -47,8 +49,9 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
             }
         }
     };
-    let bodies = study.told_of_bodies(&after);
-    after.model = with_intervals(&study, &after, &chosen.model);
+    let uncertainty = uncertainty(&study.shooting, &after.fit);
+    let bodies = study.told_of_bodies(&after, &uncertainty);
+    after.model = with_intervals(&study, &after, &uncertainty, &chosen.model);
     Refined {
         bodies,
         study,
@@ -87,14 +90,13 @@ impl Study<'_> {
 
 impl Study<'_> {
     /// What the logs tell of the bodies of a chain.
-    fn told_of_bodies(&self, fitted: &Fitted) -> BodiesTold {
+    fn told_of_bodies(&self, fitted: &Fitted, uncertainty: &Uncertainty) -> BodiesTold {
         if self.space == Space::Motion {
             return BodiesTold::default();
         }
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
-        let uncertainty = uncertainty(&self.shooting, &fitted.fit);
-        bodies_told(&dynamics, self.declared, &values, &fitted.fit, &uncertainty)
+        bodies_told(&dynamics, self.declared, &values, &fitted.fit, uncertainty)
     }
 
     /// The same study where the noise of each joint is what a model leaves.
@@ -111,8 +113,12 @@ impl Study<'_> {
 /// A fitted model with its 95 % intervals; parameters that were not free have none. An interval reaches as much further
 /// as the value was off in `coarse` numbers: smoothing and steps err to first order, so that what halving them changes is
 /// what is left of their error (Richardson 1911).
-pub fn with_intervals(study: &Study<'_>, fitted: &Fitted, coarse: &Model) -> Model {
-    let uncertainty = uncertainty(&study.shooting, &fitted.fit);
+pub fn with_intervals(
+    study: &Study<'_>,
+    fitted: &Fitted,
+    uncertainty: &Uncertainty,
+    coarse: &Model,
+) -> Model {
     let (values, coarse) = (fitted.model.values(), coarse.values());
     let mut model = fitted.model.clone();
     for (i, column) in fitted.fit.columns.iter().enumerate() {
