@@ -66,6 +66,8 @@ pub mod sim;
 #[cfg(feature = "train")]
 pub mod train;
 
+mod layout;
+
 pub use closeloop::{Finding, Outcome, Reference, Request, Settings, Verdict, close_loop};
 pub use data::Log;
 pub use model::{Library, Model, Origin, Parameter};

@@ -8,6 +8,7 @@ mod arms;
 mod bad_input;
 mod bench;
 mod bench_rigs;
+mod check;
 mod clients;
 mod common;
 mod control;

@@ -2,6 +2,7 @@
 
 mod audit;
 mod bench;
+mod check;
 mod closeloop;
 mod control;
 mod evaluate;
@@ -47,6 +48,7 @@ enum Command {
     Closeloop(closeloop::Arguments),
     Report(report::Arguments),
     Audit(audit::Arguments),
+    Check(check::Arguments),
     Train(train::Arguments),
     Tune(tune::Arguments),
     Sweep(sweep::Arguments),
@@ -95,6 +97,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Audit(arguments) => audit::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Tune(arguments) => tune::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),

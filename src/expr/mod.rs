@@ -19,14 +19,17 @@ mod print;
 mod program;
 mod scope;
 mod steps;
+mod unit;
+mod units;
 
 pub use error::{FormulaError, suggestion};
 pub use eval::Tape;
 pub use graph::Graph;
 pub use latex::latex_name;
 pub use notation::{Notation, Part};
-pub use op::{Binary, Node, Op, Unary};
+pub use op::{Binary, Node, Op, Unary, is_function};
 pub use parse::{Formula, parse};
 
 pub use program::Program;
 pub use scope::{Scope, SignForm};
+pub use unit::{BASE, Unit};

@@ -74,6 +74,11 @@ pub(super) const FUNCTIONS: &[(&str, Function)] = &[
     ("where", Function::Where),
 ];
 
+/// Whether formulas know a function of this name.
+pub fn is_function(name: &str) -> bool {
+    Function::find(name).is_some()
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Function {
     Unary(Unary),

@@ -89,6 +89,16 @@ impl Model {
         })
     }
 
+    /// The mass matrix, row by row, as a program of the inputs of [`Dynamics`]; `None` for a model that gives accelerations.
+    pub(super) fn mass_program(&self) -> Option<Program> {
+        let sign = self.sign();
+        let mut assembly = Assembly::new(self, &self.effects, &sign);
+        assembly.apply_drive();
+        assembly.apply_sensors();
+        let (matrix, _) = assembly.mass_and_bias()?;
+        Some(assembly.graph.finish(&matrix.concat()))
+    }
+
     /// Every parameter of the model: the declared ones, then those of the effects, in their order.
     pub fn all_parameters(&self) -> Vec<Parameter> {
         let mut parameters = self.parameters.clone();
@@ -342,9 +352,19 @@ impl<'a> Assembly<'a> {
     }
 
     fn accelerations(&mut self) -> Vec<Node> {
+        if let Motion::Accelerations(formulas) = &self.system.equations.motion {
+            let scope = self.declared_scope();
+            return self.lowered(&scope, formulas);
+        }
+        let (matrix, bias) = self.mass_and_bias().expect("all other models have both");
+        self.solved(&matrix, &bias)
+    }
+
+    /// Mass matrix and bias, inertia of effects included; `None` for a model that gives accelerations.
+    fn mass_and_bias(&mut self) -> Option<(Vec<Vec<Node>>, Vec<Node>)> {
         let scope = self.declared_scope();
-        let (mut matrix, bias) = match &self.system.equations.motion {
-            Motion::Accelerations(formulas) => return self.lowered(&scope, formulas),
+        let (mut matrix, bias): (Vec<Vec<Node>>, _) = match &self.system.equations.motion {
+            Motion::Accelerations(_) => return None,
             Motion::MassAndBias { mass, bias } => {
                 let rows = mass.iter().map(|row| self.lowered(&scope, row));
                 (rows.collect(), self.lowered(&scope, bias))
@@ -357,7 +377,7 @@ impl<'a> Assembly<'a> {
             }
         };
         self.add_inertia(&mut matrix);
-        self.solved(&matrix, &bias)
+        Some((matrix, bias))
     }
 
     /// The torques that accelerations need.

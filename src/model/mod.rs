@@ -4,6 +4,7 @@ mod assemble;
 mod bodies;
 pub mod chain;
 mod chain_in_file;
+pub mod check;
 mod columns_in_file;
 mod drive;
 mod dynamics;

@@ -5,6 +5,7 @@ use std::fmt;
 use super::channel::Channel;
 use super::quality::{Audit, Severity};
 use crate::data::column::Quantity;
+use crate::layout::{LABEL, hanging};
 
 /// Widest line \[characters\].
 const WIDTH: usize = 100;
@@ -98,12 +99,9 @@ impl Audit {
                 Severity::Warning => "warning",
                 Severity::Info => "info",
             };
-            for (index, line) in wrap(&finding.text, WIDTH - 9).iter().enumerate() {
-                let label = if index == 0 { label } else { "" };
-                writeln!(f, "{label:<9}{line}")?;
-            }
+            f.write_str(&hanging(label, &finding.text, WIDTH))?;
             if let Some(remedy) = &finding.remedy {
-                writeln!(f, "{:<9}  paste: {remedy}", "")?;
+                writeln!(f, "{:<LABEL$}  paste: {remedy}", "")?;
             }
         }
         Ok(())
@@ -150,21 +148,6 @@ pub(super) fn short(value: f64) -> String {
     }
 }
 
-/// Breaks a text at spaces into lines of at most `width` characters.
-fn wrap(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().expect("there is a first line");
-        if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > width {
-            lines.push(word.to_owned());
-        } else {
-            line.push_str(if line.is_empty() { "" } else { " " });
-            line.push_str(word);
-        }
-    }
-    lines
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tests::{audit, swing};
@@ -199,11 +182,5 @@ mod tests {
         for name in ["q1", "qd1", "tau1", "reversals", "serious  qd1"] {
             assert!(text.contains(name), "{name} in\n{text}");
         }
-    }
-
-    #[test]
-    fn long_texts_are_broken_at_spaces() {
-        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
-        assert_eq!(wrap("", 7), [""]);
     }
 }

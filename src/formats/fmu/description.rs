@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::unit::{BASE, exponents};
 use super::variables::{Role, Variable};
 use super::{Fmu, Standard};
+use crate::expr::{BASE, Unit};
 use crate::formats::template::filled;
 use crate::formats::xml::escaped;
 
@@ -80,10 +80,10 @@ fn units(variables: &[Variable]) -> String {
 }
 
 fn unit(name: &str) -> String {
-    let base = exponents(name).map_or_else(String::new, |exponents| {
+    let base = Unit::parse(name).map_or_else(String::new, |unit| {
         let parts = BASE
             .iter()
-            .zip(exponents)
+            .zip(unit.exponents())
             .filter(|(_, exponent)| *exponent != 0);
         let parts: String = parts
             .map(|(base, exponent)| format!(" {base}=\"{exponent}\""))

@@ -3,7 +3,6 @@
 mod description;
 pub(super) mod fmi2;
 pub(super) mod fmi3;
-mod unit;
 mod variables;
 
 use std::io::{Cursor, Write};

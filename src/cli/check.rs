@@ -1,0 +1,46 @@
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use serde_json::json;
+
+use super::{Answer, Common, inputs};
+
+/// Check model files: parameters and inputs that nothing uses, mass matrix, units, names that mislead
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Exit status 1 where something is found, 2 where a file cannot be read.\n\nExample:\n  residyn check arm.toml"
+)]
+pub(super) struct Arguments {
+    /// Model files, or names of built-in systems
+    #[arg(required = true, value_name = "MODEL")]
+    models: Vec<PathBuf>,
+    #[command(flatten)]
+    effects: inputs::Effects,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let library = arguments.effects.library()?;
+    let models = arguments.models.iter().map(|path| library.model(path));
+    let models = models.collect::<Result<Vec<_>, _>>()?;
+    let mut rng = crate::rng(arguments.common.seed);
+    let checks: Vec<_> = models.iter().map(|model| model.check(&mut rng)).collect();
+    let named = || arguments.models.iter().zip(&checks);
+    if arguments.common.json {
+        let values = named().map(|(path, check)| {
+            let mut value = json!(check);
+            value["model"] = json!(path);
+            value
+        });
+        let values: Vec<_> = values.collect();
+        inputs::print(&(serde_json::to_string_pretty(&values)? + "\n"))?;
+    } else {
+        for (path, check) in named() {
+            inputs::print(&format!("{}: {check}\n", path.display()))?;
+        }
+    }
+    let is_clean = checks.iter().all(|check| check.findings.is_empty());
+    Ok(if is_clean { Answer::Yes } else { Answer::No })
+}

@@ -1,0 +1,115 @@
+//! A mass matrix that rigid bodies cannot have: not symmetric, singular, or with negative inertia in some direction.
+
+use nalgebra::DMatrix;
+use rand::{Rng, RngExt};
+
+use super::places::Places;
+use super::{Finding, Kind, Severity};
+use crate::data::Joint;
+use crate::model::system::{Model, Motion};
+
+/// States that are looked at, beside that with all joints at zero.
+const STATES: usize = 200;
+/// Within this share of the largest entry or eigenvalue numbers are equal, or zero.
+const ROUNDING: f64 = 1e-10;
+/// Half of a full turn, rad; joints that slide are moved by as many metres.
+const REACH: f64 = std::f64::consts::PI;
+
+/// The mass matrix in a state: angles or positions, then velocities.
+struct Sample {
+    state: Vec<f64>,
+    matrix: DMatrix<f64>,
+}
+
+pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Finding> {
+    let samples = samples(model, rng);
+    let faults = [not_finite, not_symmetric, not_positive];
+    // Where numbers are missing, or their mirror images differ, there are no eigenvalues to speak of.
+    let fault = faults.into_iter().find_map(|fault| fault(&samples));
+    let line = match &model.equations.motion {
+        Motion::MassAndBias { mass, .. } => places.line(mass[0][0].at),
+        _ => None,
+    };
+    let finding = |(sample, text): (&Sample, String)| Finding {
+        severity: Severity::Error,
+        kind: Kind::Mass,
+        line,
+        text: format!("the mass matrix {text}, at {}", at(model, &sample.state)),
+    };
+    fault.map(finding).into_iter().collect()
+}
+
+/// None for a model that gives accelerations.
+fn samples(model: &Model, rng: &mut impl Rng) -> Vec<Sample> {
+    let Some(program) = model.mass_program() else {
+        return Vec::new();
+    };
+    let n = model.joints;
+    let mut drawn = || {
+        (0..2 * n)
+            .map(|_| rng.random_range(-REACH..REACH))
+            .collect()
+    };
+    let mut states = vec![vec![0.0; 2 * n]];
+    states.extend((0..STATES).map(|_| -> Vec<f64> { drawn() }));
+    let sample = |state: Vec<f64>| {
+        let inputs = [&state, vec![0.0; n + 1].as_slice(), &model.values()].concat();
+        let matrix = DMatrix::from_row_slice(n, n, &program.eval(&inputs));
+        Sample { state, matrix }
+    };
+    states.into_iter().map(sample).collect()
+}
+
+fn not_finite(samples: &[Sample]) -> Option<(&Sample, String)> {
+    let is_finite = |sample: &Sample| sample.matrix.iter().all(|entry| entry.is_finite());
+    let sample = samples.iter().find(|sample| !is_finite(sample))?;
+    Some((sample, "has an entry that is no number".to_owned()))
+}
+
+fn not_symmetric(samples: &[Sample]) -> Option<(&Sample, String)> {
+    let difference = |sample: &Sample| (&sample.matrix - sample.matrix.transpose()).amax();
+    let share = |sample: &Sample| difference(sample) / sample.matrix.amax();
+    let worst = samples
+        .iter()
+        .max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    if !(share(worst) > ROUNDING) {
+        return None;
+    }
+    let apart = (&worst.matrix - worst.matrix.transpose()).map(f64::abs);
+    let (row, column) = apart.iamax_full();
+    let told = format!(
+        "is not symmetric: {:.4} in row {}, column {}, and {:.4} across the diagonal, of which only the lower is used",
+        worst.matrix[(row, column)],
+        row + 1,
+        column + 1,
+        worst.matrix[(column, row)]
+    );
+    Some((worst, told))
+}
+
+fn not_positive(samples: &[Sample]) -> Option<(&Sample, String)> {
+    let ends = |sample: &Sample| {
+        let eigenvalues = sample.matrix.symmetric_eigenvalues();
+        [eigenvalues.min(), eigenvalues.amax()]
+    };
+    let ends = samples.iter().map(|sample| (sample, ends(sample)));
+    let share = |[least, most]: [f64; 2]| if most > 0.0 { least / most } else { 0.0 };
+    let (sample, [least, most]) = ends.min_by(|a, b| share(a.1).total_cmp(&share(b.1)))?;
+    let share = share([least, most]);
+    if share > ROUNDING {
+        return None;
+    }
+    let what = match share < -ROUNDING {
+        true => "is not positive definite",
+        false => "is singular",
+    };
+    let told = format!("{what}: its smallest eigenvalue is {least:.3e}, its largest {most:.3e}");
+    Some((sample, told))
+}
+
+/// `q1 = 0, q2 = 1.571`; the velocities say something only where there are formulas of them.
+fn at(model: &Model, state: &[f64]) -> String {
+    let angles = Joint::all(model.joints).zip(state);
+    let angles = angles.map(|(joint, q)| format!("{} = {q:.4}", joint.name("q")));
+    angles.collect::<Vec<_>>().join(", ")
+}

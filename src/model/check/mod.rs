@@ -1,0 +1,129 @@
+//! What a model file says that cannot be meant, though it can be read: one file a kind of finding.
+
+mod inputs;
+mod mass;
+mod names;
+mod places;
+mod units;
+mod unused;
+
+use std::collections::HashSet;
+use std::fmt;
+
+use rand::Rng;
+use serde::Serialize;
+
+use self::places::Places;
+use super::system::Model;
+use crate::layout::hanging;
+
+/// Widest line \[characters\].
+const WIDTH: usize = 80;
+
+/// How much a finding matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// What is computed with this model is wrong, or cannot be computed.
+    Error,
+    /// The file says something that has no consequence, or another one than it seems.
+    Warning,
+}
+
+/// What a finding is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A parameter or an intermediate that no equation uses.
+    Unused,
+    /// A torque or a command that no equation uses.
+    Input,
+    /// A mass matrix that no rigid bodies have.
+    Mass,
+    /// Units that do not fit.
+    Units,
+    /// A name that hides another one or is easily taken for it.
+    Name,
+}
+
+/// One plain sentence about a model file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    pub severity: Severity,
+    pub kind: Kind,
+    /// Where it is in the file, counted from 1; `None` where it concerns no single line.
+    pub line: Option<usize>,
+    pub text: String,
+}
+
+/// What was found in a model file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Check {
+    /// The system's name.
+    pub name: String,
+    pub joints: usize,
+    pub parameters: usize,
+    /// Errors first, then in the order of the file.
+    pub findings: Vec<Finding>,
+}
+
+impl Model {
+    /// Look for what cannot be meant in the file of the model. Its mass matrix is looked at in states drawn from `rng`.
+    pub fn check(&self, rng: &mut impl Rng) -> Check {
+        let places = Places::of(self);
+        let mut findings = [
+            unused::find(self, &places),
+            inputs::find(self, &places),
+            mass::find(self, &places, rng),
+            units::find(self, &places),
+            names::find(self, &places),
+        ]
+        .concat();
+        findings.sort_by_key(|finding| (finding.severity, finding.line));
+        Check {
+            name: self.name.clone(),
+            joints: self.joints,
+            parameters: self.parameters.len(),
+            findings,
+        }
+    }
+
+    /// Every name that these formulas mention, themselves or through intermediates.
+    fn reached<'m>(&'m self, names: impl IntoIterator<Item = &'m str>) -> HashSet<&'m str> {
+        let mut reached: HashSet<&str> = names.into_iter().collect();
+        // An intermediate uses earlier ones alone.
+        for (name, formula) in self.equations.lets.iter().rev() {
+            if reached.contains(name.as_str()) {
+                reached.extend(formula.value.names());
+            }
+        }
+        reached
+    }
+}
+
+impl fmt::Display for Check {
+    /// The model in a line, then the findings; no line is longer than 80 characters, but for a word that is.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            name,
+            joints,
+            parameters,
+            findings,
+        } = self;
+        writeln!(f, "{name}: {joints} joint(s), {parameters} parameter(s)")?;
+        if findings.is_empty() {
+            return writeln!(f, "no findings");
+        }
+        for finding in findings {
+            let label = match finding.severity {
+                Severity::Error => "error",
+                Severity::Warning => "warning",
+            };
+            let place = finding
+                .line
+                .map_or_else(String::new, |line| format!("line {line}: "));
+            f.write_str(&hanging(label, &format!("{place}{}", finding.text), WIDTH))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,89 @@
+//! Names that hide others, or are easily taken for them.
+
+use super::places::Places;
+use super::{Finding, Kind, Severity};
+use crate::expr::is_function;
+use crate::model::effect::{COUPLING_NAMES, EFFECT_NAMES};
+use crate::model::system::Model;
+
+/// What joints have, by a number each.
+const NUMBERED: [&str; 6] = ["q", "qd", "qdd", "tau", "cmd", "load"];
+
+pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
+    let finding = |line: Option<usize>, text: String| Finding {
+        severity: Severity::Warning,
+        kind: Kind::Name,
+        line,
+        text,
+    };
+    let parameters = model
+        .parameters
+        .iter()
+        .map(|parameter| parameter.name.as_str());
+    let lets = model.equations.lets.iter().map(|(name, _)| name.as_str());
+    let of_parameters =
+        parameters.filter_map(|name| Some(finding(places.parameter(name), taken_for(name)?)));
+    let of_lets =
+        lets.filter_map(|name| Some(finding(places.intermediate(name), taken_for(name)?)));
+    let of_effects = model.effects.iter().enumerate().flat_map(|(k, _)| {
+        let line = places.effect(k);
+        let texts = renamed(model, k).into_iter().chain(hiding(model, k));
+        texts
+            .map(move |text| finding(line, text))
+            .collect::<Vec<_>>()
+    });
+    of_parameters.chain(of_lets).chain(of_effects).collect()
+}
+
+/// What a declared name may be mistaken for.
+fn taken_for(name: &str) -> Option<String> {
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    if is_function(name) {
+        Some(format!("`{name}` is a function, too: choose another name"))
+    } else if NUMBERED.contains(&stem) {
+        Some(format!(
+            "`{name}` reads like a quantity of a joint: choose another name"
+        ))
+    } else {
+        None
+    }
+}
+
+/// Parameters of the k-th effect whose names the declared ones have taken.
+fn renamed(model: &Model, k: usize) -> Vec<String> {
+    let effect = &model.effects[k];
+    let own: Vec<&str> = model.own_names().collect();
+    let plain = effect.parameter_names(&[]);
+    let names = plain.iter().zip(effect.parameter_names(&own));
+    names
+        .filter(|(plain, name)| *plain != name)
+        .map(|(plain, name)| {
+            format!(
+                "`{plain}` is declared, so that this parameter of {} is called `{name}` in reports",
+                effect.label()
+            )
+        })
+        .collect()
+}
+
+/// Parameters of the k-th effect that hide the motion of the joint from its own formula.
+fn hiding(model: &Model, k: usize) -> Vec<String> {
+    let effect = &model.effects[k].effect;
+    let known = match effect.is_coupling() {
+        true => COUPLING_NAMES.as_slice(),
+        false => EFFECT_NAMES.as_slice(),
+    };
+    let names = effect
+        .parameters
+        .iter()
+        .map(|parameter| parameter.name.as_str());
+    names
+        .filter(|name| known.contains(name) || is_function(name))
+        .map(|name| {
+            format!(
+                "the parameter `{name}` of {} hides what formulas know by that name",
+                effect.name
+            )
+        })
+        .collect()
+}

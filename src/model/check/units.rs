@@ -1,0 +1,245 @@
+//! Units that do not fit, where they are declared.
+//!
+//! Exact where it says something: what a number takes part in has no known unit, since lengths are numbers in formulas that were
+//! derived from a drawing, and neither has a command or a parameter without `unit`. Angles are pure numbers.
+
+use std::collections::HashMap;
+
+use super::places::Places;
+use super::{Finding, Kind, Severity};
+use crate::data::Joint;
+use crate::expr::{Formula, Unit};
+use crate::model::effect::{Effect, Entry};
+use crate::model::reader::Located;
+use crate::model::system::{Model, Motion};
+
+/// Names and their units, where they have one.
+type Names = HashMap<String, Option<Unit>>;
+
+pub(super) fn find(model: &Model, places: &Places) -> Vec<Finding> {
+    let mut units = Units {
+        places,
+        names: Names::new(),
+        findings: Vec::new(),
+    };
+    units.parameters(model);
+    units.states(model);
+    units.drive(model);
+    units.intermediates(model);
+    units.motion(model);
+    units.energy(model);
+    for (k, effect) in model.effects.iter().enumerate() {
+        units.effect(places.effect(k), &effect.effect);
+    }
+    units.findings
+}
+
+/// A unit as it is written here.
+fn unit(text: &str) -> Unit {
+    Unit::parse(text).expect("an SI unit").without_angle()
+}
+
+/// The unit that a file declares; none where it declares none, or one that is not known.
+fn declared(text: &str) -> Option<Unit> {
+    Unit::parse(text).map(Unit::without_angle)
+}
+
+/// Units of a joint's coordinate and of its force.
+fn of_joint(model: &Model, joint: Joint) -> [Unit; 2] {
+    match model.prismatic[joint] {
+        true => [unit("m"), unit("N")],
+        false => [unit("1"), unit("N m")],
+    }
+}
+
+struct Units<'p> {
+    places: &'p Places,
+    names: Names,
+    findings: Vec<Finding>,
+}
+
+impl Units<'_> {
+    fn parameters(&mut self, model: &Model) {
+        for parameter in &model.parameters {
+            let known = declared(&parameter.unit);
+            if known.is_none() && !parameter.unit.is_empty() {
+                let text = format!(
+                    "the unit `{}` of `{}` is not a product of SI units: values are in SI units, and what it takes part in is \
+                     not looked at",
+                    parameter.unit, parameter.name
+                );
+                self.tell(self.places.parameter(&parameter.name), text);
+            }
+            self.names.insert(parameter.name.clone(), known);
+        }
+    }
+
+    fn states(&mut self, model: &Model) {
+        for joint in Joint::all(model.joints) {
+            let [q, force] = of_joint(model, joint);
+            self.names.insert(joint.name("q"), Some(q));
+            self.names.insert(joint.name("qd"), Some(q.over(unit("s"))));
+            self.names.insert(joint.name("tau"), Some(force));
+        }
+        self.names.insert("t".to_owned(), Some(unit("s")));
+    }
+
+    fn drive(&mut self, model: &Model) {
+        let formulas = model
+            .equations
+            .drive
+            .iter()
+            .flat_map(|drive| drive.formulas());
+        for (joint, formula) in Joint::all(model.joints).zip(formulas) {
+            let [_, force] = of_joint(model, joint);
+            self.expect(
+                &format!("the torque `{}`", joint.name("tau")),
+                formula,
+                force,
+            );
+        }
+    }
+
+    fn intermediates(&mut self, model: &Model) {
+        for (name, formula) in &model.equations.lets {
+            let unit = self.of(formula);
+            self.names.insert(name.clone(), unit);
+        }
+    }
+
+    fn motion(&mut self, model: &Model) {
+        let square = unit("s^2");
+        let joints = || Joint::all(model.joints);
+        match &model.equations.motion {
+            Motion::Accelerations(formulas) => {
+                for (joint, formula) in joints().zip(formulas) {
+                    let [q, _] = of_joint(model, joint);
+                    let name = format!("the acceleration `{}`", joint.name("qdd"));
+                    self.expect(&name, formula, q.over(square));
+                }
+            }
+            Motion::MassAndBias { mass, bias } => {
+                for (i, row) in joints().zip(mass) {
+                    let [_, force] = of_joint(model, i);
+                    for (j, formula) in joints().zip(row) {
+                        let [q, _] = of_joint(model, j);
+                        let name = format!("entry {i}, {j} of `mass`");
+                        self.expect(&name, formula, force.times(square).over(q));
+                    }
+                    self.expect(&format!("entry {i} of `bias`"), &bias[i], force);
+                }
+            }
+            Motion::Chain(bodies) => {
+                for formula in &bodies.gravity {
+                    self.expect("`gravity`", formula, unit("m/s^2"));
+                }
+                for body in &bodies.bodies {
+                    self.expect("`mass`", &body.mass, unit("kg"));
+                    for formula in &body.moment {
+                        self.expect("`moment`", formula, unit("kg m"));
+                    }
+                    for formula in &body.tensor {
+                        self.expect("`inertia`", formula, unit("kg m^2"));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Both may be relative to an inertia: they have to fit each other.
+    fn energy(&mut self, model: &Model) {
+        if let Some(energy) = &model.equations.energy
+            && let Some(total) = self.of(&energy.total)
+        {
+            let power = total.over(unit("s"));
+            self.expect("`power` beside `total`", &energy.power, power);
+        }
+    }
+
+    /// An effect in the units of its file, which are those of a joint that turns.
+    fn effect(&mut self, line: Option<usize>, effect: &Effect) {
+        let motion = [
+            ("q", "1"),
+            ("qd", "1/s"),
+            ("qdd", "1/s^2"),
+            ("tau", "N m"),
+            ("load", "N m"),
+            ("t", "s"),
+        ];
+        let motion = motion.map(|(name, text)| (name.to_owned(), Some(unit(text))));
+        let parameters = effect.parameters.iter();
+        let parameters = parameters.map(|p| (p.name.clone(), declared(&p.unit)));
+        let names: Names = motion.into_iter().chain(parameters).collect();
+        let (formula, of_kind) = match &effect.entry {
+            Entry::Force(formula) | Entry::Torque(formula) | Entry::Coupling(formula) => {
+                (formula, "N m")
+            }
+            Entry::Angle(formula) | Entry::Reading(formula) => (formula, "1"),
+            Entry::Inertia(formula) => (formula, "kg m^2"),
+            Entry::Payload(formula) => (formula, "kg"),
+            Entry::Shift(..) | Entry::Command(_) => return,
+        };
+        self.fit(
+            &format!("the formula of {}", effect.name),
+            formula,
+            line,
+            unit(of_kind),
+            &names,
+        );
+    }
+}
+
+impl Units<'_> {
+    /// The unit of a formula of the declared equations, whose misfits are told.
+    fn of(&mut self, formula: &Located<Formula>) -> Option<Unit> {
+        let names = std::mem::take(&mut self.names);
+        let unit = self.unit(&formula.value, self.places.line(formula.at), &names);
+        self.names = names;
+        unit
+    }
+
+    /// A formula of the declared equations whose value has this unit.
+    fn expect(&mut self, what: &str, formula: &Located<Formula>, wanted: Unit) {
+        let names = std::mem::take(&mut self.names);
+        let line = self.places.line(formula.at);
+        self.fit(what, &formula.value, line, wanted, &names);
+        self.names = names;
+    }
+
+    fn fit(
+        &mut self,
+        what: &str,
+        formula: &Formula,
+        line: Option<usize>,
+        wanted: Unit,
+        names: &Names,
+    ) {
+        if let Some(unit) = self
+            .unit(formula, line, names)
+            .filter(|unit| *unit != wanted)
+        {
+            let text = format!(
+                "{what} is `{}` [{unit}], and should be in [{wanted}]",
+                formula.text()
+            );
+            self.tell(line, text);
+        }
+    }
+
+    fn unit(&mut self, formula: &Formula, line: Option<usize>, names: &Names) -> Option<Unit> {
+        let (unit, misfits) = formula.unit(&|name| names.get(name).copied().flatten());
+        for misfit in misfits {
+            self.tell(line, misfit.message);
+        }
+        unit
+    }
+
+    fn tell(&mut self, line: Option<usize>, text: String) {
+        self.findings.push(Finding {
+            severity: Severity::Warning,
+            kind: Kind::Units,
+            line,
+            text,
+        });
+    }
+}

@@ -1,0 +1,241 @@
+//! What `residyn check` finds in model files, and that it finds nothing in those that are shipped.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use residyn::data::Joint;
+use residyn::model::FittedEffect;
+use residyn::model::check::{Check, Finding, Kind, Severity};
+use residyn::{Library, Model, rng};
+
+use crate::support::{refuses, residyn, succeeds, text};
+
+fn check(file: &str) -> Check {
+    let library = Library::built_in();
+    let model = Model::from_text(Path::new("broken.toml"), file, library.effects()).unwrap();
+    model.check(&mut rng(0))
+}
+
+/// Every TOML file of a folder of the project that describes a system.
+fn shipped(folder: &str) -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+    let files = fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let is_model =
+        |path: &PathBuf| path.is_file() && fs::read_to_string(path).unwrap().contains("[system]");
+    files.filter(is_model).collect()
+}
+
+#[test]
+fn shipped_models_are_clean() {
+    let folders = ["models", "docs/rigs", "configs/bench"];
+    let files: Vec<PathBuf> = folders.into_iter().flat_map(shipped).collect();
+    assert!(files.len() >= 14, "{files:?}");
+    let models: Vec<&str> = files.iter().map(|file| text(file)).collect();
+    let said = succeeds(&[&["check"], models.as_slice()].concat());
+    assert_eq!(said.matches("no findings").count(), files.len(), "{said}");
+}
+
+#[test]
+fn models_made_from_a_robot_description_are_clean() {
+    let folder = tempfile::tempdir().unwrap();
+    let mechanisms = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/mechanisms");
+    for (arm, from) in [
+        ("spatial_3r.urdf", "--from-urdf"),
+        ("planar_2r.urdf", "--from-urdf"),
+        ("prr.xml", "--from-mjcf"),
+    ] {
+        let out = folder.path().join(format!("{arm}.toml"));
+        let mechanism = mechanisms.join(arm);
+        succeeds(&["new", from, text(&mechanism), "--out", text(&out)]);
+        succeeds(&["check", text(&out)]);
+    }
+}
+
+#[test]
+fn the_units_of_all_effects_fit() {
+    let library = Library::built_in();
+    let cartpole = library.model("cartpole").unwrap();
+    for effect in library.effects() {
+        let effects = vec![FittedEffect::absent(effect, Joint::at(0))];
+        let found = cartpole.with_effects(effects).check(&mut rng(0)).findings;
+        assert!(found.is_empty(), "{found:?}");
+    }
+}
+
+/// A built-in model with one text in place of another, and what is found in it: kind, line, and words.
+const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
+    (
+        "acrobot",
+        ["g = {", "h = { value = 1.0 }\ng = {"],
+        Kind::Unused,
+        14,
+        "no equation uses `h`",
+    ),
+    (
+        "acrobot",
+        ["S2 =", "half = \"0.5*d1\"\nS2 ="],
+        Kind::Unused,
+        19,
+        "no equation uses `half`",
+    ),
+    (
+        "drive",
+        ["\"m\"", "\"1\""],
+        Kind::Unused,
+        8,
+        "only [energy] uses `m`",
+    ),
+    (
+        "pendulum",
+        ["+ C_i * tau1", ""],
+        Kind::Input,
+        11,
+        "no acceleration uses `tau1`",
+    ),
+    (
+        "servo",
+        ["(cmd1 - q1)", "(-q1)"],
+        Kind::Input,
+        14,
+        "no formula of [drive] uses `cmd1`",
+    ),
+    (
+        "acrobot",
+        ["[\"d2\", \"m2", "[\"d1\", \"m2"],
+        Kind::Mass,
+        23,
+        "is not symmetric",
+    ),
+    (
+        "acrobot",
+        ["\"m2*lc2^2 + I2\"]", "\"m2*lc2^2 - I2\"]"],
+        Kind::Mass,
+        23,
+        "is not positive definite: its smallest eigenvalue is -",
+    ),
+    (
+        "acrobot",
+        ["[\"d2\", \"m2*lc2^2 + I2\"]", "[\"d2\", \"d2^2/d1\"]"],
+        Kind::Mass,
+        23,
+        "is singular: its smallest eigenvalue is",
+    ),
+    (
+        "acrobot",
+        ["\"m2*lc2^2 + I2\"]", "\"I2/(q1 + q2)\"]"],
+        Kind::Mass,
+        23,
+        "has an entry that is no number, at q1 = 0.0000, q2 = 0.0000",
+    ),
+    (
+        "acrobot",
+        ["m1*lc1^2 +", "m1*lc1 +"],
+        Kind::Units,
+        17,
+        "`m1*lc1` [kg m] and `m2*(l1^2",
+    ),
+    (
+        "servo",
+        ["G*sin(q1)\"]", "G*sin(q1)/kd\"]"],
+        Kind::Units,
+        18,
+        "entry 1 of `bias` is `G*sin(q1)/kd` [1/s], and should be in [N m]",
+    ),
+    (
+        "pendulum",
+        ["\"1/(kg m^2)\"", "\"1/kg\""],
+        Kind::Units,
+        11,
+        "`C_g * sin(q1)` [1/s^2] and `C_i * tau1` [m^2/s^2] cannot be added or compared",
+    ),
+    (
+        "drive",
+        ["\"kg\"", "\"lb\""],
+        Kind::Units,
+        8,
+        "the unit `lb` of `m` is not",
+    ),
+    (
+        "drive",
+        ["[dynamics]", "sign = { value = 1.0 }\n[dynamics]"],
+        Kind::Name,
+        10,
+        "`sign` is a function",
+    ),
+    (
+        "drive",
+        ["[dynamics]", "tau2 = { value = 1.0 }\n[dynamics]"],
+        Kind::Name,
+        10,
+        "`tau2` reads like a quantity of a joint",
+    ),
+];
+
+#[test]
+fn what_is_broken_is_found_with_its_line() {
+    for (model, [from, to], kind, line, words) in BROKEN {
+        let file = Library::system_text(model).unwrap();
+        assert!(file.contains(from), "{from}");
+        let found = check(&file.replacen(from, to, 1)).findings;
+        let is_it = |finding: &&Finding| finding.kind == *kind && finding.text.contains(words);
+        let finding = found.iter().find(is_it);
+        let finding = finding.unwrap_or_else(|| panic!("{words}: {found:?}"));
+        assert_eq!(finding.line, Some(*line), "{finding:?}");
+        let is_error = finding.severity == Severity::Error;
+        assert_eq!(is_error, *kind == Kind::Mass, "{finding:?}");
+    }
+}
+
+#[test]
+fn parameters_of_effects_are_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let effect = "[effect]\nname = \"drag\"\nabout = \"drag\"\nforce = \"-c*qd*abs(qd)*sin(q)\"\n\
+        [parameters]\nc = { unit = \"N m\", typical = 1 }\nq = { unit = \"1\", typical = 1 }\nd = { unit = \"1\", typical = 1 }\n";
+    fs::write(folder.path().join("drag.toml"), effect).unwrap();
+    let library = Library::built_in().with_folder(folder.path()).unwrap();
+    let drive = Library::system_text("drive").unwrap();
+    let with = format!("{drive}\n[[effect]]\nname = \"drag\"\njoint = 1\nc = 1\nq = 1\nd = 1\n");
+    let with = with.replace("[dynamics]", "c1 = { value = 1.0 }\n[dynamics]");
+    let model = Model::from_text(Path::new("rig.toml"), &with, library.effects()).unwrap();
+    let found = model.check(&mut rng(0)).findings;
+    for words in [
+        "the formula of drag does not use its parameter `d`",
+        "the formula of drag is `-c*qd*abs(qd)*sin(q)` [kg m^2/s^4], and should be in [N m]",
+        "the parameter `q` of drag hides what formulas know by that name",
+        "`c1` is declared, so that this parameter of drag on joint 1 is called `drag_c1`",
+    ] {
+        let says = |finding: &Finding| finding.text.contains(words);
+        assert!(found.iter().any(says), "{words}: {found:?}");
+    }
+}
+
+#[test]
+fn the_exit_status_says_whether_something_was_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rig.toml");
+    let drive = Library::system_text("drive").unwrap();
+    fs::write(&file, drive.replace("\"kg\"", "\"lb\"")).unwrap();
+    let output = residyn(&["check", "pendulum", text(&file)]);
+    assert_eq!(output.status.code(), Some(1));
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        said.lines().all(|line| line.chars().count() <= 80),
+        "{said}"
+    );
+    assert!(said.contains("warning  line 8: the unit `lb`"), "{said}");
+    let output = residyn(&["check", "--json", text(&file)]);
+    assert_eq!(output.status.code(), Some(1));
+    let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(value[0]["model"], text(&file));
+    let finding = &value[0]["findings"][0];
+    assert_eq!(finding["kind"], "units");
+    assert_eq!(finding["severity"], "warning");
+    fs::write(&file, drive.replace("value = 1.0", "value = -1.0")).unwrap();
+    let said = refuses(&["check", text(&file)]);
+    assert!(
+        said.contains("rig.toml, line 8") && said.contains("outside of its bounds"),
+        "{said}"
+    );
+}
