@@ -15,6 +15,7 @@ mod control;
 mod demo;
 mod drives;
 mod effects;
+mod elsewhere;
 mod experiments;
 mod export;
 mod export_c;

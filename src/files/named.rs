@@ -7,13 +7,15 @@ pub fn beside(path: &Path, file: &Path) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(file)
 }
 
-/// `file` as the file at `path` names it or, where there is no such file, the name as it is: that of something built in.
+/// `file` as the file at `path` names it or, where that is a plain name and no such file is there, the name as it is: that of
+/// something built in. A path never depends on the folder in which the program is run.
 pub fn beside_or_named(path: &Path, file: &Path) -> PathBuf {
     let beside = beside(path, file);
-    if beside.is_file() {
-        beside
-    } else {
+    let is_plain = file.extension().is_none() && file.components().count() == 1;
+    if is_plain && !beside.is_file() {
         file.to_owned()
+    } else {
+        beside
     }
 }
 
@@ -55,5 +57,13 @@ mod tests {
         fs::write(&own, "own").unwrap();
         assert_eq!(text(), "own");
         assert!(text_or_embedded(&folder.path().join("none"), embedded).is_err());
+    }
+
+    #[test]
+    fn what_is_missing_is_missed_beside_the_file_that_names_it() {
+        for file in ["own.toml", "../plants/own"] {
+            let named = beside_or_named(Path::new("elsewhere/recipe.toml"), Path::new(file));
+            assert_eq!(named, Path::new("elsewhere").join(file));
+        }
     }
 }
