@@ -3,8 +3,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use super::{Answer, Common, inputs};
-use crate::data::{Audit, Columns, Log, audit, tell_repeats};
+use super::{Answer, Common, inputs, voice};
+use crate::data::{Audit, Columns, Log, Severity, audit, tell_repeats};
 use crate::model::Library;
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and what mends them
@@ -24,19 +24,31 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let (logs, columns) = read(arguments)?;
+    let (logs, columns) = voice::stage("reading the logs", || read(arguments))?;
     inputs::print_notes(&logs);
     let mut audits: Vec<Audit> = logs.iter().map(|log| audit(log, &columns)).collect();
     tell_repeats(&logs, &mut audits);
     if arguments.common.json {
-        inputs::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
+        voice::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
     } else {
         for audit in &audits {
-            inputs::print(&format!("{audit}\n"))?;
+            voice::answer(headline(audit), &format!("{audit}\n"))?;
         }
     }
     let serious = audits.iter().any(|audit| audit.serious().next().is_some());
     Ok(if serious { Answer::No } else { Answer::Yes })
+}
+
+/// `run1.csv: 1 serious, 2 warning(s)`
+fn headline(audit: &Audit) -> String {
+    let count = |severity| {
+        let findings = audit.findings.iter();
+        findings
+            .filter(|finding| finding.severity == severity)
+            .count()
+    };
+    let [serious, warnings] = [Severity::Serious, Severity::Warning].map(count);
+    format!("{}: {serious} serious, {warnings} warning(s)", audit.log)
 }
 
 /// The logs and what their columns are.

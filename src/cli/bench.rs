@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
 
-use super::{Answer, Common, inputs, progress, told};
+use super::{Answer, Common, interrupt, progress, told, voice};
 use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
 use crate::files::content_id;
 use crate::model::Library;
@@ -73,13 +73,13 @@ fn effects(arguments: &Effects) -> Result<Answer> {
     })?;
     let folder = RunFolder::open(&arguments.out)?;
     let store = Store::open(&arguments.out)?;
-    let lines = store.run(&cells)?;
+    let lines = store.run(&cells, &folder)?;
     let summary = summarise(&lines);
     let text = markdown(&summary);
     let json = serde_json::to_string_pretty(&summary)? + "\n";
     folder.write_text("summary.json", &json)?;
     folder.write_text("table.md", &text)?;
-    inputs::print(if arguments.common.json { &json } else { &text })?;
+    voice::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }
 
@@ -121,8 +121,9 @@ impl Store {
     }
 
     /// Results of all cells; stored ones are not computed again.
-    fn run(&self, cells: &[Cell]) -> Result<Vec<Line>> {
+    fn run(&self, cells: &[Cell], folder: &RunFolder) -> Result<Vec<Line>> {
         let bar = progress::bar(cells.len());
+        let _orderly = interrupt::counted(folder, &bar, "cells");
         let library = Library::built_in();
         let mut lines = Vec::with_capacity(cells.len());
         for cell in cells {

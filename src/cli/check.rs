@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, inputs};
+use super::{Answer, Common, inputs, voice};
 
 /// Check model files: parameters and inputs that nothing uses, mass matrix, units, names that mislead
 #[derive(Debug, Args)]
@@ -35,10 +35,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             value
         });
         let values: Vec<_> = values.collect();
-        inputs::print(&(serde_json::to_string_pretty(&values)? + "\n"))?;
+        voice::print(&(serde_json::to_string_pretty(&values)? + "\n"))?;
     } else {
         for (path, check) in named() {
-            inputs::print(&format!("{}: {check}\n", path.display()))?;
+            let path = path.display();
+            let headline = format!("{path}: {} finding(s)", check.findings.len());
+            voice::answer(headline, &format!("{path}: {check}\n"))?;
         }
     }
     let is_clean = checks.iter().all(|check| check.findings.is_empty());

@@ -1,15 +1,17 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Answer, Common, inputs, progress};
+use super::{Answer, Common, inputs, interrupt, progress, voice};
 use crate::closeloop::{
-    Outcome, Reference, Request, Settings, Space, Split, Stage, Verdict, calibrate, close_loop,
+    Outcome, Reference, Request, Settings, Space, Split, Verdict, calibrate, close_loop,
 };
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Model, Origin};
@@ -84,15 +86,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let library = arguments.effects.library()?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let (declared, split) = match &arguments.model {
-        Some(model) => measured(arguments, model, &library)?,
+        Some(model) => voice::stage("reading the logs", || measured(arguments, model, &library))?,
         None => demo(&library, &mut rng)?,
     };
     let against = references(&arguments.against, &declared, &library)?;
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
-    let _folder = RunFolder::open(&arguments.out)?;
-    let bar = progress::bar(Stage::ALL.len());
+    let folder = RunFolder::open(&arguments.out)?;
+    let written = Arc::new(AtomicBool::new(false));
+    let _orderly = interrupt::orderly(&folder, kept(&arguments.out, &written));
+    let mut stages = progress::Stages::new();
     let learner = ResidualTrainer {
         backend: arguments.common.device,
     };
@@ -101,18 +105,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     request.learner = Some(&learner);
     request.budget = Some(arguments.budget);
     request.space = arguments.errors.map(Space::from);
-    let mut estimate = progress::Estimate::new();
-    let mut outcome = close_loop(request, &mut rng, &mut |now| {
-        bar.set_position(now.stage.number() as u64);
-        bar.set_message(estimate.message(&now));
-    })?;
-    bar.finish_and_clear();
+    let mut outcome = close_loop(request, &mut rng, &mut |now| stages.show(&now))?;
+    stages.finish();
     let origin = origin(arguments, &declared);
-    let mut report = report::write(&arguments.out, &outcome, &origin)?;
+    let write = |outcome: &Outcome| {
+        interrupt::whole(|| {
+            let report = report::write(&arguments.out, outcome, &origin)?;
+            written.store(true, Ordering::SeqCst);
+            Ok::<_, anyhow::Error>(report)
+        })
+    };
+    let mut report = voice::stage("writing the report", || write(&outcome))?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
         let bar = progress::bar(runs.get());
         let study = outcome.study(&declared);
+        let begun = Instant::now();
         let calibration = calibrate(
             &study,
             &outcome.models.after,
@@ -127,14 +135,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         )?;
         outcome.calibration = Some(calibration);
         bar.finish_and_clear();
-        report = report::write(&arguments.out, &outcome, &origin)?;
+        voice::took("simulating the accepted model", begun);
+        report = write(&outcome)?;
     }
     if arguments.common.json {
-        inputs::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+        voice::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
-        inputs::print(&report::summary(&report, &outcome.seconds, &arguments.out))?;
+        let summary = report::summary(&report, &outcome.seconds, &arguments.out);
+        voice::answer(report::answer(&report), &summary)?;
     }
     Ok(answer(&outcome))
+}
+
+/// What Ctrl-C leaves.
+fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + 'static {
+    let (out, written) = (out.display().to_string(), Arc::clone(written));
+    move || match written.load(Ordering::SeqCst) {
+        false => "nothing was written".to_owned(),
+        true => format!("{out} has the report, without what --calibrate asks for"),
+    }
 }
 
 fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {

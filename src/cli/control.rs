@@ -8,7 +8,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{self, Source};
-use super::{Answer, Common, progress};
+use super::{Answer, Common, progress, voice};
 use crate::control::{Controller, Episode, Policy, Predictor, Task, episode, with_controller};
 use crate::data::statistics::{mean, sample_deviation};
 use crate::files::write_whole;
@@ -122,12 +122,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     bar.finish_and_clear();
     let printed = Printed::new(arguments, task, entries);
-    let json = serde_json::to_string_pretty(&printed)? + "\n";
-    inputs::print(&if arguments.common.json {
-        json
+    if arguments.common.json {
+        voice::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
     } else {
-        table(&printed)
-    })?;
+        let Printed {
+            return_mean,
+            successes,
+            ..
+        } = printed;
+        let headline =
+            format!("return {return_mean:.2}; {successes} of {count} episode(s) succeed");
+        voice::answer(headline, &table(&printed))?;
+    }
     Ok(Answer::Yes)
 }
 

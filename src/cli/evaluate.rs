@@ -6,7 +6,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{self, Source};
-use super::{Answer, Common};
+use super::{Answer, Common, voice};
 use crate::data::{Joint, LeaveOut, Log};
 use crate::identify::calibrate;
 use crate::model::{Dynamics, Model};
@@ -72,7 +72,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bail!("--horizon {bad}: a horizon is a number of seconds above zero");
     }
     let (declared, dynamics) = model(arguments)?;
-    let mut logs = inputs::logs(&arguments.test, &declared)?;
+    let mut logs = voice::stage("reading the logs", || {
+        inputs::logs(&arguments.test, &declared)
+    })?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
     inputs::print_notes_and_faults(&logs, &declared.columns);
     let offsets = arguments
@@ -80,7 +82,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .map(|share| calibrate(&dynamics, &mut logs, share))
         .transpose()?;
     let dynamics = offsets.as_ref().map_or(&dynamics, |found| &found.dynamics);
-    let assessment = assess(dynamics, &logs, &arguments.horizon);
+    let assess = || assess(dynamics, &logs, &arguments.horizon);
+    let assessment = voice::stage("predicting", assess);
     let summary = summarise(&assessment.horizons, declared.joints);
     if let Some(h) = summary.windows.iter().position(|count| *count == 0) {
         bail!(
@@ -109,10 +112,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             integrator_step_s: assessment.step_s,
             integrator_error: assessment.step_error,
         };
-        inputs::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
+        voice::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
     } else {
         let torque = torque.as_ref().map_or_else(String::new, torques);
-        inputs::print(&(table(&summary) + &torque))?;
+        voice::print(&(table(&summary) + &torque))?;
     }
     Ok(Answer::Yes)
 }

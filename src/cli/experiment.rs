@@ -4,7 +4,7 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 
-use super::{Answer, Common, command_line, inputs, progress};
+use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
 use crate::experiment::undeclared_effect::{self, Trial};
 use crate::experiment::{Config, Experiment, FinishedRound, Session, picture};
 use crate::model::Library;
@@ -47,6 +47,7 @@ const WALL: &str = "wall_s";
 /// The results of an experiment, as printed and written.
 struct Finished {
     json: String,
+    headline: String,
     text: String,
     /// Whether its target was reached.
     answer: Answer,
@@ -66,7 +67,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     clock.save();
     folder.write_text("results.json", &finished.json)?;
     let json = arguments.common.json;
-    inputs::print(if json { &finished.json } else { &finished.text })?;
+    match json {
+        true => voice::print(&finished.json)?,
+        false => voice::answer(&finished.headline, &finished.text)?,
+    }
     Ok(finished.answer)
 }
 
@@ -79,7 +83,9 @@ fn published(
     let Common { device, seed, .. } = arguments.common;
     let config = Config::read(&arguments.config)?;
     let session = Session::open(config, library, device, seed)?;
+    let begun = Instant::now();
     let bar = progress::bar(session.rounds());
+    let _orderly = interrupt::counted(clock.folder, &bar, "rounds");
     let results = session.carry_out(experiment, clock.folder, &|step: &FinishedRound<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
@@ -88,12 +94,14 @@ fn published(
         }
     });
     bar.finish_and_clear();
+    voice::took("learning and judging", begun);
     let results = results?.finished(command_line(), clock.wall_s());
     clock
         .folder
         .write_text("results.svg", &picture(&results)?)?;
     Ok(Finished {
         json: serde_json::to_string_pretty(&results)? + "\n",
+        headline: arguments.out.join("results.json").display().to_string(),
         text: format!(
             "{}{}",
             results.text(),
@@ -111,14 +119,17 @@ fn undeclared_effect(
     let Common { device, seed, .. } = arguments.common;
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
     let session = undeclared_effect::Session::new(experiment, library, device, seed)?;
+    let begun = Instant::now();
     let trials = session.experiment.seeds * session.plants.len() as u64;
     let bar = progress::bar(usize::try_from(trials)?);
+    let _orderly = interrupt::counted(clock.folder, &bar, "trials");
     let outcome = session.run(clock.folder, &|trial: &Trial| {
         bar.inc(1);
         bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
         clock.save();
     });
     bar.finish_and_clear();
+    voice::took("trials", begun);
     let outcome = outcome?;
     let mut value = serde_json::to_value(&outcome)?;
     value["experiment"] = "undeclared-effect".into();
@@ -126,6 +137,7 @@ fn undeclared_effect(
     value["wall_s"] = clock.wall_s().into();
     Ok(Finished {
         json: serde_json::to_string_pretty(&value)? + "\n",
+        headline: arguments.out.join("results.json").display().to_string(),
         text: format!(
             "{}{}",
             outcome.text(),

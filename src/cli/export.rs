@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
-use super::{Answer, Common};
+use super::{Answer, Common, voice};
 use crate::files::{OutputError, folder_of};
 use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
 use crate::model::Library;
@@ -49,13 +49,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let model = portable(arguments)?;
     let not_carried = (format.not_carried)(&model);
     for what in &not_carried {
-        eprintln!("not carried: {what}");
+        voice::say(format!("not carried: {what}"));
     }
     let folder = folder_of(&arguments.out);
     std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?;
     let files = format.write(&model, &arguments.out)?;
     let measured = measure(format, &model, arguments);
-    inputs::print(&match arguments.common.json {
+    voice::print(&match arguments.common.json {
         true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
         false => text(format, &files, &measured),
     })?;

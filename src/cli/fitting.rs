@@ -3,11 +3,13 @@
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
-use super::{Answer, Common, inputs, progress};
+use super::{Answer, Common, interrupt, progress, voice};
 use crate::runs::RunFolder;
 use crate::train::recipe::{Job, Saves};
 use crate::train::{Progress, Training, save};
@@ -38,38 +40,46 @@ impl Saving {
 pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common) -> Result<Answer> {
     let folder = RunFolder::open(dir)?;
     for note in &job.data.notes {
-        eprintln!("note: {note}");
+        voice::say(format!("note: {note}"));
     }
     let mut training = job.begin(&folder)?;
     if training.epoch() > 0 {
-        eprintln!(
+        voice::say(format!(
             "note: {} goes on from epoch {}",
             dir.display(),
             training.epoch()
-        );
+        ));
     }
-    run(job, &mut training, dir, saving)?;
+    voice::stage("training", || run(job, &mut training, &folder, saving))?;
     let results = job.results(&training, dir)?;
     if common.json {
-        inputs::print(&(serde_json::to_string_pretty(&results)? + "\n"))?;
+        voice::print(&(serde_json::to_string_pretty(&results)? + "\n"))?;
     } else {
-        inputs::print(&results.text())?;
+        let headline = format!("checkpoint: {}", dir.display());
+        voice::answer(headline, &results.text())?;
     }
     Ok(Answer::Yes)
 }
 
-fn run(job: &Job, training: &mut Training, dir: &Path, saving: &Saving) -> Result<()> {
+fn run(job: &Job, training: &mut Training, folder: &RunFolder, saving: &Saving) -> Result<()> {
+    let dir = folder.path();
     let bar = progress::bar(training.settings().epochs);
+    let kept = Arc::new(AtomicUsize::new(training.epoch()));
+    let of = training.settings().epochs;
+    let says = kept_epochs(dir, &kept, of);
+    let _orderly = interrupt::orderly(folder, says);
     let mut saves = Saves::new(saving.save_every);
     let mut failed = None;
     let mut observer = |at: &Progress| {
         bar.set_position(at.epoch as u64);
         bar.set_message(format!("epochs, loss {:.3e}", at.loss));
-        if saves.are_due(at)
-            && let Err(error) = save(dir, at.training, &job.origin)
-        {
-            failed = Some(error);
-            return ControlFlow::Break(());
+        if saves.are_due(at) {
+            let write = || save(dir, at.training, &job.origin);
+            if let Err(error) = interrupt::whole(write) {
+                failed = Some(error);
+                return ControlFlow::Break(());
+            }
+            kept.store(at.epoch, Ordering::SeqCst);
         }
         ControlFlow::Continue(())
     };
@@ -79,5 +89,14 @@ fn run(job: &Job, training: &mut Training, dir: &Path, saving: &Saving) -> Resul
     match failed {
         Some(error) => Err(anyhow!(error)).context("training stopped, since it cannot be saved"),
         None => Ok(()),
+    }
+}
+
+/// What Ctrl-C leaves of a training of so many epochs.
+fn kept_epochs(dir: &Path, kept: &Arc<AtomicUsize>, of: usize) -> impl Fn() -> String + use<> {
+    let (dir, kept) = (dir.display().to_string(), Arc::clone(kept));
+    move || match kept.load(Ordering::SeqCst) {
+        0 => "before the first checkpoint; nothing was written".to_owned(),
+        epoch => format!("{dir} has {epoch} of {of} epochs; {}", interrupt::go_on()),
     }
 }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, inputs};
+use super::{Answer, Common, inputs, voice};
 use crate::formats::Imported;
 use crate::train::save_imported;
 
@@ -34,7 +34,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     );
     save_imported(&arguments.out, imported, seed, device)?;
     let out = arguments.out.display();
-    inputs::print(&match arguments.common.json {
+    voice::print(&match arguments.common.json {
         true => {
             let json = json!({"system": system, "written_by": by, "checkpoint": arguments.out});
             serde_json::to_string_pretty(&json)? + "\n"

@@ -1,11 +1,11 @@
 //! Inputs that several commands share: libraries, models, logs.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 
+use super::voice;
 use crate::data::{Columns, LeaveOut, Log, audit, leave_out};
 use crate::model::{Library, Model};
 
@@ -78,7 +78,7 @@ pub(super) fn leave_out(
 pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     for log in logs {
         for note in &log.notes {
-            eprintln!("note: {}: {note}", log.name());
+            voice::say(format!("note: {}: {note}", log.name()));
         }
     }
 }
@@ -91,17 +91,7 @@ pub(super) fn print_notes_and_faults<'l>(
     for log in logs {
         print_notes([log]);
         for finding in audit(log, columns).serious() {
-            eprintln!("serious: {}: {finding}", log.name());
+            voice::say(format!("serious: {}: {finding}", log.name()));
         }
-    }
-}
-
-/// Print to standard output; a closed pipe is not an error.
-pub(super) fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(error).context("cannot write to standard output")
-        }
-        _ => Ok(()),
     }
 }

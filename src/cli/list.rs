@@ -5,7 +5,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::{Answer, Common, inputs};
+use super::{Answer, Common, inputs, voice};
 use crate::control::Task;
 use crate::formats::FORMATS;
 use crate::model::{Effect, Library, Model};
@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         What::Formats => formats(),
     };
     let json = serde_json::to_string_pretty(&value)? + "\n";
-    inputs::print(if arguments.common.json { &json } else { &text })?;
+    voice::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }
 

@@ -1,13 +1,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
 use super::experiment::message;
-use super::{Answer, Common, inputs, progress};
+use super::{Answer, Common, inputs, interrupt, progress, voice};
 use crate::experiment::{Config, FinishedRound, Session};
 use crate::mbrl::Round;
 use crate::report::EventFile;
@@ -58,7 +58,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     };
     let rounds = Mutex::new(Vec::new());
     let failed = Mutex::new(None);
+    let begun = Instant::now();
     let bar = progress::bar(session.rounds_of(method));
+    let _orderly = interrupt::counted(&folder, &bar, "rounds");
     let ended = session.run_alone(method, &folder, &|step: &FinishedRound<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
@@ -70,6 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         }
     });
     bar.finish_and_clear();
+    voice::took("rounds", begun);
     let checkpoint = ended?;
     if let Some(error) = locked(&failed).take() {
         return Err(error);
@@ -77,9 +80,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let rounds = locked(&rounds);
     if common.json {
         let value = json!({"schema": 1, "out": out, "seed": common.seed, "method": method, "rounds": *rounds});
-        inputs::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
+        voice::print(&(serde_json::to_string_pretty(&value)? + "\n"))?;
     } else {
-        inputs::print(&table(&rounds, &checkpoint))?;
+        let headline = format!("checkpoint: {}", checkpoint.display());
+        voice::answer(headline, &table(&rounds, &checkpoint))?;
     }
     Ok(Answer::Yes)
 }

@@ -11,6 +11,7 @@ mod export;
 mod fitting;
 mod import;
 mod inputs;
+mod interrupt;
 mod list;
 mod mbrl;
 mod new;
@@ -22,6 +23,7 @@ mod simulate;
 mod sweep;
 mod train;
 mod tune;
+mod voice;
 
 use std::ffi::OsString;
 use std::sync::OnceLock;
@@ -39,6 +41,8 @@ use crate::train::Backend;
     arg_required_else_help = true
 )]
 struct Cli {
+    #[command(flatten)]
+    voice: voice::Voice,
     #[command(subcommand)]
     command: Command,
 }
@@ -93,7 +97,9 @@ static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
 /// not run. Once in a process.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = ARGUMENTS.get_or_init(|| arguments.into_iter().collect());
-    let result = match Cli::parse_from(arguments).command {
+    let Cli { voice, command } = Cli::parse_from(arguments);
+    voice.begin();
+    let result = match command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Audit(arguments) => audit::run(&arguments),
@@ -118,7 +124,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Answer::Yes) => 0,
         Ok(Answer::No) => 1,
         Err(error) => {
-            eprintln!("error: {}", told(&error));
+            voice::tell(format!("error: {}", told(&error)));
             2
         }
     }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::{Arg, ArgGroup, ArgMatches, Args, Command, FromArgMatches, value_parser};
 use serde_json::json;
 
-use super::{Answer, Common, inputs};
+use super::{Answer, Common, voice};
 use crate::files::write_whole;
 use crate::formats::{FORMATS, Format, RobotReader};
 
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (model, notes) = reader.model(file, tip, drive)?;
     let text = &model.text;
     for note in &notes {
-        eprintln!("note: {note}");
+        voice::say(format!("note: {note}"));
     }
     if let Some(out) = &arguments.out {
         write_whole(out, text.as_bytes())?;
@@ -93,16 +93,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if arguments.common.json {
         let value =
             json!({"model": text, "joints": model.joints, "notes": notes, "out": arguments.out});
-        inputs::print(&format!("{value:#}\n"))?;
+        voice::print(&format!("{value:#}\n"))?;
     } else if let Some(out) = &arguments.out {
-        inputs::print(&format!(
+        voice::print(&format!(
             "{}: model of {}, joints: {}\n",
             out.display(),
             model.name,
             model.joints
         ))?;
     } else {
-        inputs::print(text)?;
+        voice::print(text)?;
     }
     Ok(Answer::Yes)
 }

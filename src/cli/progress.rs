@@ -1,44 +1,164 @@
+//! How much of long work is done, on standard error: a bar on a terminal, elsewhere a line every ten seconds.
+
+use std::ops::Deref;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::closeloop::{Fits, Progress};
+use super::voice;
+use crate::closeloop::{Fits, Progress, Stage};
 
-/// A progress bar of `steps` steps on standard error, hidden where that is no terminal.
-pub(super) fn bar(steps: usize) -> ProgressBar {
+/// How often a line is written where there is no terminal.
+const EVERY: Duration = Duration::from_secs(10);
+
+/// A progress bar, of which lines tell where it cannot be seen.
+pub(super) struct Bar {
+    bar: ProgressBar,
+    /// Ends the lines when it is dropped.
+    _lines: Option<Sender<()>>,
+}
+
+impl Deref for Bar {
+    type Target = ProgressBar;
+
+    fn deref(&self) -> &ProgressBar {
+        &self.bar
+    }
+}
+
+/// The progress of `steps` steps that take about as long as each other.
+pub(super) fn bar(steps: usize) -> Bar {
+    shown(steps, step_line)
+}
+
+/// The progress of the stages of closing the loop, which take very different times.
+pub(super) fn stages() -> Bar {
+    shown(Stage::ALL.len(), stage_line)
+}
+
+fn shown(steps: usize, line: fn(&ProgressBar) -> String) -> Bar {
+    if voice::is_quiet() {
+        return Bar {
+            bar: ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::hidden()),
+            _lines: None,
+        };
+    }
     let bar = ProgressBar::new(steps as u64);
     let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} ({elapsed})")
         .expect("the template is sound")
         .progress_chars("=> ");
     bar.set_style(style);
-    bar.enable_steady_tick(Duration::from_millis(120));
-    bar
+    let lines = bar.is_hidden().then(|| lines(bar.clone(), line));
+    if lines.is_none() {
+        bar.enable_steady_tick(Duration::from_millis(120));
+    }
+    Bar { bar, _lines: lines }
 }
 
-/// Estimates how long models that are being fitted will still take.
-pub(super) struct Estimate {
+/// Write a line from time to time, until what is returned is dropped.
+fn lines(bar: ProgressBar, line: fn(&ProgressBar) -> String) -> Sender<()> {
+    let (sender, ended) = mpsc::channel();
+    thread::spawn(move || {
+        while ended.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
+            voice::say(line(&bar));
+        }
+    });
+    sender
+}
+
+/// `34 %: 3400 of 10000 epochs, loss 1.2e-3; about 25 s left`
+fn step_line(bar: &ProgressBar) -> String {
+    let (done, of) = (bar.position(), bar.length().unwrap_or(0));
+    let percent = 100 * done / of.max(1);
+    let left = match bar.eta().as_secs() {
+        0 => String::new(),
+        left => format!("; about {left} s left"),
+    };
+    format!("{percent} %: {done} of {of} {}{left}", bar.message())
+}
+
+/// `stage 4 of 9: selecting effects, 12 of 40, about 30 s left`
+fn stage_line(bar: &ProgressBar) -> String {
+    let of = bar.length().unwrap_or(0);
+    format!("stage {} of {of}: {}", bar.position() + 1, bar.message())
+}
+
+/// Shows the stages of closing the loop: how long the models that are being fitted will still take and, in a verbose run, how
+/// long each stage took.
+pub(super) struct Stages {
+    bar: Bar,
+    now: Stage,
     since: Instant,
+    fits_since: Instant,
 }
 
-impl Estimate {
+impl Stages {
     pub fn new() -> Self {
         Self {
+            bar: stages(),
+            now: Stage::ALL[0],
             since: Instant::now(),
+            fits_since: Instant::now(),
         }
     }
 
+    pub fn show(&mut self, now: &Progress<'_>) {
+        if now.stage != self.now {
+            self.end();
+            (self.now, self.since) = (now.stage, Instant::now());
+        }
+        self.bar.set_position(now.stage.number() as u64);
+        let message = self.message(now);
+        self.bar.set_message(message);
+    }
+
+    /// The last stage is done.
+    pub fn finish(self) {
+        self.end();
+        self.bar.finish_and_clear();
+    }
+
+    fn end(&self) {
+        self.bar
+            .suspend(|| voice::took(self.now.text(), self.since));
+    }
+
     /// What is being done and, where that is a number of models to fit, about how long it will still take.
-    pub fn message(&mut self, now: &Progress<'_>) -> String {
+    fn message(&mut self, now: &Progress<'_>) -> String {
         match now.fits {
             Some(Fits { done, of }) if done > 0 => {
-                let each_s = self.since.elapsed().as_secs_f64() / done as f64;
+                let each_s = self.fits_since.elapsed().as_secs_f64() / done as f64;
                 let left_s = each_s * (of - done) as f64;
                 format!("{}, {done} of {of}, about {left_s:.0} s left", now.text)
             }
             _ => {
-                self.since = Instant::now();
+                self.fits_since = Instant::now();
                 now.text.to_owned()
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{bar, stage_line, stages, step_line};
+
+    #[test]
+    fn a_line_says_what_is_done_and_how_much_of_it() {
+        let epochs = bar(10_000);
+        epochs.set_position(3400);
+        epochs.set_message("epochs, loss 1.2e-3");
+        let line = step_line(&epochs);
+        let share = "34 %: 3400 of 10000 epochs, loss 1.2e-3";
+        assert!(line.starts_with(share), "{line}");
+        // An unknown number of steps is no division by zero.
+        assert!(step_line(&bar(0)).starts_with("0 %: 0 of 0"));
+        let stages = stages();
+        stages.set_position(3);
+        stages.set_message("selecting effects");
+        assert!(stage_line(&stages).starts_with("stage 4 of "));
+        assert!(stage_line(&stages).ends_with(": selecting effects"));
     }
 }

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use super::{Answer, inputs};
+use super::{Answer, voice};
 use crate::report::Report;
 
 /// Make report.html and report.md again from report.json
@@ -18,7 +18,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let report = Report::read(&arguments.folder)?;
     for path in report.write_readable(&arguments.folder)? {
-        inputs::print(&format!("{}\n", path.display()))?;
+        voice::print(&format!("{}\n", path.display()))?;
     }
     Ok(Answer::Yes)
 }

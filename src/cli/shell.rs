@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::{Shell, generate};
 
-use super::{Answer, Cli, inputs};
+use super::{Answer, Cli, voice};
 use crate::files::OutputError;
 
 /// Completions for a shell, on standard output
@@ -28,7 +28,7 @@ pub(super) struct Man {
 pub(super) fn completions(arguments: &Completions) -> Result<Answer> {
     let mut out = Vec::new();
     generate(arguments.shell, &mut Cli::command(), "residyn", &mut out);
-    inputs::print(&String::from_utf8_lossy(&out))?;
+    voice::print(&String::from_utf8_lossy(&out))?;
     Ok(Answer::Yes)
 }
 

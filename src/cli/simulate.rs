@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
 
-use super::{Answer, Common, inputs};
+use super::{Answer, Common, inputs, voice};
 use crate::data::Joint;
 use crate::model::Library;
 use crate::plant::Plant;
@@ -98,9 +98,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         .collect();
     if arguments.common.json {
         let value = json!({"out": arguments.out, "rows": log.rows(), "duration_s": log.duration(), "effects": effects});
-        inputs::print(&format!("{value:#}\n"))?;
+        voice::print(&format!("{value:#}\n"))?;
     } else {
-        inputs::print(&format!(
+        voice::print(&format!(
             "{}: {} rows, {} s\n",
             arguments.out.display(),
             log.rows(),

@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Result, bail};
 use clap::Args;
 
-use super::{Answer, Common, command_line, inputs, progress};
+use super::{Answer, Common, command_line, inputs, progress, voice};
 use crate::runs::RunFolder;
 use crate::train::recipe::{Job, Member, Recipe, SweepResults};
 use crate::train::{SweepProgress, Trained};
@@ -102,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let swept = SweepResults::new(&job, &members, trained, begun.elapsed().as_secs_f64());
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;
-    inputs::print(&if common.json { json } else { swept.text() })?;
+    voice::print(&if common.json { json } else { swept.text() })?;
     let all_diverged = swept.totals.diverged == swept.totals.models;
     Ok(if all_diverged {
         Answer::No
@@ -129,7 +129,7 @@ impl Arguments {
 
 fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
     for note in &job.data.notes {
-        eprintln!("note: {note}");
+        voice::say(format!("note: {note}"));
     }
     let parts = members.chunks(arguments.together.get());
     let bar = progress::bar(0);

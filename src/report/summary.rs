@@ -9,10 +9,15 @@ use super::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small, values};
 use crate::closeloop::{Space, Stage};
 use crate::data::Joint;
 
+/// The answer in a line.
+pub fn answer(report: &Report) -> String {
+    format!("{}: {}", report.headline, report.reason)
+}
+
 /// The answer for a terminal: a few lines, and where the rest is. `seconds` is how long each stage took.
 pub fn summary(report: &Report, seconds: &[(Stage, f64)], folder: &std::path::Path) -> String {
     let mut out = serious(report).replace("**", "");
-    let _ = writeln!(out, "{}: {}", report.headline, report.reason);
+    let _ = writeln!(out, "{}", answer(report));
     for effect in &report.effects {
         let _ = writeln!(
             out,

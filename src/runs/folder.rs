@@ -21,7 +21,7 @@ const RECORD: &str = "run.json";
 #[derive(Debug, Clone)]
 pub struct RunFolder {
     path: PathBuf,
-    _lock: Arc<Lock>,
+    lock: Arc<Lock>,
 }
 
 /// Why a run cannot have its folder.
@@ -70,7 +70,7 @@ impl RunFolder {
         match Lock::take(&lock) {
             Ok(lock) => Ok(Self {
                 path: owned(),
-                _lock: Arc::new(lock),
+                lock: Arc::new(lock),
             }),
             Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy { path: owned() }),
             Err(TryLockError::Error(source)) => Err(failed("locked", path)(source)),
@@ -82,13 +82,18 @@ impl RunFolder {
     pub fn within(&self, name: impl AsRef<Path>) -> Self {
         Self {
             path: self.path.join(name),
-            _lock: Arc::clone(&self._lock),
+            lock: Arc::clone(&self.lock),
         }
     }
 
     /// The folder's path, as it was given; it may not exist yet.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Remove the lock, for a process that ends at once and drops nothing.
+    pub fn leave(&self) {
+        self.lock.remove();
     }
 
     /// Make the folder where it is missing.

@@ -32,10 +32,17 @@ impl Lock {
     }
 }
 
+impl Lock {
+    /// Remove the file.
+    pub fn remove(&self) {
+        // A file that stays is not locked once its owner has ended, and the next one takes it.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
 impl Drop for Lock {
     fn drop(&mut self) {
-        // A file that stays is not locked any more, and the next owner takes it.
-        let _ = fs::remove_file(&self.path);
+        self.remove();
     }
 }
 

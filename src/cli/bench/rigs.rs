@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 
-use super::{Answer, Common, inputs, program_id, progress, told, unless_panic};
+use super::{Answer, Common, interrupt, program_id, progress, told, unless_panic, voice};
 use crate::bench::rigs::{
     Fold, Found, Line, Measured, Method, Rig, Tools, markdown, read, summarise,
 };
@@ -96,7 +96,7 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
     store.folder.write("rigs.json", &summary)?;
     store.folder.write_text("rigs.md", &text)?;
     let json = || Ok::<_, anyhow::Error>(serde_json::to_string_pretty(&summary)? + "\n");
-    inputs::print(&if arguments.common.json { json()? } else { text })?;
+    voice::print(&if arguments.common.json { json()? } else { text })?;
     Ok(if summary.failures.is_empty() {
         Answer::Yes
     } else {
@@ -156,6 +156,7 @@ impl Store<'_> {
     /// The results, and which methods cannot be run here; stored results are not computed again.
     fn run(&self, all: &[Work<'_>]) -> Result<(Vec<Line>, BTreeMap<Method, String>)> {
         let bar = progress::bar(all.len());
+        let _orderly = interrupt::counted(&self.folder, &bar, "results");
         let (mut lines, mut not_run) = (Vec::with_capacity(all.len()), BTreeMap::new());
         for work in all {
             match self.line(work, &bar)? {

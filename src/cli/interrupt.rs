@@ -1,0 +1,86 @@
+//! Ctrl-C: says what is kept and how to go on, and ends the program. Runs save as they go, so that they can end at any time.
+
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+use std::thread;
+
+use indicatif::ProgressBar;
+
+use super::{command_line, voice};
+use crate::runs::RunFolder;
+
+/// As shells report a program that Ctrl-C ended.
+const STATUS: i32 = 130;
+
+/// What a run says, and the folder that it leaves.
+struct Run {
+    folder: RunFolder,
+    says: Box<dyn Fn() -> String + Send>,
+}
+
+/// The run that is interrupted; locked while something is written that has to be whole.
+static RUN: Mutex<Option<Run>> = Mutex::new(None);
+static HANDLER: Once = Once::new();
+static HIT: AtomicBool = AtomicBool::new(false);
+
+/// While it exists, Ctrl-C ends the run in a folder in an orderly way.
+pub(super) struct Orderly;
+
+/// From now on Ctrl-C prints what `says` returns and ends the program; a second one ends it at once.
+pub(super) fn orderly(folder: &RunFolder, says: impl Fn() -> String + Send + 'static) -> Orderly {
+    *run() = Some(Run {
+        folder: folder.clone(),
+        says: Box::new(says),
+    });
+    // Without a handler Ctrl-C ends the program all the same, and says nothing.
+    HANDLER.call_once(|| _ = ctrlc::set_handler(hit));
+    Orderly
+}
+
+impl Drop for Orderly {
+    fn drop(&mut self) {
+        *run() = None;
+    }
+}
+
+/// The same in a folder that keeps whatever a bar counts, `rounds` say.
+pub(super) fn counted(folder: &RunFolder, bar: &ProgressBar, what: &'static str) -> Orderly {
+    let (path, bar) = (folder.path().display().to_string(), bar.clone());
+    orderly(folder, move || {
+        let (done, of) = (bar.position(), bar.length().unwrap_or(0));
+        format!("{path} keeps {done} of {of} {what}; {}", go_on())
+    })
+}
+
+/// How a run is taken up again.
+pub(super) fn go_on() -> String {
+    format!("to go on from there, type again\n  {}", command_line())
+}
+
+/// Do what Ctrl-C waits for.
+pub(super) fn whole<T>(work: impl FnOnce() -> T) -> T {
+    let _run = run();
+    work()
+}
+
+/// Ctrl-C was typed.
+fn hit() {
+    if HIT.swap(true, Ordering::SeqCst) {
+        process::exit(STATUS);
+    }
+    thread::spawn(end);
+}
+
+fn end() {
+    let run = run();
+    if let Some(Run { folder, says }) = &*run {
+        voice::tell(format!("interrupted: {}", says()));
+        folder.leave();
+    }
+    process::exit(STATUS);
+}
+
+fn run() -> MutexGuard<'static, Option<Run>> {
+    RUN.lock().unwrap_or_else(PoisonError::into_inner)
+}

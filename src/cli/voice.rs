@@ -1,0 +1,136 @@
+//! What the program says beside its answer, how much of the answer it prints, and its colours: on a terminal alone, and not where
+//! `NO_COLOR` is set.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use anstyle::{AnsiColor, Style};
+use anyhow::{Context, Result};
+use clap::Args;
+
+/// How much is said.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(super) struct Voice {
+    /// Print the headline of the answer alone, and errors
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say on standard error what is done, and how long it took
+    #[arg(short, long, global = true)]
+    verbose: bool,
+}
+
+/// Set once, before anything is said.
+static VOICE: OnceLock<Voice> = OnceLock::new();
+
+/// Words that a line begins with, and their colours.
+const LABELS: [(&str, Style); 5] = [
+    ("error", AnsiColor::Red.on_default().bold()),
+    ("serious", AnsiColor::Red.on_default().bold()),
+    ("interrupted", AnsiColor::Yellow.on_default().bold()),
+    ("warning", AnsiColor::Yellow.on_default().bold()),
+    ("note", AnsiColor::Cyan.on_default()),
+];
+
+impl Voice {
+    /// All that follows is said in this voice.
+    pub fn begin(self) {
+        VOICE.get_or_init(|| self);
+    }
+
+    fn now() -> Self {
+        VOICE.get().copied().unwrap_or_default()
+    }
+}
+
+/// Print an answer on standard output, or its headline alone; a pipe that was closed is not an error.
+pub(super) fn answer(headline: impl Display, whole: &str) -> Result<()> {
+    match is_quiet() {
+        true => print(&format!("{headline}\n")),
+        false => print(whole),
+    }
+}
+
+/// Print to standard output; a pipe that was closed is not an error.
+pub(super) fn print(text: &str) -> Result<()> {
+    match anstream::stdout()
+        .lock()
+        .write_all(coloured(text).as_bytes())
+    {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(error).context("cannot write to standard output")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether nothing but headlines and errors is asked for.
+pub(super) fn is_quiet() -> bool {
+    Voice::now().quiet
+}
+
+/// A line on standard error that a quiet run does without.
+pub(super) fn say(line: impl Display) {
+    if !is_quiet() {
+        tell(line);
+    }
+}
+
+/// A line on standard error that is always told.
+pub(super) fn tell(line: impl Display) {
+    // Where nobody listens any more, there is nobody to tell it.
+    let _ = anstream::stderr()
+        .lock()
+        .write_all(coloured(&format!("{line}\n")).as_bytes());
+}
+
+/// Do some work; a verbose run says what, and how long it took.
+pub(super) fn stage<T>(what: &str, work: impl FnOnce() -> T) -> T {
+    let begun = Instant::now();
+    let done = work();
+    took(what, begun);
+    done
+}
+
+/// In a verbose run, how long something took.
+pub(super) fn took(what: &str, begun: Instant) {
+    if Voice::now().verbose {
+        tell(format!("{:>8.2} s  {what}", begun.elapsed().as_secs_f64()));
+    }
+}
+
+/// The text with colours on the labels of its lines.
+fn coloured(text: &str) -> String {
+    text.split_inclusive('\n').map(labelled).collect()
+}
+
+fn labelled(line: &str) -> String {
+    let is_label = |label: &str| {
+        let rest = line.strip_prefix(label);
+        rest.is_some_and(|rest| rest.starts_with([':', ' ']))
+    };
+    match LABELS.iter().find(|(label, _)| is_label(label)) {
+        Some((label, style)) => format!("{style}{label}{style:#}{}", &line[label.len()..]),
+        None => line.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::coloured;
+
+    #[test]
+    fn labels_have_colours_and_other_words_none() {
+        let plain = "erroneous\n  error: no\nno error\n";
+        assert_eq!(coloured(plain), plain);
+        let labelled = coloured("one\nerror: two\nwarning  three\n");
+        let plain = anstream::adapter::strip_str(&labelled).to_string();
+        assert_eq!(plain, "one\nerror: two\nwarning  three\n");
+        assert_eq!(labelled.matches("\u{1b}[").count() % 2, 0);
+        assert!(
+            labelled.contains("\u{1b}[1m\u{1b}[31merror\u{1b}[0m: two"),
+            "{labelled:?}"
+        );
+    }
+}

@@ -1,0 +1,122 @@
+//! What Ctrl-C leaves of a run, and what it says.
+
+#![cfg(unix)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use crate::support::text;
+
+fn begin(arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_residyn"))
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Wait until a run has made this.
+fn until_there(path: &Path, run: &mut Child) {
+    while !path.exists() {
+        assert!(run.try_wait().unwrap().is_none(), "the run has ended");
+        sleep(Duration::from_millis(10));
+    }
+}
+
+/// Type Ctrl-C; the exit status and what the run said.
+fn interrupt(run: Child) -> (Option<i32>, String) {
+    // Between the lock of its folder and the handler are some microseconds.
+    sleep(Duration::from_millis(200));
+    let pid = run.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    assert!(sent.success());
+    let output = run.wait_with_output().unwrap();
+    (
+        output.status.code(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+/// A recipe of this many epochs.
+fn recipe(folder: &Path, epochs: &str) -> String {
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    let recipe = fs::read_to_string(configs.join("smoke/train-pendulum.toml")).unwrap();
+    let line = recipe
+        .lines()
+        .find(|line| line.starts_with("epochs"))
+        .unwrap();
+    let file = folder.join("recipe.toml");
+    fs::write(&file, recipe.replace(line, &format!("epochs = {epochs}"))).unwrap();
+    text(&file).to_owned()
+}
+
+#[test]
+fn a_training_says_what_is_kept_and_how_to_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let recipe = recipe(folder.path(), "100000000");
+    let command = [
+        "train",
+        "--config",
+        &recipe,
+        "--out",
+        text(&out),
+        "--save-every",
+        "20",
+    ];
+    let mut run = begin(&command);
+    until_there(&out.join("model.toml"), &mut run);
+    let (status, said) = interrupt(run);
+    assert_eq!(status, Some(130), "{said}");
+    assert!(
+        said.contains(&format!("interrupted: {} has ", text(&out))),
+        "{said}"
+    );
+    assert!(said.contains(" of 100000000 epochs; "), "{said}");
+    let typed = said.lines().last().unwrap().trim();
+    assert_eq!(typed, format!("residyn {}", command.join(" ")));
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+    assert_eq!(left.len(), 2, "recipe and checkpoint: {left:?}");
+    // What is typed goes on from what was kept.
+    let mut again = begin(&command);
+    sleep(Duration::from_millis(500));
+    assert!(again.try_wait().unwrap().is_none());
+    let (_, said) = interrupt(again);
+    assert!(said.contains("goes on from epoch "), "{said}");
+}
+
+#[test]
+fn closing_the_loop_says_that_nothing_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let mut run = begin(&["closeloop", "--out", text(&out)]);
+    until_there(&folder.path().join(".report.lock"), &mut run);
+    let (status, said) = interrupt(run);
+    assert_eq!(status, Some(130), "{said}");
+    assert_eq!(said, "interrupted: nothing was written\n");
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn a_run_that_counts_says_how_far_it_came() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run");
+    let config =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/physics-prior/acrobot-paper.toml");
+    let command = ["mbrl", "--config", text(&config), "--out", text(&out)];
+    let mut run = begin(&command);
+    until_there(&folder.path().join(".run.lock"), &mut run);
+    sleep(Duration::from_millis(800));
+    let (status, said) = interrupt(run);
+    assert_eq!(status, Some(130), "{said}");
+    assert!(
+        said.contains(" rounds; to go on from there, type again\n  residyn mbrl"),
+        "{said}"
+    );
+    assert!(!folder.path().join(".run.lock").exists());
+}
