@@ -131,7 +131,7 @@ fn declared_values_that_the_logs_contradict_are_named_with_their_factor() {
         text(&out),
     ]);
     assert!(
-        said.contains("declared model as written, no fit: joint 1"),
+        said.contains("as written     fitted  with effects"),
         "{said}"
     );
     let report: Value =

@@ -46,6 +46,7 @@ mod runs;
 mod shell;
 mod shift;
 mod simulators;
+mod summary;
 mod support;
 mod sweep;
 mod together;

@@ -57,6 +57,9 @@ pub(super) struct Arguments {
     /// that say more about these logs
     #[arg(long, value_enum)]
     errors: Option<Errors>,
+    /// Draw curves of the error below the answer, as is done on a terminal that shows UTF-8
+    #[arg(long)]
+    curves: bool,
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
@@ -141,7 +144,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if arguments.common.json {
         voice::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
     } else {
-        let summary = report::summary(&report, &outcome.seconds, &arguments.out);
+        let curves = match arguments.curves || voice::shows_curves() {
+            true => report::curves(&report),
+            false => Vec::new(),
+        };
+        let summary = report::summary(&report, &outcome.seconds, &arguments.out, &curves);
         voice::answer(report::answer(&report), &summary)?;
     }
     Ok(answer(&outcome))

@@ -2,7 +2,7 @@
 //! `NO_COLOR` is set.
 
 use std::fmt::Display;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -63,6 +63,17 @@ pub(super) fn print(text: &str) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Whether standard output is a terminal that shows UTF-8, as far as its locale says.
+pub(super) fn shows_curves() -> bool {
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].map(|name| std::env::var(name).unwrap_or_default());
+    let locale = locale.into_iter().find(|value| !value.is_empty());
+    let is_utf8 = locale.is_some_and(|value| {
+        let value = value.to_lowercase();
+        value.contains("utf-8") || value.contains("utf8")
+    });
+    is_utf8 && io::stdout().is_terminal()
 }
 
 /// Whether nothing but headlines and errors is asked for.

@@ -211,7 +211,7 @@ pub(super) fn section(calibration: &CalibrationEntry) -> String {
 /// The line for a terminal.
 pub(super) fn line(calibration: &CalibrationEntry) -> String {
     format!(
-        "  {}: {}\n",
+        "{}: {}",
         simulations(calibration),
         alarms_in_words(calibration)
     )
