@@ -3,6 +3,7 @@
 #![cfg(unix)]
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
@@ -83,9 +84,11 @@ fn a_training_says_what_is_kept_and_how_to_go_on() {
     assert_eq!(left.len(), 2, "recipe and checkpoint: {left:?}");
     // What is typed goes on from what was kept.
     let mut again = begin(&command);
-    sleep(Duration::from_millis(500));
-    assert!(again.try_wait().unwrap().is_none());
-    let (_, said) = interrupt(again);
+    let mut said = String::new();
+    let mut errors = BufReader::new(again.stderr.take().unwrap());
+    errors.read_line(&mut said).unwrap();
+    again.kill().unwrap();
+    again.wait().unwrap();
     assert!(said.contains("goes on from epoch "), "{said}");
 }
 
@@ -110,8 +113,7 @@ fn a_run_that_counts_says_how_far_it_came() {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/physics-prior/acrobot-paper.toml");
     let command = ["mbrl", "--config", text(&config), "--out", text(&out)];
     let mut run = begin(&command);
-    until_there(&folder.path().join(".run.lock"), &mut run);
-    sleep(Duration::from_millis(800));
+    until_there(&out.join("run.json"), &mut run);
     let (status, said) = interrupt(run);
     assert_eq!(status, Some(130), "{said}");
     assert!(

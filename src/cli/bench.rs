@@ -122,6 +122,7 @@ impl Store {
 
     /// Results of all cells; stored ones are not computed again.
     fn run(&self, cells: &[Cell], folder: &RunFolder) -> Result<Vec<Line>> {
+        let begun = Instant::now();
         let bar = progress::bar(cells.len());
         let _orderly = interrupt::counted(folder, &bar, "cells");
         let library = Library::built_in();
@@ -135,6 +136,7 @@ impl Store {
             bar.inc(1);
         }
         bar.finish_and_clear();
+        voice::took("closing the loops", begun);
         Ok(lines)
     }
 

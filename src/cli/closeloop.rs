@@ -159,7 +159,7 @@ fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + '
     let (out, written) = (out.display().to_string(), Arc::clone(written));
     move || match written.load(Ordering::SeqCst) {
         false => "nothing was written".to_owned(),
-        true => format!("{out} has the report, without what --calibrate asks for"),
+        true => format!("{out} has the report as it was written last"),
     }
 }
 

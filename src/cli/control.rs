@@ -113,6 +113,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             .with_context(|| format!("{} cannot be made", out.display()))?;
     }
     let count = arguments.episodes.get();
+    let begun = Instant::now();
     let bar = progress::bar(count);
     let mut entries = Vec::new();
     for number in 0..count {
@@ -121,6 +122,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         bar.set_message("episodes");
     }
     bar.finish_and_clear();
+    voice::took("controlling the plant", begun);
     let printed = Printed::new(arguments, task, entries);
     if arguments.common.json {
         voice::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;

@@ -53,8 +53,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     }
     let folder = folder_of(&arguments.out);
     std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?;
-    let files = format.write(&model, &arguments.out)?;
-    let measured = measure(format, &model, arguments);
+    let files = voice::stage("writing", || format.write(&model, &arguments.out))?;
+    let compare = || measure(format, &model, arguments);
+    let measured = voice::stage("comparing with a client of the format", compare);
     voice::print(&match arguments.common.json {
         true => format!("{:#}\n", printed(format, &files, &not_carried, &measured)),
         false => text(format, &files, &measured),

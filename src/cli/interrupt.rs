@@ -1,5 +1,6 @@
 //! Ctrl-C: says what is kept and how to go on, and ends the program. Runs save as they go, so that they can end at any time.
 
+use std::io::{self, IsTerminal};
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
@@ -75,6 +76,10 @@ fn hit() {
 fn end() {
     let run = run();
     if let Some(Run { folder, says }) = &*run {
+        if io::stderr().is_terminal() {
+            // Below the bar.
+            voice::tell("");
+        }
         voice::tell(format!("interrupted: {}", says()));
         folder.leave();
     }

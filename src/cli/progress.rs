@@ -39,16 +39,14 @@ pub(super) fn stages() -> Bar {
 }
 
 fn shown(steps: usize, line: fn(&ProgressBar) -> String) -> Bar {
-    if voice::is_quiet() {
-        return Bar {
-            bar: ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::hidden()),
-            _lines: None,
-        };
-    }
     let bar = ProgressBar::new(steps as u64);
-    let style = ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} {msg} ({elapsed})")
-        .expect("the template is sound")
-        .progress_chars("=> ");
+    if voice::is_quiet() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    let style =
+        ProgressStyle::with_template("{spinner} [{bar:24}] {pos}/{len} ({elapsed}) {wide_msg}")
+            .expect("the template is sound")
+            .progress_chars("=> ");
     bar.set_style(style);
     let lines = bar.is_hidden().then(|| lines(bar.clone(), line));
     if lines.is_none() {

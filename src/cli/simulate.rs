@@ -88,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         plant.recording.duration_s = duration;
     }
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
-    let log = plant.record(&mut rng)?;
+    let log = voice::stage("simulating", || plant.record(&mut rng))?;
     log.write(&arguments.out)
         .context("the log was not written")?;
     let effects: Vec<&str> = plant

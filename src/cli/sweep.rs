@@ -99,6 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let members = arguments.members();
     let begun = Instant::now();
     let trained = train(&job, &members, arguments)?;
+    voice::took("training", begun);
     let swept = SweepResults::new(&job, &members, trained, begun.elapsed().as_secs_f64());
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::fitting::{Saving, carry_out};
-use super::{Answer, Common, command_line, inputs};
+use super::{Answer, Common, command_line, inputs, voice};
 use crate::train::recipe::{Job, Recipe};
 
 /// Train a hybrid, physics-only or data-driven model from scratch, on logs or on a simulated plant
@@ -34,7 +34,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         common,
     } = arguments;
     let library = effects.library()?;
-    let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?;
+    let recipe = Recipe::read(config)?;
+    let prepare = || Job::train(recipe, &library, common.device, common.seed);
+    let job = voice::stage("preparing the data", prepare)?;
     let dir = saving.folder(config, "checkpoint");
     carry_out(&job.begun_by(command_line()), &dir, saving, common)
 }

@@ -83,10 +83,8 @@ impl Push {
              needs elsewhere: did something push or touch the rig? If so, leave it out",
             self.joint, self.force, self.times
         );
-        Finding {
-            joint: Some(self.joint),
-            ..Finding::new(Severity::Warning, text).within(log, &[span])
-        }
+        let finding = Finding::new(Severity::Warning, text).of(self.joint);
+        finding.within(log, &[span])
     }
 }
 

@@ -9,7 +9,7 @@ pub const GAP_STEPS: f64 = 5.0;
 
 /// A step longer than this many median steps lacks a row: midway between one period and two, and beyond what jitter of a
 /// fifth of a period does.
-const DROPPED_STEPS: f64 = 1.7;
+pub(super) const DROPPED_STEPS: f64 = 1.7;
 
 /// The torque passes a missing row smoothly if its change over the step, per period, is at most this many times the
 /// largest change from row to row close by.

@@ -27,6 +27,9 @@ pub struct Channel {
     pub saturated_fraction: f64,
     /// Whether all values are the same.
     pub constant: bool,
+    /// The ends of the range at which values sit.
+    #[serde(skip)]
+    pub(super) limits: Vec<f64>,
 }
 
 impl Channel {
@@ -37,8 +40,8 @@ impl Channel {
         let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let resolution = resolution(values);
         let noise = noise_std(values);
-        let saturated = saturated_rows(values, max, max - min, resolution)
-            + saturated_rows(values, min, max - min, resolution);
+        let at_limit = |limit: &f64| saturated_rows(values, *limit, max - min, resolution);
+        let saturated: usize = [max, min].iter().map(at_limit).sum();
         Self {
             name,
             min,
@@ -52,6 +55,10 @@ impl Channel {
             spikes,
             saturated_fraction: saturated as f64 / values.len() as f64,
             constant: min == max,
+            limits: [max, min]
+                .into_iter()
+                .filter(|limit| at_limit(limit) > 0)
+                .collect(),
         }
     }
 

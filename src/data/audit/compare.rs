@@ -67,13 +67,13 @@ pub(super) struct Speeds {
     pub fast_rad_s: f64,
 }
 
-/// Compares logged and derived velocity, and counts the logged ones that disagree.
+/// Compares logged and derived velocity, and finds the rows in which they disagree.
 pub(super) fn velocity_check(
     motion: &Motion,
     qd: &Channel,
     speeds: Speeds,
     step_s: f64,
-) -> (Option<VelocityCheck>, usize) {
+) -> (Option<VelocityCheck>, Vec<usize>) {
     let Speeds {
         rest_rad_s,
         fast_rad_s,
@@ -85,10 +85,10 @@ pub(super) fn velocity_check(
         ..
     }) = found
     else {
-        return (None, 0);
+        return (None, Vec::new());
     };
     let lag_s = samples * lag_step_s(step_s);
-    let pairs = aligned_velocities(motion, lag_s);
+    let (rows, pairs) = aligned_velocities(motion, lag_s);
     let scale = velocity_scale(&pairs, fast_rad_s);
     let off = |(logged, derived): &(f64, f64)| logged - scale * derived;
     // At rest both are zero and agree to the last digit, which is no measure for rows in motion.
@@ -98,6 +98,7 @@ pub(super) fn velocity_check(
         .max(JUMP_SHARE_OF_RANGE * scale.abs() * fast_rad_s)
         .max(JUMP_RESOLUTION_STEPS * qd.resolution);
     let sizes = || pairs.iter().map(|pair| off(pair).abs());
+    let disagreeing = rows.iter().zip(sizes()).filter(|(_, size)| *size > floor);
     let check = VelocityCheck {
         correlation,
         lag_s,
@@ -105,7 +106,7 @@ pub(super) fn velocity_check(
         noise_std_rad_s: SIGMA_PER_MAD * spread,
         worst_rad_s: sizes().fold(0.0, f64::max),
     };
-    (Some(check), sizes().filter(|size| *size > floor).count())
+    (Some(check), disagreeing.map(|(row, _)| *row).collect())
 }
 
 /// Correlation of the logged velocity with the negative derivative, if it is closer than that with the derivative.
@@ -120,12 +121,13 @@ pub(super) fn opposed_velocity(
     (found.correlation > direct && !found.at_edge).then_some(found.correlation)
 }
 
-/// Logged velocity of each row with the derivative of the angle `lag_s` earlier.
-fn aligned_velocities(motion: &Motion, lag_s: f64) -> Vec<(f64, f64)> {
+/// Rows, and the logged velocity of each with the derivative of the angle `lag_s` earlier.
+fn aligned_velocities(motion: &Motion, lag_s: f64) -> (Vec<usize>, Vec<(f64, f64)>) {
     let derived = |t: f64| interpolate(&motion.time, &motion.velocity, t - lag_s);
-    let rows = motion.time.iter().zip(&motion.qd);
-    rows.filter_map(|(t, logged)| Some((*logged, derived(*t)?)))
-        .collect()
+    let logged = motion.time.iter().zip(&motion.qd);
+    (motion.rows.iter().zip(logged))
+        .filter_map(|(row, (t, logged))| Some((*row, (*logged, derived(*t)?))))
+        .unzip()
 }
 
 /// Ratio of logged to derived velocity: the median over the rows faster than a third of the fast

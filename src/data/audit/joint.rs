@@ -13,7 +13,7 @@ use crate::data::Joint;
 use crate::data::column::Quantity;
 use crate::data::jumps::rows_that_jump;
 use crate::data::local_cubic::{LocalCubic, half_width_s};
-use crate::data::log::Log;
+use crate::data::log::{Interval, Log};
 use crate::data::statistics::quantile;
 
 /// Slower than this share of the fast speed counts as rest.
@@ -62,6 +62,15 @@ pub struct JointAudit {
     /// Share of the rows in motion that repeat the angle of the row before although it should have
     /// moved by two steps of its resolution: a logger that is faster than its source.
     pub repeated_fraction: f64,
+    /// Where the logged velocity disagrees with the derivative of the angle.
+    #[serde(skip)]
+    pub(super) disagreeing: Vec<Interval>,
+    /// Where the joint is at rest.
+    #[serde(skip)]
+    pub(super) at_rest: Vec<Interval>,
+    /// Where its angle repeats that of the row before.
+    #[serde(skip)]
+    pub(super) repeated: Vec<Interval>,
 }
 
 /// Audits every joint of a log.
@@ -110,10 +119,10 @@ impl JointAudit {
         let q_channel = channel("q", q, 0);
         let qd_channel = channel("qd", qd, 0);
         // A log too short for derivatives still has a speed: the logged one.
-        let velocity = if motion.rows() > 0 {
-            &motion.velocity
-        } else {
-            qd
+        let every: Vec<usize> = (0..log.rows()).collect();
+        let (rows, velocity) = match motion.rows() {
+            0 => (&every, qd),
+            _ => (&motion.rows, &motion.velocity),
         };
         let speeds: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
         let fast_rad_s = quantile(&speeds, 0.95);
@@ -122,8 +131,12 @@ impl JointAudit {
             rest_rad_s,
             fast_rad_s,
         };
-        let (check, spikes) = velocity_check(motion, &qd_channel, range, log.median_step());
-        let at_rest = speeds.iter().filter(|speed| **speed <= rest_rad_s).count();
+        let (check, disagreeing) = velocity_check(motion, &qd_channel, range, log.median_step());
+        let resting: Vec<usize> = (rows.iter().zip(&speeds))
+            .filter(|(_, speed)| **speed <= rest_rad_s)
+            .map(|(row, _)| *row)
+            .collect();
+        let repeats = Repeats::of(motion, rest_rad_s, &q_channel, log.median_step());
         Self {
             joint,
             opposed: opposed_velocity(motion, check, log.median_step()),
@@ -132,13 +145,16 @@ impl JointAudit {
             torque_lag: None,
             torque_demand: None,
             reversals: reversals(velocity, rest_rad_s),
-            share_at_rest: at_rest as f64 / speeds.len().max(1) as f64,
+            share_at_rest: resting.len() as f64 / speeds.len().max(1) as f64,
             fast_rad_s,
             covers_full_turn: q_channel.range() >= std::f64::consts::TAU,
-            repeated_fraction: repeated_fraction(motion, rest_rad_s, &q_channel, log.median_step()),
+            repeated_fraction: repeats.rows.len() as f64 / repeats.moving.max(1) as f64,
+            disagreeing: log.stretches(disagreeing.iter().copied()),
+            at_rest: log.stretches(resting),
+            repeated: log.stretches(repeats.rows),
             q: q_channel,
             qd: Channel {
-                spikes,
+                spikes: disagreeing.len(),
                 ..qd_channel
             },
             tau: channel(log.driven_by.key(), tau, rows_that_jump(tau).len()),
@@ -169,15 +185,24 @@ fn reversals(velocity: &[f64], rest: f64) -> usize {
         .count()
 }
 
-fn repeated_fraction(motion: &Motion, rest: f64, q: &Channel, step_s: f64) -> f64 {
-    let visible = (2.0 * q.resolution / step_s).max(rest);
-    let moving = (0..motion.rows()).filter(|&row| motion.velocity[row].abs() > visible);
-    let (mut rows, mut repeated) = (0_usize, 0_usize);
-    for row in moving {
-        rows += 1;
-        repeated += usize::from(motion.moved[row] == 0.0);
+/// Rows in motion that repeat the angle of the row before.
+struct Repeats {
+    rows: Vec<usize>,
+    /// How many rows are in motion.
+    moving: usize,
+}
+
+impl Repeats {
+    fn of(motion: &Motion, rest: f64, q: &Channel, step_s: f64) -> Self {
+        let visible = (2.0 * q.resolution / step_s).max(rest);
+        let moving = (0..motion.rows()).filter(|&k| motion.velocity[k].abs() > visible);
+        let moving: Vec<usize> = moving.collect();
+        let repeats = moving.iter().filter(|&&k| motion.moved[k] == 0.0);
+        Self {
+            rows: repeats.map(|&k| motion.rows[k]).collect(),
+            moving: moving.len(),
+        }
     }
-    repeated as f64 / rows.max(1) as f64
 }
 
 #[cfg(test)]

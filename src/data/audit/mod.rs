@@ -14,6 +14,7 @@ mod quality;
 mod regressors;
 mod repeats;
 mod response;
+mod stretches;
 mod table;
 
 pub use channel::Channel;

@@ -9,6 +9,8 @@ use crate::data::log::Log;
 /// These are the rows that a cubic can be fitted around: not the ends of the log, nor its gaps. They
 /// depend on the times alone, so they are the same rows for all joints of a log.
 pub(super) struct Motion {
+    /// The rows.
+    pub rows: Vec<usize>,
     /// Time of the rows \[s\].
     pub time: Vec<f64>,
     /// Smoothed angle \[rad\].
@@ -31,6 +33,7 @@ impl Motion {
     /// Follows a joint through the log, smoothed over `half_width_s` on either side.
     pub fn of(log: &Log, joint: Joint, half_width_s: f64) -> Self {
         let mut motion = Self {
+            rows: vec![],
             time: vec![],
             q: vec![],
             velocity: vec![],
@@ -45,6 +48,7 @@ impl Motion {
             let (Some(q), Some(tau)) = (fit(&log.q[joint]), fit(&log.tau[joint])) else {
                 continue;
             };
+            motion.rows.push(row);
             motion.time.push(log.time[row]);
             motion.q.push(q.value);
             motion.velocity.push(q.slope);

@@ -10,6 +10,10 @@ use crate::data::Joint;
 use crate::data::column::Quantity;
 use crate::data::log::Interval;
 
+/// More stretches than these are no list to paste, and none to read.
+const MOST_SPANS: usize = 20;
+const TOLD_SPANS: usize = 3;
+
 /// The quality of one log.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Audit {
@@ -77,7 +81,8 @@ pub struct Finding {
     /// The joint that it concerns, if it is a single one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<Joint>,
-    /// Where it is in the log: start and end of each stretch in s. Empty where it concerns the whole log.
+    /// Where it is in the log: start and end of each stretch in s, the longest where there are many. Empty where it
+    /// concerns the whole log.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spans_s: Vec<[f64; 2]>,
     /// The sentence.
@@ -108,27 +113,70 @@ impl Finding {
         }
     }
 
-    /// The same in these stretches of a log, which can be left out.
-    pub(crate) fn within(self, log: &str, spans: &[Interval]) -> Self {
-        let argument = |span: &Interval| format!("{log}@{}-{}", span.start_s, span.end_s);
+    /// The same of one joint.
+    pub(crate) fn of(self, joint: Joint) -> Self {
         Self {
-            spans_s: spans
-                .iter()
-                .map(|span| [span.start_s, span.end_s])
-                .collect(),
-            remedy: Some(Remedy::LeaveOut(spans.iter().map(argument).collect())),
+            joint: Some(joint),
             ..self
         }
     }
+
+    /// The same in these stretches of a log, which can be left out where they are few.
+    pub(crate) fn within(self, log: &str, spans: &[Interval]) -> Self {
+        let argument = |span: &Interval| format!("{log}@{}-{}", span.start_s, span.end_s);
+        let few = spans.len() <= MOST_SPANS;
+        Self {
+            remedy: few.then(|| Remedy::LeaveOut(spans.iter().map(argument).collect())),
+            ..self.during(spans)
+        }
+    }
+
+    /// The same in these stretches of a log.
+    pub(super) fn during(self, spans: &[Interval]) -> Self {
+        Self {
+            spans_s: longest(spans.iter().map(ends).collect(), MOST_SPANS),
+            ..self
+        }
+    }
+
+    /// Where it is in the log, `t = 2 to 3.2 s, 5 to 6 s and shorter`; `None` where it concerns the whole log.
+    pub(super) fn place(&self) -> Option<String> {
+        let told = longest(self.spans_s.clone(), TOLD_SPANS);
+        let span = |[start, end]: &[f64; 2]| format!("{} to {} s", seconds(*start), seconds(*end));
+        let text = told.iter().map(span).collect::<Vec<_>>().join(", ");
+        let more = match self.spans_s.len() > told.len() {
+            true => " and shorter",
+            false => "",
+        };
+        (!told.is_empty()).then(|| format!("t = {text}{more}"))
+    }
+}
+
+fn ends(span: &Interval) -> [f64; 2] {
+    [span.start_s, span.end_s]
+}
+
+/// The longest of some stretches, in the order of time.
+fn longest(mut spans: Vec<[f64; 2]>, most: usize) -> Vec<[f64; 2]> {
+    spans.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
+    spans.truncate(most);
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    spans
+}
+
+/// A time to the millisecond.
+fn seconds(time_s: f64) -> f64 {
+    (1e3 * time_s).round() / 1e3
 }
 
 impl fmt::Display for Finding {
-    /// The sentence, and in brackets what to paste.
+    /// The sentence, and in brackets what to paste, or else where it is so.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)?;
-        self.remedy
+        let more = self.remedy.as_ref().map(Remedy::to_string);
+        more.or_else(|| self.place())
             .iter()
-            .try_for_each(|remedy| write!(f, " ({remedy})"))
+            .try_for_each(|more| write!(f, " ({more})"))
     }
 }
 

@@ -5,14 +5,14 @@ use std::fmt;
 use super::channel::Channel;
 use super::quality::{Audit, Severity};
 use crate::data::column::Quantity;
-use crate::layout::{LABEL, hanging};
+use crate::layout::{LABEL, hanging, wrap};
 
 /// Widest line \[characters\].
-const WIDTH: usize = 100;
+const WIDTH: usize = 80;
 
 impl fmt::Display for Audit {
-    /// Sampling, one line a channel, one line a joint, and the findings; no line is longer than 100
-    /// characters, but for a word that is.
+    /// Sampling, one line a channel, one line a joint, and the findings; no line is longer than 80
+    /// characters, but for a word that is and for what is to be pasted.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.write_sampling(f)?;
         self.write_channels(f)?;
@@ -23,8 +23,7 @@ impl fmt::Display for Audit {
 
 impl Audit {
     fn write_sampling(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
+        let text = format!(
             "{}: {} rows in {} s; steps of {} ms ({} to {}), jitter {} %, {} gap(s)",
             self.log,
             self.rows,
@@ -34,13 +33,14 @@ impl Audit {
             short(1e3 * self.max_step_s),
             short(100.0 * self.jitter),
             self.gaps.len()
-        )
+        );
+        writeln!(f, "{}", wrap(&text, WIDTH).join("\n"))
     }
 
     fn write_channels(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "\n{:<8}{:<6}{:>12}{:>12}{:>12}{:>12}{:>9}{:>11}",
+            "\n{:<8}{:<6}{:>11}{:>11}{:>12}{:>12}{:>9}{:>10}",
             "channel", "unit", "min", "max", "resolution", "noise", "spikes", "at limit"
         )?;
         let driven_in = match self.driven_by {
@@ -58,23 +58,19 @@ impl Audit {
     fn write_joints(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "\n{:<6}{:>11}{:>10}{:>11}{:>11}{:>10}{:>10}  tau lag ms",
+            "\n{:<6}{:>11}{:>9}{:>11}{:>10}{:>10}{:>10}  tau lag",
             "joint", "fast rad/s", "at rest", "reversals", "full turn", "qd scale", "qd lag ms"
         )?;
         for joint in &self.joints {
             let scale = joint.velocity.map(|check| short(check.scale));
             let lag = joint.velocity.map(|check| short(1e3 * check.lag_s));
-            let torque = joint.torque_lag.map(|lag| {
-                format!(
-                    "{} (correlation {})",
-                    short(1e3 * lag.lag_s),
-                    short(lag.correlation)
-                )
-            });
+            let torque = joint
+                .torque_lag
+                .map(|lag| format!("{} ms", short(1e3 * lag.lag_s)));
             let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
             writeln!(
                 f,
-                "{:<6}{:>11}{:>10}{:>11}{:>11}{:>10}{:>10}  {}",
+                "{:<6}{:>11}{:>9}{:>11}{:>10}{:>10}{:>10}  {}",
                 joint.joint,
                 short(joint.fast_rad_s),
                 format!("{:.1} %", 100.0 * joint.share_at_rest),
@@ -100,6 +96,9 @@ impl Audit {
                 Severity::Info => "info",
             };
             f.write_str(&hanging(label, &finding.text, WIDTH))?;
+            if let Some(place) = finding.place() {
+                f.write_str(&hanging("", &place, WIDTH))?;
+            }
             if let Some(remedy) = &finding.remedy {
                 writeln!(f, "{:<LABEL$}  paste: {remedy}", "")?;
             }
@@ -111,7 +110,7 @@ impl Audit {
 fn write_channel(f: &mut fmt::Formatter<'_>, channel: &Channel, unit: &str) -> fmt::Result {
     writeln!(
         f,
-        "{:<8}{:<6}{:>12}{:>12}{:>12}{:>12}{:>9}{:>11}",
+        "{:<8}{:<6}{:>11}{:>11}{:>12}{:>12}{:>9}{:>10}",
         channel.name,
         unit,
         short(channel.min),

@@ -1,5 +1,6 @@
 //! Small curves of block characters.
 
+use super::cut;
 use crate::report::schema::Report;
 use crate::report::shown::TracksEntry;
 use crate::report::wording::small;
@@ -26,12 +27,12 @@ pub fn curves(report: &Report) -> Vec<String> {
     let [start, end] =
         [stretch.time.first(), stretch.time.last()].map(|t| t.copied().unwrap_or(0.0));
     vec![
-        format!(
-            "  error of {}, {}, {start:.1} to {end:.1} s, up to {}:",
+        cut(&format!(
+            "  error up to {} of {}, {start:.1} to {end:.1} s of {}:",
+            small(top),
             errors.quantity,
-            stretch.log,
-            small(top)
-        ),
+            stretch.log
+        )),
         format!("  {:<14}{}", "fitted", curve(&errors.before, top)),
         format!("  {:<14}{}", "with effects", curve(&errors.after, top)),
     ]

@@ -9,9 +9,6 @@ use crate::data::jumps::{bridge, rows_that_jump};
 use crate::data::local_cubic::half_width_s;
 use crate::data::log::{Interval, Log};
 
-/// More stretches than this are no list to paste.
-const MOST_SPANS: usize = 20;
-
 impl Found {
     pub(super) fn about_jumps(&mut self, joint: &JointAudit, log: &Log) {
         let angles = &log.q[joint.joint];
@@ -31,16 +28,9 @@ impl Found {
             short(log.time[first])
         );
         let severity = spike_severity(rows.len(), log.rows()).min(Warning);
-        let finding = Finding {
-            joint: Some(joint.joint),
-            ..Finding::new(severity, text)
-        };
         let spans: Vec<Interval> = rows.iter().map(|&row| around(log, row)).collect();
-        self.0.push(if spans.len() > MOST_SPANS {
-            finding
-        } else {
-            finding.within(&log.name(), &spans)
-        });
+        let finding = Finding::new(severity, text).of(joint.joint);
+        self.0.push(finding.within(&log.name(), &spans));
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod command;
 mod jumps;
+mod stuck;
 mod torque;
 mod velocity;
 
@@ -9,6 +10,7 @@ use super::joint::{JointAudit, VISIBLE_STEPS};
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::column::Quantity;
+use crate::data::dropped::dropped;
 use crate::data::log::{Interval, Log};
 use Severity::{Info, Serious, Warning};
 
@@ -41,7 +43,7 @@ const FEW_DROPPED: f64 = 0.001;
 pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
     let mut found = Found(vec![]);
     found.about_reading(log);
-    found.about_sampling(audit);
+    found.about_sampling(audit, log);
     found.about_amount_of_motion(audit);
     let by_torque = log.driven_by == Quantity::Torque;
     let passive = by_torque && audit.joints.iter().all(is_passive);
@@ -52,11 +54,11 @@ pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
         if !by_torque {
             found.about_command(joint);
         } else if !passive {
-            found.about_torque(joint, audit);
+            found.about_torque(joint, audit, log);
         }
         if found.moves(joint) {
             found.about_excitation(joint);
-            found.about_angle(joint);
+            found.about_angle(joint, log);
             found.about_jumps(joint, log);
             found.about_velocity(joint, audit);
         }
@@ -95,12 +97,14 @@ impl Found {
         self.0.push(Finding::new(severity, text));
     }
 
+    /// A finding about stretches of the log.
+    fn add_during(&mut self, spans: &[Interval], severity: Severity, text: impl Into<String>) {
+        self.0.push(Finding::new(severity, text).during(spans));
+    }
+
     /// A finding about one joint.
     fn add_of(&mut self, joint: &JointAudit, severity: Severity, text: impl Into<String>) {
-        self.0.push(Finding {
-            joint: Some(joint.joint),
-            ..Finding::new(severity, text)
-        });
+        self.0.push(Finding::new(severity, text).of(joint.joint));
     }
 
     fn about_reading(&mut self, log: &Log) {
@@ -116,7 +120,7 @@ impl Found {
         }
     }
 
-    fn about_sampling(&mut self, audit: &Audit) {
+    fn about_sampling(&mut self, audit: &Audit, log: &Log) {
         let Audit {
             gaps,
             jitter,
@@ -138,7 +142,7 @@ impl Found {
             self.0
                 .push(Finding::new(Warning, text).within(&audit.log, gaps));
         }
-        self.about_dropped_rows(audit);
+        self.about_dropped_rows(audit, log);
         if *jitter > LARGE_JITTER {
             self.add(
                 Warning,
@@ -153,12 +157,14 @@ impl Found {
         }
     }
 
-    fn about_dropped_rows(&mut self, audit: &Audit) {
+    fn about_dropped_rows(&mut self, audit: &Audit, log: &Log) {
         let share = audit.dropped_rows as f64 / audit.rows as f64;
         if audit.dropped_rows == 0 {
             return;
         }
-        self.add(
+        let steps = dropped(log);
+        self.add_during(
+            &log.stretches(steps.iter().map(|step| step.row)),
             if share > FEW_DROPPED { Warning } else { Info },
             format!(
                 "{} row(s) are missing ({} as many as there are): the torque meanwhile is not known. Fits continue it \
@@ -219,7 +225,8 @@ impl Found {
             );
         }
         if joint.share_at_rest > MUCH_REST {
-            self.add(
+            self.add_during(
+                &joint.at_rest,
                 Info,
                 format!(
                     "joint {} is at rest in {} of the rows",
@@ -230,10 +237,11 @@ impl Found {
         }
     }
 
-    fn about_angle(&mut self, joint: &JointAudit) {
+    fn about_angle(&mut self, joint: &JointAudit, log: &Log) {
         let name = &joint.q.name;
         if joint.repeated_fraction > MANY_REPEATS {
-            self.add(
+            self.add_during(
+                &joint.repeated,
                 Serious,
                 format!(
                     "{name} repeats the row before in {} of the rows in motion: the log is written \
@@ -241,6 +249,8 @@ impl Found {
                     percent(joint.repeated_fraction)
                 ),
             );
+        } else {
+            self.about_freezes(joint, log);
         }
     }
 }
@@ -278,6 +288,76 @@ pub(super) mod tests {
         assert!(says(&log, Warning, &["only 1.398", "s of motion"]));
         let still = one_joint(time.clone(), vec![0.5; 700], vec![0.0; 700], time);
         assert!(says(&still, Serious, &["joint 1 moves by 0 rad"]));
+    }
+
+    /// The stretches of the finding that says this.
+    pub(super) fn spans(log: &Log, words: &str) -> Vec<[f64; 2]> {
+        let findings = audit(log).findings;
+        let mut said = findings
+            .iter()
+            .filter(|finding| finding.text.contains(words));
+        said.next()
+            .unwrap_or_else(|| panic!("{words}: {findings:?}"))
+            .spans_s
+            .clone()
+    }
+
+    #[test]
+    fn what_belongs_to_a_part_of_a_log_says_from_when_to_when() {
+        let part = 1000..1600;
+        let time = swing().time;
+        let near = |spans: &[[f64; 2]], from: usize, to: usize| {
+            let ends = [time[from], time[to]];
+            spans
+                .iter()
+                .any(|span| (0..2).all(|k| (span[k] - ends[k]).abs() < 0.05))
+        };
+        let mut clipped = swing();
+        clipped.tau[0][part.clone()].fill(40.0);
+        assert!(near(&spans(&clipped, "tau1 sits at an end"), 1000, 1600));
+        let mut stuck = swing();
+        let exact = stuck.q[0].clone();
+        (0..3000).for_each(|row| stuck.q[0][row] = exact[row - row % 2]);
+        // But for where the joint turns round.
+        let repeated = spans(&stuck, "q1 repeats the row before");
+        let length_s: f64 = repeated.iter().map(|[start, end]| end - start).sum();
+        assert!(
+            length_s > 0.7 * 6.0 && repeated.iter().all(|span| span[1] < 6.05),
+            "{repeated:?}"
+        );
+        let mut resting = swing();
+        for row in 1000..5000 {
+            resting.q[0][row] = resting.q[0][1000];
+            resting.qd[0][row] = 0.0;
+        }
+        assert!(near(&spans(&resting, "at rest in"), 1000, 4999));
+        let mut thinned = swing();
+        for channel in [
+            &mut thinned.time,
+            &mut thinned.q[0],
+            &mut thinned.qd[0],
+            &mut thinned.tau[0],
+        ] {
+            channel.remove(2000);
+        }
+        let missing = spans(&thinned, "1 row(s) are missing");
+        assert_eq!(missing, [[time[1999], time[2001]]]);
+        let mut spiky = swing();
+        spiky.tau[0][700] += 500.0;
+        assert_eq!(
+            spans(&spiky, "tau1 has 1 single-row spike"),
+            [[time[700], time[701]]]
+        );
+        let mut off = swing();
+        off.qd[0][900] += 9.0;
+        let disagrees = spans(&off, "qd1 has 1 sample(s)");
+        assert_eq!(disagrees, [[time[900], time[901]]]);
+        let told = audit(&clipped).to_string();
+        let line = told.lines().find(|line| line.contains("t = 2 to 3.2 s"));
+        assert!(
+            line.is_some_and(|line| line.starts_with("         ")),
+            "{told}"
+        );
     }
 
     #[test]

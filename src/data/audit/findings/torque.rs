@@ -4,6 +4,8 @@ use super::super::table::short;
 use super::super::{Audit, JointAudit};
 use super::Severity::{Info, Serious, Warning};
 use super::{Found, is_passive, milliseconds, percent, spike_severity};
+use crate::data::jumps::rows_that_jump;
+use crate::data::log::Log;
 
 /// Less clipping than this leaves the torque usable as it is logged.
 const MUCH_SATURATION: f64 = 0.02;
@@ -22,7 +24,7 @@ const MUCH_CHATTER: f64 = 1.0;
 const WELL_EXPLAINED: f64 = 0.5;
 
 impl Found {
-    pub(super) fn about_torque(&mut self, joint: &JointAudit, audit: &Audit) {
+    pub(super) fn about_torque(&mut self, joint: &JointAudit, audit: &Audit, log: &Log) {
         let (tau, name) = (&joint.tau, &joint.tau.name);
         if tau.constant {
             self.about_constant_torque(joint);
@@ -39,16 +41,19 @@ impl Found {
                 ),
             );
         }
-        self.about_torque_signal(joint, audit.rows);
+        self.about_torque_signal(joint, log);
         self.about_chatter(joint);
         self.about_torque_explained(joint);
         self.about_torque_lag(joint, audit.median_step_s);
     }
 
-    fn about_torque_signal(&mut self, joint: &JointAudit, rows: usize) {
+    fn about_torque_signal(&mut self, joint: &JointAudit, log: &Log) {
         let (tau, name) = (&joint.tau, &joint.tau.name);
+        let values = &log.tau[joint.joint];
         if tau.saturated_fraction > MUCH_SATURATION {
-            self.add(
+            let at_limit = (0..log.rows()).filter(|row| tau.limits.contains(&values[*row]));
+            self.add_during(
+                &log.stretches(at_limit),
                 Warning,
                 format!(
                     "{name} sits at an end of its range ({} to {} N m) in {} of the rows: make sure \
@@ -60,14 +65,15 @@ impl Found {
             );
         }
         if tau.spikes > 0 {
-            self.add(
+            self.add_during(
+                &log.stretches(rows_that_jump(values)),
                 // Never serious: a command may chatter for good reason.
-                spike_severity(tau.spikes, rows).max(Warning),
+                spike_severity(tau.spikes, log.rows()).max(Warning),
                 format!(
                     "{name} has {} single-row spike(s) ({}): too fast for a real actuator; check whether \
                      the column holds a command or a measurement",
                     tau.spikes,
-                    percent(tau.spikes as f64 / rows as f64)
+                    percent(tau.spikes as f64 / log.rows() as f64)
                 ),
             );
         }

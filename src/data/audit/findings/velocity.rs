@@ -1,5 +1,6 @@
 //! Findings about a joint's logged velocity.
 
+use super::super::quality::Finding;
 use super::super::table::short;
 use super::super::{Audit, JointAudit, MAX_LAG_S, VelocityCheck};
 use super::Severity::{Info, Warning};
@@ -28,18 +29,17 @@ impl Found {
 
     fn about_velocity_spikes(&mut self, joint: &JointAudit, check: VelocityCheck, rows: usize) {
         let (name, number) = (&joint.qd.name, joint.joint);
-        self.add_of(
-            joint,
-            // Never serious: fits read no velocities.
-            spike_severity(joint.qd.spikes, rows).max(Warning),
-            format!(
-                "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in errors of \
+        // Never serious: fits read no velocities.
+        let severity = spike_severity(joint.qd.spikes, rows).max(Warning);
+        let text = format!(
+            "{name} has {} sample(s) ({}) that disagree with dq{number}/dt, by up to {} rad/s: they count in errors of \
                  velocities; `qd = []` under [columns] takes velocities from q{number}",
-                joint.qd.spikes,
-                percent(joint.qd.spikes as f64 / rows as f64),
-                short(check.worst_rad_s)
-            ),
+            joint.qd.spikes,
+            percent(joint.qd.spikes as f64 / rows as f64),
+            short(check.worst_rad_s)
         );
+        let finding = Finding::new(severity, text).of(number);
+        self.0.push(finding.during(&joint.disagreeing));
     }
 
     fn about_velocity_scale(&mut self, name: &str, number: Joint, check: VelocityCheck) {
