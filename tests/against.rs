@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::clients::{client, schema_path};
 use crate::support::{refuses, succeeds, text};
 
 /// A scratch folder with logs of the demo rig and a model file of the true rig, friction included.
@@ -149,6 +150,11 @@ fn declared_values_that_the_logs_contradict_are_named_with_their_factor() {
         written.contains(line) && written.contains("): 0.50 times as large"),
         "{written}"
     );
+    // Whoever has the files finds out whether they are those that were read.
+    let files = report["call"]["inputs"].as_array().unwrap().iter();
+    let roles: Vec<&str> = files.map(|file| file["role"].as_str().unwrap()).collect();
+    assert_eq!(roles, ["model", "train", "train", "test"]);
+    client("report.py", &[&out, &schema_path()]);
 }
 
 #[test]

@@ -51,6 +51,11 @@ pub fn client(script: &str, arguments: &[&Path]) {
     assert!(run.status.success(), "{script} failed:\n{said}");
 }
 
+/// The published schema of report.json.
+pub fn schema_path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/report.schema.json")
+}
+
 #[test]
 fn python_reads_the_weights_of_a_checkpoint() {
     client("weights.py", &[demo()]);
@@ -58,8 +63,7 @@ fn python_reads_the_weights_of_a_checkpoint() {
 
 #[test]
 fn report_matches_its_published_schema() {
-    let schema = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/report.schema.json");
-    client("report.py", &[demo(), &schema]);
+    client("report.py", &[demo(), &schema_path()]);
 }
 
 #[test]

@@ -122,6 +122,7 @@ impl Question {
             }),
             seed: self.seed,
             model_toml: self.model.declaration.clone(),
+            call: None,
         }
     }
 }

@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::call::{Begun, files};
 use super::{Answer, Common, inputs, interrupt, progress, voice};
 use crate::closeloop::{
     Outcome, Reference, Request, Settings, Space, Split, Verdict, calibrate, close_loop,
@@ -17,7 +18,7 @@ use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Model, Origin};
 use crate::plant::Plant;
 use crate::report;
-use crate::runs::RunFolder;
+use crate::runs::{InputFile, RunFolder};
 use crate::train::ResidualTrainer;
 
 /// Find what a model lacks: fit it, trace the residual to effects, add them, refit, report before and after
@@ -86,6 +87,7 @@ impl From<Errors> for Space {
 const DEMO: &str = include_str!("../../configs/demo.toml");
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let begun = Begun::now();
     let library = arguments.effects.library()?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let (declared, split) = match &arguments.model {
@@ -93,6 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         None => demo(&library, &mut rng)?,
     };
     let against = references(&arguments.against, &declared, &library)?;
+    let inputs = input_files(arguments)?;
     if split.test.is_empty() {
         bail!("the logs are too short to set any of them apart for the test; give --test");
     }
@@ -110,10 +113,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     request.space = arguments.errors.map(Space::from);
     let mut outcome = close_loop(request, &mut rng, &mut |now| stages.show(&now))?;
     stages.finish();
-    let origin = origin(arguments, &declared);
+    let origin = || Origin {
+        call: Some(begun.call(&inputs)),
+        ..origin(arguments, &declared)
+    };
     let write = |outcome: &Outcome| {
         interrupt::whole(|| {
-            let report = report::write(&arguments.out, outcome, &origin)?;
+            let report = report::write(&arguments.out, outcome, &origin())?;
             written.store(true, Ordering::SeqCst);
             Ok::<_, anyhow::Error>(report)
         })
@@ -222,6 +228,20 @@ fn joints(model: &Model) -> String {
     format!("{} joint(s) ({})", model.joints, kinds.join(", "))
 }
 
+/// The files that the run reads.
+fn input_files(arguments: &Arguments) -> Result<Vec<InputFile>> {
+    let effects = arguments.effects.files()?;
+    let roles = [
+        ("model", arguments.model.as_slice()),
+        ("train", &arguments.train),
+        ("test", &arguments.test),
+        ("against", &arguments.against),
+        ("effect", &effects),
+    ];
+    let of_roles = roles.iter().map(|(role, paths)| files(role, paths));
+    Ok(of_roles.collect::<Result<Vec<_>>>()?.concat())
+}
+
 fn origin(arguments: &Arguments, declared: &Model) -> Origin {
     let paths = |paths: &[PathBuf]| {
         paths
@@ -249,6 +269,7 @@ fn origin(arguments: &Arguments, declared: &Model) -> Origin {
         }),
         seed: arguments.common.seed,
         model_toml: declared.declaration.clone(),
+        call: None,
     }
 }
 

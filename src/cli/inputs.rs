@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::voice;
 use crate::data::{Columns, LeaveOut, Log, audit, leave_out};
-use crate::model::{Library, Model};
+use crate::model::{Library, Model, effect_files};
 
 /// The effects that model files may name: the built-in ones and the user's own.
 #[derive(Debug, Args)]
@@ -24,6 +24,12 @@ impl Effects {
             library = library.with_folder(folder)?;
         }
         Ok(library)
+    }
+
+    /// The effect files in the folders.
+    pub fn files(&self) -> Result<Vec<PathBuf>> {
+        let folders = self.folders.iter().map(|folder| effect_files(folder));
+        Ok(folders.collect::<Result<Vec<_>, _>>()?.concat())
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod audit;
 mod bench;
+mod call;
 mod check;
 mod closeloop;
 mod control;

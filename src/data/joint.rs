@@ -51,6 +51,11 @@ impl Joint {
         self.0 + 1
     }
 
+    /// For people: its number, with its name where it has one.
+    pub fn called(self, name: Option<&str>) -> String {
+        name.map_or_else(|| self.to_string(), |name| format!("{self} ({name})"))
+    }
+
     /// A variable of this joint: `q2` of `q`.
     pub fn name(self, stem: &str) -> String {
         format!("{stem}{self}")

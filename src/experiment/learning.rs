@@ -135,6 +135,7 @@ impl Method {
                 }),
                 seed: run.seed,
                 model_toml: self.model_toml.clone(),
+                call: None,
             };
             folder.keep(round.clone(), &state, &training, &origin)?;
             report(&round, false);

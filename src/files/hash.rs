@@ -1,3 +1,5 @@
+use sha2::{Digest, Sha256};
+
 /// A 64-bit hash of contents (FNV-1a), the same on every machine and in every version. It tells changed contents from
 /// unchanged ones; it does not protect against forgery.
 pub fn content_hash(bytes: &[u8]) -> u64 {
@@ -11,14 +13,23 @@ pub fn content_id(bytes: &[u8]) -> String {
     format!("{:016x}", content_hash(bytes))
 }
 
+/// The SHA-256 of contents in hexadecimal digits, as `sha256sum` prints it: by it others find the file that was read.
+pub fn sha256(bytes: &[u8]) -> String {
+    format!("{:x}", Sha256::digest(bytes))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{content_hash, content_id};
+    use super::{content_hash, content_id, sha256};
 
     #[test]
     fn hashes_are_the_published_ones() {
         assert_eq!(content_hash(b""), 0xcbf2_9ce4_8422_2325);
         assert_eq!(content_hash(b"a"), 0xaf63_dc4c_8601_ec8c);
         assert_eq!(content_id(b"foobar"), "85944171f73967e8");
+        assert_eq!(
+            sha256(b"abc"),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
     }
 }

@@ -4,6 +4,6 @@ mod hash;
 mod named;
 mod output;
 
-pub use hash::{content_hash, content_id};
+pub use hash::{content_hash, content_id, sha256};
 pub use named::{beside, beside_or_named, text_or_embedded};
 pub use output::{OutputError, end_of_links, folder_of, move_contents, write_whole, write_with};

@@ -91,8 +91,8 @@ impl Setting {
         let run = self.run();
         let origin = Origin {
             config: json!({}),
-            seed: 4,
             model_toml: self.plant.system.declaration.clone(),
+            ..Origin::of_seed(4)
         };
         while state.rounds < until {
             let (round, training) = run.round(state).unwrap();

@@ -41,19 +41,7 @@ impl Library {
     /// # Errors
     /// Unreadable folder, or the first error in a file.
     pub fn with_folder(mut self, folder: &Path) -> Result<Self, FileError> {
-        let unreadable = |error: std::io::Error| FileError {
-            path: folder.to_owned(),
-            place: None,
-            message: format!("cannot be read as a folder of effects: {error}"),
-        };
-        let entries = std::fs::read_dir(folder).map_err(unreadable)?;
-        let mut paths: Vec<PathBuf> = entries
-            .map(|entry| entry.map(|entry| entry.path()))
-            .collect::<Result<_, _>>()
-            .map_err(unreadable)?;
-        paths.retain(|path| is_toml(path));
-        paths.sort();
-        for path in paths {
+        for path in effect_files(folder)? {
             let effect = Effect::read(&path)?;
             self.effects.retain(|known| known.name != effect.name);
             self.effects.push(effect);
@@ -143,6 +131,26 @@ fn embedded<T>(folder: &str, read: impl Fn(&Path, &str) -> Result<T, FileError>)
         read(file.path(), text).expect("embedded files are read by a test")
     });
     whole.collect()
+}
+
+/// The effect files of a folder, by name.
+///
+/// # Errors
+/// Unreadable folder.
+pub fn effect_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let unreadable = |error: std::io::Error| FileError {
+        path: folder.to_owned(),
+        place: None,
+        message: format!("cannot be read as a folder of effects: {error}"),
+    };
+    let entries = std::fs::read_dir(folder).map_err(unreadable)?;
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<Result<_, _>>()
+        .map_err(unreadable)?;
+    paths.retain(|path| is_toml(path));
+    paths.sort();
+    Ok(paths)
 }
 
 fn is_toml(path: &Path) -> bool {

@@ -32,7 +32,7 @@ pub use dynamics::{Dynamics, OwnValue, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
-pub use library::Library;
+pub use library::{Library, effect_files};
 pub(crate) use network::to_f32;
 pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,

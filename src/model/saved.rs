@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use super::{Angles, InputScaling, MlpWeights, Parameter, ResidualOn};
+use crate::runs::Call;
 
 /// All learnable numbers of a model, in plain form.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +58,8 @@ pub struct Origin {
     pub seed: u64,
     /// Text of the model file.
     pub model_toml: String,
+    /// Of a report: how the program was called. None where a program calls the library.
+    pub call: Option<Call>,
 }
 
 impl Origin {
@@ -66,6 +69,7 @@ impl Origin {
             config: serde_json::json!({"command": null}),
             seed,
             model_toml: String::new(),
+            call: None,
         }
     }
 }

@@ -37,6 +37,7 @@ impl Report {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: origin.seed,
             configuration: origin.config.clone(),
+            call: origin.call.clone(),
             settings: outcome.given.settings.clone(),
             system: model.name.clone(),
             joints: model.joints,

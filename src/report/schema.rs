@@ -14,6 +14,7 @@ use crate::closeloop::{
     Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, Unexplained, Verdict,
 };
 use crate::data::{Finding as AuditFinding, Joint, Severity};
+use crate::runs::Call;
 use crate::sim::metric::TorqueError;
 
 /// The JSON schema (draft 2020-12) of [`Report`].
@@ -38,6 +39,8 @@ pub struct Report {
     pub(super) seed: u64,
     /// the command with its arguments as resolved; of a program that calls the library, what it gives
     pub(super) configuration: Value,
+    /// how the program was called; null of a program that calls the library. All else is the same each time
+    pub(super) call: Option<Call>,
     /// every tuning constant of closing the loop
     pub(super) settings: Settings,
     /// name of the declared system

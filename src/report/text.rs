@@ -8,6 +8,7 @@ use super::schema::{EffectEntry, LogEntry, Report};
 use super::wording::{capitalised, probability, reduction, split, values};
 use crate::closeloop::Space;
 use crate::data::{Finding, Interval, Severity};
+use crate::runs::Call;
 
 /// The report in Markdown: the answer first, then the evidence, then what to be careful about.
 pub fn text(report: &Report) -> String {
@@ -191,14 +192,26 @@ fn logs(report: &Report) -> String {
     out + "\n"
 }
 
+/// When, by which command and for how long.
+fn called(call: &Call) -> String {
+    let Call {
+        command,
+        began,
+        took_s,
+        ..
+    } = call;
+    format!("Begun on {began} by `{command}`, took {took_s:.1} s. ")
+}
+
 fn footer(report: &Report) -> String {
     let widths: Vec<String> = report
         .sign_widths
         .iter()
         .map(|w| format!("{w:.3}"))
         .collect();
+    let call = report.call.as_ref().map_or_else(String::new, called);
     format!(
-        "---\nresidyn {}, seed {}. In fits and predictions the sign of a velocity is smoothed over {} rad/s (or m/s); \
+        "---\nresidyn {}, seed {}. {call}In fits and predictions the sign of a velocity is smoothed over {} rad/s (or m/s); \
          integrator: Runge-Kutta 4, steps of {:.2} ms.\n",
         report.version,
         report.seed,

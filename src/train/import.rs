@@ -37,6 +37,7 @@ pub fn save_imported(
         config: json!({"command": "import", "step_s": step_s, "origin": exported}),
         seed,
         model_toml: description.model_toml,
+        call: None,
     };
     save(dir, &training, &origin)
 }

@@ -1,5 +1,7 @@
 """Read a report as any program would: JSON, checked against the schema, and the files that it names."""
 
+import datetime
+import hashlib
 import json
 import pathlib
 import sys
@@ -18,6 +20,13 @@ validator = jsonschema.validators.validator_for(schema)
 validator.check_schema(schema)
 faults = [f"{fault.json_path}: {fault.message}" for fault in validator(schema).iter_errors(report)]
 assert not faults, "\n".join(faults)
+
+call = report["call"]
+assert call["command"].startswith("residyn closeloop ") and call["took_s"] > 0, call
+began = datetime.datetime.fromisoformat(call["began"].replace("Z", "+00:00"))
+assert datetime.timedelta(0) <= datetime.datetime.now(datetime.timezone.utc) - began < datetime.timedelta(hours=1), began
+for file in call["inputs"]:
+    assert hashlib.sha256(pathlib.Path(file["path"]).read_bytes()).hexdigest() == file["sha256"], file["path"]
 
 horizons, joints = len(report["error"]["horizons_s"]), report["joints"]
 named = {name: report["error"][name] or {} for name in ("declared", "before", "after", "hybrid")}

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::Section;
 use crate::report::schema::{LogEntry, Report};
 use crate::report::wording::split;
+use crate::runs::Call;
 
 pub(super) fn section(report: &Report) -> Section {
     Section {
@@ -13,6 +14,7 @@ pub(super) fn section(report: &Report) -> Section {
         question: "How was it made?",
         answer: html! {
             p { "residyn " (report.version) ", seed " (report.seed) ". The same seed gives the same result on the same machine." }
+            @if let Some(call) = &report.call { (called(call)) }
             p { "Test logs: " (split(&report.logs.split)) "." }
             div.table tabindex="0" { table {
                 thead { tr { th { "log" } th { "role" } th { "rows" } th { "from, s" } th { "to, s" } th { "left out, s" } } }
@@ -21,9 +23,27 @@ pub(super) fn section(report: &Report) -> Section {
                     @for log in &report.logs.test { (row(log, "test")) }
                 }
             } }
-            details { summary { "Command and configuration" } pre tabindex="0" { (pretty(&report.configuration)) } }
+            details { summary { "Configuration as resolved" } pre tabindex="0" { (pretty(&report.configuration)) } }
             details { summary { "Every tuning constant" } pre tabindex="0" { (pretty(&report.settings)) } }
         },
+    }
+}
+
+/// The command, when it ran, and its files with their hashes.
+fn called(call: &Call) -> Markup {
+    html! {
+        p { "Begun on " (call.began) ", took " (format!("{:.1}", call.took_s)) " s:" }
+        pre tabindex="0" { (call.command) }
+        @if !call.inputs.is_empty() {
+            div.table tabindex="0" { table {
+                thead { tr { th { "read as" } th { "file" } th { "SHA-256" } } }
+                tbody {
+                    @for file in &call.inputs {
+                        tr { td { (file.role) } th scope="row" { (file.path) } td { code { (file.sha256) } } }
+                    }
+                }
+            } }
+        }
     }
 }
 

@@ -60,6 +60,7 @@ impl Job {
                 config,
                 seed,
                 model_toml,
+                call: None,
             },
             dynamics,
         })

@@ -91,6 +91,7 @@ fn tuned(
             config,
             seed,
             model_toml: checkpoint.model_toml.clone(),
+            call: None,
         },
         dynamics,
     })

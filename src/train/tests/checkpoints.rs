@@ -8,8 +8,8 @@ use crate::train::{Backend, Checkpoint, FitSettings, HybridModel, Training, save
 fn origin() -> Origin {
     Origin {
         config: serde_json::json!({"epochs": 3}),
-        seed: 9,
         model_toml: "[system]\nname = \"pendulum\"\n".to_owned(),
+        ..Origin::of_seed(9)
     }
 }
 

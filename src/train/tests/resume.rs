@@ -8,8 +8,8 @@ use crate::train::{Backend, Batching, Checkpoint, Ended, FitSettings, Penalty, T
 fn origin() -> Origin {
     Origin {
         config: serde_json::json!({"learning_rate": 0.1}),
-        seed: 3,
         model_toml: "[system]\n".to_owned(),
+        ..Origin::of_seed(3)
     }
 }
 
