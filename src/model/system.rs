@@ -102,10 +102,7 @@ impl Model {
 
     /// A joint for people: `2`, or `2 (elbow)` where it has a name.
     pub fn joint_label(&self, joint: Joint) -> String {
-        match self.joint_names.get(joint.index()) {
-            Some(name) => format!("{joint} ({name})"),
-            None => joint.to_string(),
-        }
+        joint.called(self.joint_names.get(joint.index()).map(String::as_str))
     }
 
     /// The names that formulas of the motion may use before any `let`: states, torques, time, parameters.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::schema::{IdentifiabilityEntry, ModelError, Report, TorqueEntry};
+use super::schema::{ErrorEntry, IdentifiabilityEntry, ModelError, Report, TorqueEntry};
 use super::wording::{
     AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
 };
@@ -97,7 +97,7 @@ pub(super) fn torques(report: &Report) -> String {
         "| all, share of the logged torques | {declared:.2} % | {before:.2} % | {after:.2} % | {:.2} |",
         after / before.max(f64::MIN_POSITIVE)
     );
-    out += &removed(*reduction_ci95, "error");
+    out += &paragraph(removed(*reduction_ci95, "error"));
     out + &repeated(report) + "\n"
 }
 
@@ -126,14 +126,32 @@ pub(super) fn repeated(report: &Report) -> String {
 }
 
 /// How much of an error of the fitted declared model the effects remove, where an interval is known.
-fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> String {
-    reduction_ci95.map_or_else(String::new, |[low, high]| {
-        format!(
-            "\nThe effects remove {:.0} to {:.0} % of the fitted declared model's {error} (95 % interval, bootstrap over parts of the test logs).\n",
-            100.0 * low,
-            100.0 * high
-        )
+pub(super) fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> Option<String> {
+    let [low, high] = reduction_ci95?;
+    Some(format!(
+        "The effects remove {:.0} to {:.0} % of the fitted declared model's {error} (95 % interval, bootstrap over parts of the test logs).",
+        100.0 * low,
+        100.0 * high
+    ))
+}
+
+/// The same of the open-loop error.
+pub(super) fn removed_of_motion(error: &ErrorEntry) -> Option<String> {
+    let of = format!("error at {} s", error.middle().1);
+    removed(error.reduction_ci95, &of)
+}
+
+/// In how many windows a model diverged, if in any.
+pub(super) fn diverged(name: &str, model: &ModelError) -> Option<String> {
+    let windows: usize = model.diverged.iter().sum();
+    (windows > 0).then(|| {
+        format!("{name}: {windows} windows diverged; each counts with the error reached by then.")
     })
+}
+
+/// A paragraph, where there is something to say.
+fn paragraph(sentence: Option<String>) -> String {
+    sentence.map_or_else(String::new, |sentence| format!("\n{sentence}\n"))
 }
 
 pub(super) fn errors(report: &Report) -> String {
@@ -180,13 +198,7 @@ pub(super) fn errors(report: &Report) -> String {
         }
     }
     for (name, model) in &models {
-        let diverged: usize = model.diverged.iter().sum();
-        if diverged > 0 {
-            let _ = writeln!(
-                out,
-                "\n{name}: {diverged} windows diverged; each counts with the error reached by then."
-            );
-        }
+        out += &paragraph(diverged(name, model));
     }
     if let (Some(torque), Space::Motion) = (&report.torque, report.compared) {
         let percent = |error: &TorqueError| 100.0 * error.relative;
@@ -205,8 +217,7 @@ pub(super) fn errors(report: &Report) -> String {
             "\nNo test log holds a window of {horizon} s, so no error is given at that horizon."
         );
     }
-    let error = format!("error at {} s", report.error.middle().1);
-    out += &removed(report.error.reduction_ci95, &error);
+    out += &paragraph(removed_of_motion(&report.error));
     out + "\n![predictions](predictions.svg)\n\n![errors](errors.svg)\n\n"
 }
 

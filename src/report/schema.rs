@@ -120,11 +120,8 @@ impl Report {
 
     /// A joint for people: its number, with its name where it has one.
     pub(super) fn label(&self, joint: Joint) -> String {
-        let name = &self.joint_names[joint.index()];
-        match *name == joint.name("q") {
-            true => joint.to_string(),
-            false => format!("{joint} ({name})"),
-        }
+        let name = Some(self.joint_names[joint.index()].as_str());
+        joint.called(name.filter(|name| *name != joint.name("q")))
     }
 }
 

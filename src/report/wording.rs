@@ -42,13 +42,9 @@ pub(super) fn reduction(part: f64, quantity: &str) -> String {
     }
 }
 
-/// One text for each value of an effect; a value that holds in one log alone names it.
+/// One text for each value of an effect.
 pub(super) fn values(parameters: &[ParameterEntry]) -> Vec<String> {
-    let row = |parameter: &ParameterEntry| match &parameter.log {
-        Some(log) => format!("{} in {log}", value(parameter)),
-        None => value(parameter),
-    };
-    parameters.iter().map(row).collect()
+    parameters.iter().map(value).collect()
 }
 
 /// `coulomb_friction on joint 1: F_c1 = 0.1598 N m (0.1593 to 0.1603)`
@@ -71,9 +67,13 @@ pub(super) fn value(parameter: &ParameterEntry) -> String {
     format!("{} = {}", parameter.name, amount(parameter))
 }
 
-/// `0.1598 N m (0.1593 to 0.1603)`
+/// `0.1598 N m (0.1593 to 0.1603)`; a value that holds in one log alone names it.
 pub(super) fn amount(parameter: &ParameterEntry) -> String {
-    amount_of(parameter.value, parameter.ci95, &parameter.unit)
+    let amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
+    match &parameter.log {
+        Some(log) => format!("{amount} in {log}"),
+        None => amount,
+    }
 }
 
 /// The same of a number with its interval and unit.

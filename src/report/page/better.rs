@@ -4,7 +4,9 @@ use maud::{Markup, html};
 
 use super::Section;
 use crate::data::Joint;
-use crate::report::accuracy::{compared, position_unit, repeated, scored};
+use crate::report::accuracy::{
+    compared, diverged, position_unit, removed, removed_of_motion, repeated, scored,
+};
 use crate::report::schema::{Report, TorqueEntry};
 use crate::report::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small};
 
@@ -36,15 +38,6 @@ fn ratio(after: f64, before: f64) -> Markup {
     html! { td.ratio { span.bar.worse[share > 1.0] style={ "--share:" (format!("{width:.1}%")) } { (format!("{share:.2}")) } } }
 }
 
-fn removed(interval: Option<[f64; 2]>) -> Markup {
-    html! {
-        @if let Some([low, high]) = interval {
-            p { "The effects remove " strong { (format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high)) }
-                " of the fitted declared model\u{2019}s error (95 % interval, bootstrap over parts of the test logs)." }
-        }
-    }
-}
-
 fn of_torques(report: &Report, errors: &TorqueEntry) -> Markup {
     let models = [&errors.as_declared, &errors.before, &errors.after];
     html! {
@@ -67,7 +60,7 @@ fn of_torques(report: &Report, errors: &TorqueEntry) -> Markup {
                 }
             }
         } }
-        (removed(errors.reduction_ci95))
+        @if let Some(removed) = removed(errors.reduction_ci95, "error") { p { (removed) } }
         p { (repeated(report)) }
     }
 }
@@ -95,10 +88,9 @@ fn of_motion(report: &Report) -> Markup {
                 }
             }
         } }
-        (removed(error.reduction_ci95))
+        @if let Some(removed) = removed_of_motion(error) { p { (removed) } }
         @for (name, model) in &models {
-            @let diverged: usize = model.diverged.iter().sum();
-            @if diverged > 0 { p { (name) ": " (diverged) " windows diverged; each counts with the error reached by then." } }
+            @if let Some(diverged) = diverged(name, model) { p { (diverged) } }
         }
     }
 }

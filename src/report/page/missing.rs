@@ -52,10 +52,7 @@ fn added(effect: &EffectEntry) -> Markup {
 
 /// `F_c1 = 0.1598 N m (0.1593 to 0.1603)`
 pub(super) fn value(parameter: &ParameterEntry) -> Markup {
-    html! {
-        code { (parameter.name) } " = " (amount(parameter))
-        @if let Some(log) = &parameter.log { " in " (log) }
-    }
+    html! { code { (parameter.name) } " = " (amount(parameter)) }
 }
 
 fn supported(report: &Report) -> Markup {
