@@ -8,9 +8,9 @@ use residyn::data::{Columns, Log};
 use crate::clients::client;
 
 /// A trajectory of two joints as CSV.
-fn trajectory() -> String {
+pub fn trajectory() -> String {
     let row = |k: u32| {
-        let t = 0.004 * f64::from(k);
+        let t = f64::from(k) / 250.0;
         let (q, qd) = (
             [t.sin(), 0.5 * (2.0 * t).cos()],
             [t.cos(), -(2.0 * t).sin()],

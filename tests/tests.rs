@@ -41,6 +41,7 @@ mod physics;
 mod prescribed;
 mod printers;
 mod recipes;
+mod recordings;
 mod rigs;
 mod runs;
 mod shell;

@@ -40,6 +40,11 @@ const OTHERS: &[(&str, &str)] = &[
     ),
     ("npz", "logs of NumPy, in"),
     (
+        "mcap",
+        "recordings of robots, joint states in CDR or JSON, in",
+    ),
+    ("rosbag2", "the same as .db3 files and folders of ROS 2, in"),
+    (
         "toml",
         "models, effects, plants, tasks and recipes, in; fitted models, out",
     ),

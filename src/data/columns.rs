@@ -20,6 +20,8 @@ pub struct Columns {
     pub tau: Vec<Column>,
     /// Which of the two they are: [`Quantity::Torque`] or [`Quantity::Command`].
     pub driven_by: Quantity,
+    /// The topic of a recording that has the joints; `None` where their names tell.
+    pub topic: Option<String>,
     /// Names of the joints, if they have any. A standard column that a header lacks may be called by its joint's: `q_elbow`
     /// for `q2`.
     pub joint_names: Vec<String>,
@@ -34,6 +36,7 @@ impl Default for Columns {
             qd: Some(vec![]),
             tau: vec![],
             driven_by: Quantity::Torque,
+            topic: None,
             joint_names: vec![],
         }
     }
@@ -80,7 +83,10 @@ impl Columns {
     }
 
     /// These columns with every empty list filled with the standard names.
-    fn completed(&self, joints: usize, path: &Path) -> Result<Columns, LogError> {
+    ///
+    /// # Errors
+    /// A list of another length.
+    pub(super) fn completed(&self, joints: usize, path: &Path) -> Result<Columns, LogError> {
         let list = |list: &'static str, columns: &Vec<Column>| match columns.len() {
             0 => Ok(numbered(list, joints)),
             named if named == joints => Ok(columns.clone()),
@@ -92,17 +98,30 @@ impl Columns {
             }),
         };
         Ok(Columns {
-            time: self.time.clone(),
             q: list("q", &self.q)?,
             qd: self.qd.as_ref().map(|qd| list("qd", qd)).transpose()?,
             tau: list(self.driven_by.key(), &self.tau)?,
-            driven_by: self.driven_by,
-            joint_names: self.joint_names.clone(),
+            ..self.clone()
         })
     }
 
-    /// These columns, each that has its standard name and is not in the header by the name of its joint if that is there.
+    /// Whether one of these columns is called so.
+    pub(super) fn names(&self, name: &str) -> bool {
+        self.in_file_order().any(|column| column.name == name)
+    }
+
+    /// Whether a header has the angles of all joints.
+    pub(super) fn has_angles_in(&self, header: &[String]) -> bool {
+        let renamed = self.clone().renamed_for(header);
+        renamed.q.iter().all(|column| header.contains(&column.name))
+    }
+
+    /// These columns, each that has its standard name and is not in the header by the name of its joint if that is there. A
+    /// single joint without a name is the only one of the header.
     fn renamed_for(mut self, header: &[String]) -> Columns {
+        if let ([_], [], [joint]) = (&*self.q, &*self.joint_names, &*joints(header)) {
+            self.joint_names = vec![(*joint).to_owned()];
+        }
         let has = |name: &String| header.contains(name);
         let lists = [
             ("q", Some(&mut self.q)),
@@ -121,6 +140,12 @@ impl Columns {
         }
         self
     }
+}
+
+/// The joints by whose names a header calls its angles.
+pub(super) fn joints(header: &[String]) -> Vec<&str> {
+    let joints = header.iter().filter_map(|name| name.strip_prefix("q_"));
+    joints.collect()
 }
 
 fn numbered(prefix: &str, joints: usize) -> Vec<Column> {
@@ -168,6 +193,7 @@ impl Header<'_> {
         self.check_is_a_header()?;
         let columns = columns.completed(joints, self.path)?;
         let standard = Columns {
+            topic: columns.topic.clone(),
             joint_names: columns.joint_names.clone(),
             ..Columns::standard(joints, columns.driven_by)
         };
@@ -227,7 +253,10 @@ impl Header<'_> {
             let name = name.to_lowercase();
             words.iter().any(|word| name.contains(word))
         };
-        self.names.iter().any(is_like)
+        // `q_level` is the angle of a joint, whatever its name.
+        let is_angle = |name: &String| name.starts_with("q_");
+        let mut others = self.names.iter().filter(|name| !is_angle(name));
+        others.any(is_like)
     }
 
     fn find(
@@ -262,6 +291,16 @@ impl Header<'_> {
     /// Points to the nearest of the names that are `free` (no other channel's) where one is near, and
     /// to all names otherwise.
     fn remedy(&self, wanted: &str, quantity: Quantity, free: &[String]) -> String {
+        let joints = joints(&self.names);
+        if !joints.is_empty() && quantity == Quantity::Angle {
+            return format!(
+                "the log has the joints {}: give those of the model their names, joint_names = [\"{}\", ..] under [system] in \
+                 the model file, or name the columns under [columns]: q = [\"q_{}\", ..]",
+                joints.join(", "),
+                joints[0],
+                joints[0]
+            );
+        }
         let nearest = free
             .iter()
             .map(|name| (likeness(name, wanted), name))

@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::column::unwrap;
-use super::columns::{Cell, Columns, Header, Layout};
+use super::columns::{Cell, Columns, Header, Layout, joints};
 use super::error::{CellFault, LogError};
 use super::local_cubic::slopes;
 use super::log::Log;
 use super::table::{Table, open};
 
 impl Log {
-    /// Reads one trajectory of a rig with `joints` joints from a file of any format that is read.
+    /// Reads one trajectory of a rig with `joints` joints from a file, or a folder, of any format that is read.
     ///
     /// Columns may stand in any order. Columns that nothing asks for are ignored, and a note names
     /// them. A file without any torque column is the log of a passive rig: its torques are zero, and
@@ -22,20 +22,27 @@ impl Log {
     /// table of finite numbers with strictly increasing time and the asked number of joints.
     pub fn read(path: impl AsRef<Path>, joints: usize, columns: &Columns) -> Result<Log, LogError> {
         let path = path.as_ref();
-        log(path, open(path)?.as_ref(), joints, columns)
+        let columns = columns.completed(joints, path)?;
+        log(path, open(path, &columns)?.as_ref(), joints, &columns)
     }
 
-    /// Reads a file with the standard columns, of as many joints as its header has.
+    /// Reads a file with the standard columns, of as many joints as its header has, in its order where they have names.
     ///
     /// # Errors
     /// As [`Log::read`].
     pub fn read_standard(path: impl AsRef<Path>) -> Result<Log, LogError> {
         let path = path.as_ref();
-        let table = open(path)?;
+        let table = open(path, &Columns::default())?;
         let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
-        let joints = (1..).take_while(has).count();
+        let numbered = (1..).take_while(has).count();
+        let named = joints(table.names()).into_iter();
+        let columns = Columns {
+            joint_names: named.map(str::to_owned).collect(),
+            ..Columns::default()
+        };
         // A header of no joint lacks the first.
-        log(path, table.as_ref(), joints.max(1), &Columns::default())
+        let count = numbered.max(columns.joint_names.len()).max(1);
+        log(path, table.as_ref(), count, &columns)
     }
 }
 
@@ -82,7 +89,8 @@ pub(super) fn log(
         };
         return Err(fault(previous + 1, layout.time.index, late));
     }
-    let (mut q, mut notes) = (channel(&layout.q)?, notes(&layout));
+    let mut q = channel(&layout.q)?;
+    let mut notes = [table.notes().to_vec(), notes(&layout)].concat();
     for (angles, cell) in q.iter_mut().zip(&layout.q).filter(|(_, cell)| cell.wrapped) {
         let (name, passed) = (&header.names[cell.index], unwrap(angles, TAU));
         notes.push(format!(

@@ -18,15 +18,15 @@ pub(super) fn columns(
     let Some(section) = section else {
         return Ok(columns);
     };
-    section.only(
-        &[
-            Quantity::Time,
-            Quantity::Angle,
-            Quantity::Velocity,
-            driven_by,
-        ]
-        .map(Quantity::key),
-    )?;
+    let [time, q, qd, driven] = [
+        Quantity::Time,
+        Quantity::Angle,
+        Quantity::Velocity,
+        driven_by,
+    ]
+    .map(Quantity::key);
+    section.only(&["topic", time, q, qd, driven])?;
+    columns.topic = section.text("topic")?.map(|topic| topic.value);
     if let Some(time) = section.name_or_table("time")? {
         columns.time = column(time, Quantity::Time)?;
     }

@@ -1,6 +1,7 @@
 //! Columns of numbers in memory: what readers of binary formats make.
 
 use super::Table;
+use super::npy::Array;
 use crate::data::error::{CellFault, LogError, Place};
 
 /// Columns, those that are shorter than others with empty cells at their ends.
@@ -8,6 +9,8 @@ use crate::data::error::{CellFault, LogError, Place};
 pub struct Arrays {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
+    /// What a reader of the log should know about how they were read.
+    pub notes: Vec<String>,
 }
 
 impl Arrays {
@@ -16,31 +19,35 @@ impl Arrays {
         self.columns.push(column);
     }
 
-    /// The columns `name1`, `name2` .. of a matrix with a row a sample; one that has a single column keeps the name of a
-    /// vector, `name`, where it is one.
-    pub fn add_matrix(&mut self, name: &str, matrix: &Matrix, values: &[f64]) {
-        // A matrix without rows may claim any number of columns.
-        for column in 0..matrix.columns.min(values.len()) {
-            let place = |row: usize| match matrix.by_columns {
-                true => column * matrix.rows + row,
-                false => row * matrix.columns + column,
+    /// A vector is a column of its name; a matrix with a row a sample makes the columns `name1`, `name2` .. What is neither,
+    /// or holds texts, is left out, as columns are that nothing asks for.
+    ///
+    /// # Errors
+    /// An array that holds something else, or is cut off.
+    pub(super) fn add_array(&mut self, name: &str, array: &Array<'_>) -> Result<(), String> {
+        let (rows, columns) = match *array.shape.as_slice() {
+            [rows] => (rows, 1),
+            [rows, columns] => (rows, columns),
+            _ => return Ok(()),
+        };
+        if array.is_text() {
+            return Ok(());
+        }
+        let values = array.numbers(name)?;
+        // Without rows, any number of columns may be claimed.
+        for column in 0..columns.min(values.len()) {
+            let place = |row: usize| match array.by_columns {
+                true => column * rows + row,
+                false => row * columns + column,
             };
-            let values = (0..matrix.rows).map(|row| values[place(row)]).collect();
-            match matrix.is_vector {
-                true => self.add(name, values),
-                false => self.add(format!("{name}{}", column + 1), values),
+            let values = (0..rows).map(|row| values[place(row)]).collect();
+            match array.shape.len() {
+                1 => self.add(name, values),
+                _ => self.add(format!("{name}{}", column + 1), values),
             }
         }
+        Ok(())
     }
-}
-
-/// How the numbers of a matrix stand in a file.
-pub struct Matrix {
-    pub rows: usize,
-    pub columns: usize,
-    /// Whether a column follows the other, rather than a row.
-    pub by_columns: bool,
-    pub is_vector: bool,
 }
 
 impl Table for Arrays {
@@ -70,5 +77,9 @@ impl Table for Arrays {
 
     fn place(&self, row: usize) -> Place {
         Place::Row(row + 1)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
     }
 }

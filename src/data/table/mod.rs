@@ -4,15 +4,17 @@ mod arrays;
 mod csv;
 mod npy;
 mod npz;
+mod recording;
 
-use std::fs;
-use std::io::Read;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
 pub(super) use self::arrays::Arrays;
 pub(super) use self::csv::Csv;
+use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
 
 /// Named columns of numbers.
@@ -34,6 +36,11 @@ pub(super) trait Table {
 
     /// Where a row is.
     fn place(&self, row: usize) -> Place;
+
+    /// What a reader of the log should know about how the file was read.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
 }
 
 /// How files of each format but text begin.
@@ -41,11 +48,19 @@ const GZIP: &[u8] = b"\x1f\x8b";
 const ZIP: &[u8] = b"PK\x03\x04";
 
 /// Files that are known and not read: how they begin, and the line that converts them.
-const FOREIGN: [(&[u8], &str); 4] = [
+const FOREIGN: [(&[u8], &str); 6] = [
     (
         b"#ROSBAG",
-        "a ROS 1 bag is not read; convert it: `pip install rosbags && rosbags-convert --src run.bag --dst run`, then export its \
-         joint states as CSV",
+        "a ROS 1 bag is not read; convert it: `pip install rosbags && rosbags-convert --src run.bag --dst run`, and read the \
+         folder `run`",
+    ),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "is packed with zstd; unpack it: `zstd -d run.db3.zstd`",
+    ),
+    (
+        recording::SQLITE,
+        "a packed recording is not read; unpack it: `gunzip run.db3.gz`",
     ),
     (
         b"\x89HDF",
@@ -61,23 +76,28 @@ const FOREIGN: [(&[u8], &str); 4] = [
     ),
 ];
 
-/// The table that a file holds, whatever its format: by how it begins, not by its name.
+/// The table that a file or a folder holds, whatever its format: by how it begins, not by its name. Of files that hold
+/// several tables, the one that has the columns.
 ///
 /// # Errors
 /// A file that cannot be read, or that is of none of the formats.
-pub(super) fn open(path: &Path) -> Result<Box<dyn Table>, LogError> {
+pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+    if path.is_dir() {
+        return Ok(Box::new(recording::of_folder(path, columns)?));
+    }
     let unreadable = |why| LogError::Open {
         path: path.to_owned(),
         why,
     };
-    let mut bytes = fs::read(path).map_err(unreadable)?;
-    if bytes.starts_with(GZIP) {
-        let mut unpacked = Vec::new();
-        MultiGzDecoder::new(bytes.as_slice())
-            .read_to_end(&mut unpacked)
-            .map_err(unreadable)?;
-        bytes = unpacked;
+    let begin = begin(path).map_err(unreadable)?;
+    // Recordings may be larger than the memory: they are not read at once.
+    if begin.starts_with(recording::SQLITE) {
+        return Ok(Box::new(recording::of_bag(path, columns)?));
     }
+    if begin.starts_with(recording::MCAP) {
+        return Ok(Box::new(recording::of_mcap(path, columns)?));
+    }
+    let bytes = unpacked(path).map_err(unreadable)?;
     if let Some((_, remedy)) = FOREIGN.iter().find(|(begin, _)| bytes.starts_with(begin)) {
         return Err(LogError::Form {
             path: path.to_owned(),
@@ -88,4 +108,22 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn Table>, LogError> {
         return Ok(Box::new(npz::read(path, bytes)?));
     }
     Ok(Box::new(Csv::of_bytes(path, &bytes)?))
+}
+
+/// The first bytes of a file.
+fn begin(path: &Path) -> io::Result<Vec<u8>> {
+    let mut begin = Vec::new();
+    File::open(path)?.take(16).read_to_end(&mut begin)?;
+    Ok(begin)
+}
+
+/// The bytes of a file, unpacked where it is packed with gzip.
+fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
+    let bytes = std::fs::read(path)?;
+    if !bytes.starts_with(GZIP) {
+        return Ok(bytes);
+    }
+    let mut unpacked = Vec::new();
+    MultiGzDecoder::new(bytes.as_slice()).read_to_end(&mut unpacked)?;
+    Ok(unpacked)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use zip::ZipArchive;
 
-use super::arrays::{Arrays, Matrix};
+use super::arrays::Arrays;
 use super::npy::Array;
 use crate::data::error::LogError;
 
@@ -27,33 +27,13 @@ fn table(bytes: Vec<u8>) -> Result<Arrays, String> {
         if let Some(name) = name.strip_suffix(".npy") {
             let mut array = Vec::new();
             file.read_to_end(&mut array).map_err(|why| broken(&why))?;
-            add(&mut table, name, &array)?;
+            let array = Array::of(&array).ok_or_else(|| {
+                format!("array {name:?} is no NumPy array; write it again with numpy.savez")
+            })?;
+            table.add_array(name, &array)?;
         }
     }
     Ok(table)
-}
-
-/// The columns of an array; one that is no table is left out, as columns are that nothing asks for.
-fn add(table: &mut Arrays, name: &str, bytes: &[u8]) -> Result<(), String> {
-    let array = Array::of(bytes).ok_or_else(|| {
-        format!("array {name:?} is no NumPy array; write it again with numpy.savez")
-    })?;
-    let (rows, columns) = match *array.shape.as_slice() {
-        [rows] => (rows, 1),
-        [rows, columns] => (rows, columns),
-        _ => return Ok(()),
-    };
-    if array.is_text() {
-        return Ok(());
-    }
-    let matrix = Matrix {
-        rows,
-        columns,
-        by_columns: array.by_columns,
-        is_vector: array.shape.len() == 1,
-    };
-    table.add_matrix(name, &matrix, &array.numbers(name)?);
-    Ok(())
 }
 
 fn broken(why: &dyn std::fmt::Display) -> String {

@@ -1,0 +1,90 @@
+//! MCAP, read from its beginning to the end of its data: with or without an index, in chunks or not.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use ::mcap::read::{ChannelAccumulator, parse_record};
+use ::mcap::records::{Record, op};
+use ::mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use ::mcap::{McapError, McapResult};
+
+use super::Recording;
+use crate::data::error::LogError;
+
+/// Larger than any message \[bytes\]: a damaged length must not take all memory.
+const LARGEST_RECORD: usize = 1 << 28;
+
+pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogError> {
+    match add(path, recording) {
+        Ok(()) => Ok(()),
+        Err(McapError::UnexpectedEof) => {
+            recording.notes.push(format!(
+                "{} is cut off: what came before the cut is read",
+                path.display()
+            ));
+            Ok(())
+        }
+        Err(McapError::Io(why)) => Err(LogError::Open {
+            path: path.to_owned(),
+            why,
+        }),
+        Err(why) => Err(LogError::Form {
+            path: path.to_owned(),
+            fault: format!(
+                "is damaged: {why}; save what is left: `mcap recover run.mcap --output mended.mcap`"
+            ),
+        }),
+    }
+}
+
+fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
+    let mut file = File::open(path)?;
+    let mut reader = LinearReader::new_with_options(
+        LinearReaderOptions::default()
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LARGEST_RECORD),
+    );
+    let mut channels = ChannelAccumulator::default();
+    while let Some(event) = reader.next_event() {
+        match event? {
+            LinearReadEvent::ReadRequest(size) => {
+                let read = file.read(reader.insert(size))?;
+                reader.notify_read(read);
+            }
+            // What follows is an index.
+            LinearReadEvent::Record { opcode, .. } if opcode == op::DATA_END => break,
+            LinearReadEvent::Record { opcode, data } => {
+                if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
+                    add_record(parse_record(opcode, data)?, &mut channels, recording)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn add_record(
+    record: Record<'_>,
+    channels: &mut ChannelAccumulator<'static>,
+    recording: &mut Recording,
+) -> McapResult<()> {
+    match record {
+        Record::Schema { header, data } => {
+            channels.add_schema(header, Cow::Owned(data.into_owned()))?;
+        }
+        Record::Channel(channel) => channels.add_channel(channel)?,
+        Record::Message { header, data } => {
+            let (message, id) = (header.sequence, header.channel_id);
+            let channel = channels
+                .get(id)
+                .ok_or(McapError::UnknownChannel(message, id))?;
+            let kind = channel.schema.as_ref().map_or("", |schema| &schema.name);
+            let topic = recording.topic(&channel.topic, kind, &channel.message_encoding);
+            recording.add(topic, header.log_time.cast_signed(), &data);
+        }
+        _ => {}
+    }
+    Ok(())
+}

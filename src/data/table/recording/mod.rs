@@ -1,0 +1,168 @@
+//! Recordings of a robot's messages, rosbag2 and MCAP: the topics that hold numbers of joints, as a table.
+
+mod bag;
+mod choose;
+mod folder;
+mod mcap;
+mod message;
+mod rows;
+
+use std::path::{Path, PathBuf};
+
+use self::message::{CHANNELS, Decoder, Message};
+use super::arrays::Arrays;
+use crate::data::columns::Columns;
+use crate::data::error::LogError;
+
+/// How files of each kind begin.
+pub(super) const SQLITE: &[u8] = b"SQLite format 3\0";
+pub(super) const MCAP: &[u8] = ::mcap::MAGIC;
+
+/// The table of a rosbag2 in SQLite.
+///
+/// # Errors
+/// A file that is none, and as [`Recording::table`].
+pub(super) fn of_bag(path: &Path, columns: &Columns) -> Result<Arrays, LogError> {
+    let mut recording = Recording::of(path);
+    bag::read(path, &mut recording)?;
+    recording.table(columns)
+}
+
+/// The table of an MCAP file.
+///
+/// # Errors
+/// A file that is damaged, and as [`Recording::table`].
+pub(super) fn of_mcap(path: &Path, columns: &Columns) -> Result<Arrays, LogError> {
+    let mut recording = Recording::of(path);
+    mcap::read(path, &mut recording)?;
+    recording.table(columns)
+}
+
+/// The table of a folder of rosbag2, whose files follow each other.
+///
+/// # Errors
+/// A folder without such files, and as those of the files.
+pub(super) fn of_folder(path: &Path, columns: &Columns) -> Result<Arrays, LogError> {
+    let mut recording = Recording::of(path);
+    folder::read(path, &mut recording)?;
+    recording.table(columns)
+}
+
+/// The messages of a recording that hold numbers.
+struct Recording {
+    path: PathBuf,
+    topics: Vec<Topic>,
+    series: Vec<Series>,
+    notes: Vec<String>,
+}
+
+struct Topic {
+    name: String,
+    /// Type of the messages, and how they are encoded.
+    kind: String,
+    decoder: Option<Decoder>,
+    messages: usize,
+    /// The first message that could not be read, and why.
+    fault: Option<String>,
+}
+
+/// Messages of one topic with the same numbers: publishers of different joints may share a topic.
+struct Series {
+    topic: usize,
+    names: Vec<String>,
+    samples: Vec<Sample>,
+}
+
+struct Sample {
+    logged_ns: i64,
+    /// 0 where the message has none.
+    stamp_ns: i64,
+    values: Vec<f64>,
+}
+
+impl Series {
+    /// The names that the columns of a rig have, as far as these are of joints: `q_elbow` for `elbow/position`.
+    fn short_names(&self) -> Vec<String> {
+        let short = |name: &String| {
+            let of_joint = CHANNELS
+                .into_iter()
+                .find_map(|(suffix, stem)| Some(format!("{stem}_{}", name.strip_suffix(suffix)?)));
+            of_joint.unwrap_or_else(|| name.clone())
+        };
+        self.names.iter().map(short).collect()
+    }
+
+    /// The joints whose angles it has.
+    fn joints(&self) -> impl Iterator<Item = &str> {
+        let [(angle, _), ..] = CHANNELS;
+        self.names
+            .iter()
+            .filter_map(move |name| name.strip_suffix(angle))
+    }
+}
+
+impl Recording {
+    fn of(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            topics: Vec::new(),
+            series: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// The index of a topic, which begins here or in an earlier file.
+    fn topic(&mut self, name: &str, kind: &str, encoding: &str) -> usize {
+        let known = self.topics.iter().position(|topic| topic.name == name);
+        known.unwrap_or_else(|| {
+            self.topics.push(Topic {
+                name: name.to_owned(),
+                kind: format!("{kind} in {encoding}"),
+                decoder: message::decoder(kind, encoding),
+                messages: 0,
+                fault: None,
+            });
+            self.topics.len() - 1
+        })
+    }
+
+    fn add(&mut self, topic: usize, logged_ns: i64, data: &[u8]) {
+        let entry = &mut self.topics[topic];
+        entry.messages += 1;
+        let Some(decoder) = entry.decoder else {
+            return;
+        };
+        match decoder(data) {
+            Ok(message) => self.sort_in(topic, logged_ns, message),
+            Err(why) => {
+                let told = || format!("message {} of {} {why}", entry.messages, entry.name);
+                entry.fault.get_or_insert_with(told);
+            }
+        }
+    }
+
+    fn sort_in(&mut self, topic: usize, logged_ns: i64, message: Message) {
+        let is_its = |series: &Series| series.topic == topic && series.names == message.names;
+        let known = self.series.iter().position(is_its);
+        let series = known.unwrap_or_else(|| {
+            self.series.push(Series {
+                topic,
+                names: message.names,
+                samples: Vec::new(),
+            });
+            self.series.len() - 1
+        });
+        self.series[series].samples.push(Sample {
+            logged_ns,
+            stamp_ns: message.stamp_ns,
+            values: message.values,
+        });
+    }
+
+    fn fault(&self, fault: String) -> LogError {
+        LogError::Form {
+            path: self.path.clone(),
+            fault,
+        }
+    }
+}

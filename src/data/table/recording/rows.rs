@@ -1,0 +1,159 @@
+//! The table of the rig's topic, and of what other topics held at the times of its messages.
+
+use super::{Recording, Sample, Series, Topic};
+use crate::data::columns::Columns;
+use crate::data::error::LogError;
+use crate::data::table::arrays::Arrays;
+
+impl Recording {
+    /// The columns `time`, `q_JOINT`, `qd_JOINT` and `tau_JOINT` of the rig's topic, and `/TOPIC/JOINT/position`,
+    /// `/TOPIC/1` and the like of others, whose numbers are held from one message to the next. Of topics that no column is
+    /// asked of, only the names are there.
+    ///
+    /// # Errors
+    /// As [`Recording::choose`], and messages of the topics asked for that cannot be decoded.
+    pub(super) fn table(&self, columns: &Columns) -> Result<Arrays, LogError> {
+        let chosen = self.choose(columns)?;
+        let others = self
+            .series
+            .iter()
+            .filter(|other| !std::ptr::eq(*other, chosen));
+        let is_asked = |other: &&Series| {
+            self.full_names(other)
+                .iter()
+                .any(|name| columns.names(name))
+        };
+        let (asked, unasked): (Vec<&Series>, Vec<&Series>) = others.partition(is_asked);
+        let used: Vec<&Series> = [&[chosen], asked.as_slice()].concat();
+        self.check(&used)?;
+        let clock = Clock::of(&used);
+        let mut table = Arrays::default();
+        table.notes.extend(self.notes.iter().cloned());
+        table.notes.extend(self.told_of_rows(chosen, clock));
+
+        let rows = clock.rows(chosen);
+        let begins = |series: &&Series| clock.rows(series).first().map(|row| row.ns);
+        // Before its first message, nothing is known of a topic.
+        let known = used.iter().filter_map(begins).max();
+        let unknown = rows.partition_point(|row| Some(row.ns) < known);
+        let (before, rows) = rows.split_at(unknown);
+        let begin = before.first().or(rows.first()).map_or(0, |row| row.ns);
+        table.add(
+            "time",
+            rows.iter().map(|row| seconds(row.ns, begin)).collect(),
+        );
+        for (index, name) in chosen.short_names().into_iter().enumerate() {
+            table.add(name, rows.iter().map(|row| row.values[index]).collect());
+        }
+        if !before.is_empty() {
+            let left_out = before.len();
+            table.notes.push(format!(
+                "{left_out} rows before the first command are left out"
+            ));
+        }
+        for other in asked {
+            let held = held(&clock.rows(other), rows);
+            for (index, name) in self.full_names(other).into_iter().enumerate() {
+                table.add(name, held.iter().map(|row| row.values[index]).collect());
+            }
+            let longest = rows
+                .iter()
+                .zip(&held)
+                .map(|(row, held)| seconds(row.ns, held.ns));
+            let longest = longest.fold(0.0, f64::max);
+            table.notes.push(format!(
+                "{} is held from one message to the next, for {longest} s at most",
+                self.topics[other.topic].name
+            ));
+        }
+        for name in unasked.into_iter().flat_map(|other| self.full_names(other)) {
+            table.add(name, Vec::new());
+        }
+        Ok(table)
+    }
+
+    /// Every message of these topics can be decoded.
+    fn check(&self, used: &[&Series]) -> Result<(), LogError> {
+        let mut faults = used
+            .iter()
+            .filter_map(|series| self.topics[series.topic].fault.as_ref());
+        faults.next().map_or(Ok(()), |fault| {
+            Err(self.fault(format!(
+                "{fault}; record it again, or cut the recording there"
+            )))
+        })
+    }
+
+    fn full_names(&self, series: &Series) -> Vec<String> {
+        let topic = &self.topics[series.topic].name;
+        let names = series.names.iter();
+        names.map(|name| format!("{topic}/{name}")).collect()
+    }
+
+    /// From which messages the rows are.
+    fn told_of_rows(&self, chosen: &Series, clock: Clock) -> Vec<String> {
+        let Topic { name, messages, .. } = &self.topics[chosen.topic];
+        let times = match clock {
+            Clock::Stamps => "by the stamps in their headers",
+            Clock::Logged => "by when they were recorded, since not all messages have a stamp",
+        };
+        let others = messages - chosen.samples.len();
+        let left_out =
+            format!("{others} of {messages} messages of {name} hold other joints and are left out");
+        let read = format!("read from {name}, {times}");
+        std::iter::once(read)
+            .chain((others > 0).then_some(left_out))
+            .collect()
+    }
+}
+
+/// Where the times of messages come from: one clock for all topics that are used.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Clock {
+    Stamps,
+    Logged,
+}
+
+/// A message at its time.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    ns: i64,
+    values: &'a [f64],
+}
+
+impl Clock {
+    fn of(used: &[&Series]) -> Self {
+        let mut samples = used.iter().flat_map(|series| &series.samples);
+        match samples.all(|sample| sample.stamp_ns != 0) {
+            true => Self::Stamps,
+            false => Self::Logged,
+        }
+    }
+
+    /// The messages in order.
+    fn rows(self, series: &Series) -> Vec<Row<'_>> {
+        let ns = |sample: &Sample| match self {
+            Self::Stamps => sample.stamp_ns,
+            Self::Logged => sample.logged_ns,
+        };
+        let samples = series.samples.iter();
+        let rows = samples.map(|sample| Row {
+            ns: ns(sample),
+            values: &sample.values,
+        });
+        let mut rows: Vec<Row<'_>> = rows.collect();
+        rows.sort_by_key(|row| row.ns);
+        rows
+    }
+}
+
+/// The last messages of a topic at these times, none of which is before its first.
+fn held<'a>(messages: &[Row<'a>], rows: &[Row<'_>]) -> Vec<Row<'a>> {
+    let last = |row: &Row<'_>| messages.partition_point(|message| message.ns <= row.ns);
+    rows.iter().map(|row| messages[last(row) - 1]).collect()
+}
+
+#[allow(clippy::cast_precision_loss)] // a recording is far shorter than 2^53 ns, 104 days
+fn seconds(ns: i64, since: i64) -> f64 {
+    ns.saturating_sub(since) as f64 / 1e9
+}
