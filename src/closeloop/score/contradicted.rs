@@ -39,7 +39,10 @@ impl Contradicted {
             let direction = if ratio > 1.0 { "larger" } else { "smaller" };
             format!("{:.1} % {direction}", 100.0 * (ratio - 1.0).abs())
         } else {
-            format!("{ratio:.2} times as large")
+            // Two digits, however small it is.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 2 and 20
+            let digits = (1.0 - ratio.log10().floor()).clamp(2.0, 20.0) as usize;
+            format!("{ratio:.digits$} times as large")
         }
     }
 }
@@ -83,6 +86,7 @@ mod tests {
         assert_eq!(says(1.0, 1.1), "10.0 % larger");
         assert_eq!(says(1.0, 0.9), "10.0 % smaller");
         assert_eq!(says(2.0, 0.5), "0.25 times as large");
+        assert_eq!(says(42.0, 0.056), "0.0013 times as large");
         assert_eq!(says(0.0, 0.5), "not zero");
         assert_eq!(says(-1.0, 0.5), "not of that sign");
     }

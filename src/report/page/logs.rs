@@ -12,7 +12,7 @@ pub(super) fn by_log(report: &Report) -> Markup {
         @if !report.by_log.is_empty() {
             h3 { "Do the logs agree?" }
             p { "The model with effects, fitted to each training log alone. A value is marked where its distance from that of all logs "
-                "together is more than its own 95 % interval explains." }
+                "together is more than its own 95 % interval explains, and not told where that is far wider than the value." }
             (values(report))
             (crossed(report))
             (ranges(report))
@@ -60,10 +60,19 @@ fn value(log: &OfLogEntry, name: &str, of_all: f64) -> Markup {
         .find(|parameter| parameter.name == name);
     html! {
         @match own {
-            Some(own) => td class=(mark(own, of_all)) title=(amount(own)) { (digits_of(own.value, own.ci95).0) },
+            Some(own) if is_told(own) => td class=(mark(own, of_all)) title=(amount(own)) { (digits_of(own.value, own.ci95).0) },
+            Some(own) => td title=(amount(own)) { "not told" },
             None => td { "-" },
         }
     }
+}
+
+/// Whether the digits that the interval leaves of a value say anything.
+fn is_told(own: &ParameterEntry) -> bool {
+    digits_of(own.value, own.ci95)
+        .0
+        .parse()
+        .is_ok_and(|shown: f64| shown != 0.0 || own.value == 0.0)
 }
 
 /// What is fitted to the log of a row, on the log of a column.
