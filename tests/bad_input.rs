@@ -126,6 +126,19 @@ fn errors_in_model_files_name_line_column_and_a_similar_name() {
         ),
         ("sin(q1) +", "sin(q1 +", &["line 11", "never closed"]),
         (
+            "sin(q1) +",
+            "(2 sin(q1)) +",
+            &["line 11", "expected an operator, or `)`, found `s`"],
+        ),
+        (
+            "[dynamics]",
+            "[dynamics.let]\na = \"2 * b\"\nb = \"q1\"\n\n[dynamics]",
+            &[
+                "line 11",
+                "`a` uses `b`, which is defined after it; move it up",
+            ],
+        ),
+        (
             "value = 15.0",
             "vlaue = 15.0",
             &["line 7", "unknown key `vlaue`", "`value`"],

@@ -171,7 +171,7 @@ impl<'a> Parser<'a> {
         let inner = self.infix(0)?;
         self.skip_space();
         if !self.eat(')') {
-            return Err(self.error_at(open..open + 1, "this `(` is never closed".into()));
+            return Err(self.unclosed(open, "an operator"));
         }
         Ok(Term {
             span: open..self.at,
@@ -256,7 +256,7 @@ impl<'a> Parser<'a> {
                 return Ok(arguments);
             }
             if !self.eat(',') {
-                return Err(self.error_at(open..open + 1, "this `(` is never closed".into()));
+                return Err(self.unclosed(open, "an operator or `,`"));
             }
             arguments.push(self.infix(0)?);
         }
@@ -299,6 +299,14 @@ impl<'a> Parser<'a> {
         self.error_at(self.at..self.at + width, message)
     }
 
+    /// What follows a whole term within a parenthesis that opens at `open`, where it is none of `wanted` and no `)`.
+    fn unclosed(&self, open: usize, wanted: &str) -> FormulaError {
+        match self.rest().chars().next() {
+            Some(found) => self.error_here(format!("expected {wanted}, or `)`, found `{found}`")),
+            None => self.error_at(open..open + 1, "this `(` is never closed".into()),
+        }
+    }
+
     fn error_at(&self, span: Range<usize>, message: String) -> FormulaError {
         FormulaError::new(self.text, span, message)
     }
@@ -321,6 +329,10 @@ mod tests {
         assert_eq!(
             message("2 * (a + b"),
             "this `(` is never closed\n    2 * (a + b\n        ^"
+        );
+        assert_eq!(
+            message("a * (2 b)"),
+            "expected an operator, or `)`, found `b`\n    a * (2 b)\n           ^"
         );
         assert_eq!(
             message("clamp(x, 1)"),

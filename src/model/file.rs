@@ -121,7 +121,14 @@ impl Model {
                 .lower(&mut graph, &formula.value)
                 .map_err(|error| document.formula_error(formula.at, &error))
         };
-        for (name, formula) in &self.equations.lets {
+        let lets = &self.equations.lets;
+        for (k, (name, formula)) in lets.iter().enumerate() {
+            let mut later = lets[k..].iter().map(|(later, _)| later.as_str());
+            if let Some(later) = later.find(|later| formula.value.names().contains(later)) {
+                let told =
+                    format!("`{name}` uses `{later}`, which is defined after it; move it up");
+                return Err(document.error(formula.at, told));
+            }
             let node = lower(&scope, formula)?;
             scope.bind(name, node);
         }
