@@ -1,5 +1,6 @@
 """Closing the loop: from logs and a declared model to the effects that the model lacks."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
@@ -12,8 +13,8 @@ Progress = Callable[[str, str, int | None, int | None], object]
 
 def close_loop(
     model: Model,
-    train: Sequence[Log],
-    test: Sequence[Log] = (),
+    train: Sequence[Log | str | os.PathLike[str]],
+    test: Sequence[Log | str | os.PathLike[str]] = (),
     *,
     against: Mapping[str, Model] | None = None,
     seed: int = 0,
@@ -28,7 +29,7 @@ def close_loop(
 
     Args:
         model: the declared model.
-        train: logs to learn from.
+        train: logs to learn from, or their files.
         test: logs to judge by, never fitted; without them, the last logs or the end of each are set apart.
         against: other models of the same rig, by name, to score as they are.
         seed: of everything random; the same seed gives the same result on the same machine.
@@ -42,5 +43,10 @@ def close_loop(
     Raises:
         ResidynError: logs without a usable stretch, or of another rig; a model that diverges from its starting values.
     """
+    learnt, judged = ([_log(model, log) for log in logs] for logs in (train, test))
     others = list((against or {}).items())
-    return Report(_close_loop(model, list(train), list(test), others, seed, budget_s, errors, network, progress))
+    return Report(_close_loop(model, learnt, judged, others, seed, budget_s, errors, network, progress))
+
+
+def _log(model: Model, log: Log | str | os.PathLike[str]) -> Log:
+    return log if isinstance(log, Log) else model.read_log(log)

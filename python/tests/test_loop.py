@@ -93,6 +93,14 @@ def test_other_threads_go_on(pendulum: residyn.Model, logs: list[residyn.Log]) -
     assert counted > 20
 
 
+def test_files_are_logs_as_well(tmp_path: Path, pendulum: residyn.Model, logs: list[residyn.Log]) -> None:
+    for number, log in enumerate(logs):
+        log.write(tmp_path / f"run{number}.csv")
+    files = [str(tmp_path / "run0.csv"), tmp_path / "run1.csv"]
+    report = residyn.close_loop(pendulum, files, [tmp_path / "run3.csv"], network=False)
+    assert [effect.name for effect in report.effects] == ["coulomb_friction"]
+
+
 def test_what_is_wrong_is_said(pendulum: residyn.Model, logs: list[residyn.Log]) -> None:
     short = residyn.simulate("pendulum", duration_s=0.1)
     with pytest.raises(residyn.ResidynError, match="too short"):
