@@ -51,6 +51,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     for what in &not_carried {
         voice::say(format!("not carried: {what}"));
     }
+    if let Some(told) = told_of_steps(&model, arguments)? {
+        voice::say(told);
+    }
     let folder = folder_of(&arguments.out);
     std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?;
     let files = voice::stage("writing", || format.write(&model, &arguments.out))?;
@@ -68,6 +71,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         true => Answer::No,
         false => Answer::Yes,
     })
+}
+
+/// Finer steps than these cost less than a model with friction that jumps is worth.
+const MOST_SUBSTEPS: usize = 1000;
+
+/// What to do where the steps are too long for the friction of a model at rest.
+fn told_of_steps(model: &ExportModel, arguments: &Arguments) -> Result<Option<String>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
+    let needed = model.substeps_around_rest(&mut rng)?;
+    if needed <= model.integrator.substeps() {
+        return Ok(None);
+    }
+    let remedy = match needed <= MOST_SUBSTEPS {
+        true => format!(
+            "give --integrator fine:{needed}, or a --step of {:.1e} s",
+            model.step_s / needed as f64
+        ),
+        false => "give `sign_width` in the model file, over which friction reverses".to_owned(),
+    };
+    Ok(Some(format!(
+        "note: friction at rest is too steep for steps of {} s, in which the model creeps or chatters; {remedy}",
+        model.step_s
+    )))
 }
 
 fn measure(

@@ -13,6 +13,7 @@ mod latex;
 mod mjcf;
 mod onnx;
 mod python;
+mod rest;
 mod robot;
 mod template;
 mod urdf;
