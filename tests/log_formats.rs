@@ -2,8 +2,10 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::OnceLock;
 
-use residyn::data::{Columns, Log};
+use residyn::data::{Columns, Log, Quantity};
+use tempfile::TempDir;
 
 use crate::clients::client;
 
@@ -33,16 +35,24 @@ fn read(path: &Path) -> Result<Log, String> {
     Log::read(path, 2, &Columns::default()).map_err(|error| error.to_string())
 }
 
+/// A folder with `run.csv` and the same in every format, made once; `None` without the clients that write them.
+fn formats() -> Option<&'static Path> {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let run = folder.path().join("run.csv");
+        fs::write(&run, trajectory()).unwrap();
+        client("logs.py", &[&run, folder.path()]);
+        folder
+    });
+    let is_written = folder.path().join("pickled.npz").exists();
+    is_written.then(|| folder.path())
+}
+
 #[test]
 fn every_format_holds_the_same_trajectory() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    fs::write(at("run.csv"), trajectory()).unwrap();
-    client("logs.py", &[&at("run.csv"), folder.path()]);
-    if !at("pickled.npz").exists() {
-        return;
-    }
-    let wanted = read(&at("run.csv")).unwrap();
+    let Some(folder) = formats() else { return };
+    let wanted = read(&folder.join("run.csv")).unwrap();
     for name in [
         "packed.csv.gz",
         "german.csv",
@@ -50,8 +60,17 @@ fn every_format_holds_the_same_trajectory() {
         "matrices.npz",
         "columns.npz",
         "fortran.npz",
+        "plain.mat",
+        "packed.mat",
+        "columns.mat",
+        "snappy.parquet",
+        "gzip.parquet",
+        "zstd.parquet",
+        "lz4.parquet",
+        "none.parquet",
+        "lists.parquet",
     ] {
-        let found = read(&at(name)).unwrap();
+        let found = read(&folder.join(name)).unwrap();
         let channels = |log: &Log| {
             (
                 log.time.clone(),
@@ -62,29 +81,107 @@ fn every_format_holds_the_same_trajectory() {
         };
         assert!(channels(&found) == channels(&wanted), "{name}");
     }
-    let counts = read(&at("integers.npz")).unwrap();
-    assert_eq!((counts.time[7], counts.q[0][1]), (7.0, 4.0));
+    for name in ["integers.npz", "integers.mat"] {
+        let counts = read(&folder.join(name)).unwrap();
+        assert_eq!((counts.time[7], counts.q[0][1]), (7.0, 4.0), "{name}");
+    }
     for (name, wanted) in [
         ("short.npz", "short.npz, row 48, column \"tau1\": is empty"),
         ("gap.npz", "row 5, column \"q2\": \"NaN\" is not a finite"),
+        ("gap.mat", "row 5, column \"q2\": \"NaN\" is not a finite"),
+        (
+            "gap.parquet",
+            "row 5, column \"q2\": \"NaN\" is not a finite",
+        ),
+        (
+            "ragged.parquet",
+            "row 50 of \"q\" has 1 number(s) where the first has 2",
+        ),
         (
             "pickled.npz",
             "array \"q\" holds pickled objects, which are never read",
         ),
     ] {
-        let said = read(&at(name)).unwrap_err();
+        let said = read(&folder.join(name)).unwrap_err();
         assert!(said.contains(wanted), "{said}");
+    }
+}
+
+/// Positions and commands of an episode, by the names of the joints.
+#[test]
+fn an_episode_of_a_data_set_of_lerobot_is_a_log() {
+    let Some(folder) = formats() else { return };
+    let rig = Columns {
+        joint_names: vec!["wrist".into(), "elbow".into()],
+        driven_by: Quantity::Command,
+        ..Columns::default()
+    };
+    let read = |name: &str| {
+        let log = Log::read(folder.join(name), 2, &rig);
+        log.map_err(|error| error.to_string())
+    };
+    let wanted = self::read(&folder.join("run.csv")).unwrap();
+    for (name, rows) in [
+        ("set_v2#0", 50),
+        ("set_v2#1", 30),
+        ("set_v2/data/chunk-000/episode_000001.parquet", 30),
+        ("set_v3#0", 50),
+        ("set_v3#1", 30),
+        ("single", 50),
+    ] {
+        let log = read(name).unwrap();
+        assert_eq!(log.rows(), rows, "{name}");
+        // Data sets are in single precision.
+        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-7);
+        assert!(near(&log.time, &wanted.time) && near(&log.q[0], &wanted.q[1]));
+        assert!(near(&log.q[1], &wanted.q[0]) && near(&log.tau[0], &wanted.tau[1]));
+    }
+    for (name, wanted) in [
+        ("set_v3", "holds several episodes, up to 1"),
+        ("set_v3", "set_v3#1 for instance"),
+        ("set_v2#7", "there is no episode 7"),
+    ] {
+        let said = read(name).unwrap_err();
+        assert!(said.contains(wanted), "{said}");
+    }
+}
+
+/// Cut anywhere, and each with a bit flipped: read, or refused.
+#[test]
+fn damaged_files_are_no_panic() {
+    let Some(folder) = formats() else { return };
+    let scratch = tempfile::tempdir().unwrap();
+    for name in [
+        "plain.mat",
+        "packed.mat",
+        "matrices.npz",
+        "snappy.parquet",
+        "none.parquet",
+        "lists.parquet",
+    ] {
+        let whole = fs::read(folder.join(name)).unwrap();
+        let damaged = scratch.path().join(name);
+        for k in 0..150 {
+            fs::write(&damaged, &whole[..whole.len() * k / 150]).unwrap();
+            let _ = read(&damaged);
+            let mut flipped = whole.clone();
+            flipped[k * 7919 % whole.len()] ^= 1 << (k % 8);
+            fs::write(&damaged, &flipped).unwrap();
+            let _ = read(&damaged);
+        }
     }
 }
 
 #[test]
 fn files_that_are_not_read_get_the_line_that_converts_them() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [(&[u8], &str); 5] = [
+    let cases: [(&[u8], &str); 7] = [
         (b"#ROSBAG V2.0\n", "rosbags-convert"),
         (b"\x89HDF\r\n\x1a\n", "h5py"),
-        (b"MATLAB 5.0 MAT-file", "scipy.io"),
-        (b"PAR1\x15\x04", "read_parquet"),
+        (b"MATLAB 7.3 MAT-file", "h5py"),
+        (b"MATLAB 5.0 MAT-file", "save('run.mat'"),
+        (b"\x28\xb5\x2f\xfd", "zstd -d"),
+        (b"PAR1\x15\x04", "is no whole Parquet file"),
         (b"PK\x03\x04 and no more", "numpy.savez"),
     ];
     for (begin, remedy) in cases {

@@ -161,7 +161,7 @@ fn torques_of_another_topic_are_held_at_the_times_of_the_joints() {
     for said in [
         "by when they were recorded, since not all messages have a stamp",
         "/effort_controller/commands is held from one message to the next, for 0.008 s at most",
-        "2 rows before the first command are left out",
+        "2 of 50 messages of /joint_states are earlier than the first of the other topics and are left out",
     ] {
         assert!(
             log.notes.iter().any(|note| note.contains(said)),

@@ -39,11 +39,13 @@ const OTHERS: &[(&str, &str)] = &[
         "logs, out; in with any separator, decimal commas, and packed with gzip",
     ),
     ("npz", "logs of NumPy, in"),
+    ("mat", "logs of MATLAB, versions 5 to 7, in"),
     (
         "mcap",
         "recordings of robots, joint states in CDR or JSON, in",
     ),
     ("rosbag2", "the same as .db3 files and folders of ROS 2, in"),
+    ("parquet", "logs, and data sets of LeRobot, in"),
     (
         "toml",
         "models, effects, plants, tasks and recipes, in; fitted models, out",

@@ -117,9 +117,10 @@ impl Columns {
     }
 
     /// These columns, each that has its standard name and is not in the header by the name of its joint if that is there. A
-    /// single joint without a name is the only one of the header.
+    /// single joint may be the only one of the header, or have none: `q` for `q1`.
     fn renamed_for(mut self, header: &[String]) -> Columns {
-        if let ([_], [], [joint]) = (&*self.q, &*self.joint_names, &*joints(header)) {
+        let single = self.q.len() == 1;
+        if let (true, [], [joint]) = (single, &*self.joint_names, &*joints(header)) {
             self.joint_names = vec![(*joint).to_owned()];
         }
         let has = |name: &String| header.contains(name);
@@ -129,12 +130,15 @@ impl Columns {
             (self.driven_by.key(), Some(&mut self.tau)),
         ];
         for (stem, list) in lists {
-            let named = list.into_iter().flatten().zip(&self.joint_names);
-            for ((column, joint), number) in named.zip(1..) {
-                let by_joint = format!("{stem}_{joint}");
-                if column.name == format!("{stem}{number}") && !has(&column.name) && has(&by_joint)
-                {
-                    column.name = by_joint;
+            for (joint, column) in list.into_iter().flatten().enumerate() {
+                if column.name != format!("{stem}{}", joint + 1) || has(&column.name) {
+                    continue;
+                }
+                let by_joint = self.joint_names.get(joint);
+                let by_joint = by_joint.map(|name| format!("{stem}_{name}"));
+                let alone = single.then(|| stem.to_owned());
+                if let Some(name) = by_joint.into_iter().chain(alone).find(has) {
+                    column.name = name;
                 }
             }
         }
@@ -313,7 +317,12 @@ impl Header<'_> {
             Quantity::Velocity => {
                 format!("qd = [{example:?}], or qd = [] to take velocities from the angles")
             }
-            Quantity::Torque if self.names.iter().any(|name| name == "cmd1") => {
+            Quantity::Torque
+                if self
+                    .names
+                    .iter()
+                    .any(|name| name == "cmd1" || name.starts_with("cmd_")) =>
+            {
                 return "the log has commands, cmd1: say in [drive] of the model file what torque they make, \
                         tau1 = \"kp*(cmd1 - q1) - kd*qd1\" for instance; `residyn list drives` shows ready ones"
                     .to_owned();
@@ -438,6 +447,17 @@ mod tests {
         assert_eq!(found.q, [cell(2), cell(1)]);
         assert_eq!(found.qd, Some(vec![cell(3), cell(4)]));
         assert_eq!(found.tau, Some(vec![cell(5), cell(6)]));
+    }
+
+    #[test]
+    fn a_single_joint_needs_no_number() {
+        for header in ["time,q,qd,tau", "time,q_hip,qd_hip,tau_hip"] {
+            let found = layout(header, 1, &Columns::default()).unwrap();
+            assert_eq!((found.q, found.qd), (vec![cell(1)], Some(vec![cell(2)])));
+            assert_eq!(found.tau, Some(vec![cell(3)]));
+        }
+        assert!(message("time,q,qd,tau", 2).contains("there is no column \"q1\""));
+        assert!(message("time,q_hip,q_knee", 1).contains("joint_names = [\"hip\", ..]"));
     }
 
     #[test]

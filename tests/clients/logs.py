@@ -5,10 +5,14 @@ Arguments: a CSV file with the columns time, q1, q2, qd1, qd2, tau1, tau2, and t
 
 import csv
 import gzip
+import json
 import pathlib
 import sys
 
 import numpy
+import pyarrow
+import pyarrow.parquet
+import scipy.io
 
 source, folder = (pathlib.Path(argument) for argument in sys.argv[1:])
 with open(source, newline="") as file:
@@ -32,4 +36,50 @@ numpy.savez(folder / "short.npz", **{**channels, "tau": channels["tau"][:-3]})
 gap = channels["q"].copy()
 gap[4, 1] = numpy.nan
 numpy.savez(folder / "gap.npz", **{**channels, "q": gap})
+
+# MATLAB has no vectors, but matrices of one column or one row; it writes other things beside.
+beside = {"note": "left arm", "rig": {"joints": 2}, "cells": numpy.array([1, "a"], dtype=object), "gains": numpy.zeros((2, 2, 2))}
+for name, packed in [("plain.mat", False), ("packed.mat", True)]:
+    scipy.io.savemat(folder / name, {**channels, **beside}, do_compression=packed)
+scipy.io.savemat(folder / "columns.mat", {name: table[:, [k]] for k, name in enumerate(names)})
+scipy.io.savemat(folder / "integers.mat", ticks)
+scipy.io.savemat(folder / "gap.mat", {**channels, "q": gap})
+
+columns = {name: table[:, k] for k, name in enumerate(names)}
+for packing in ["snappy", "gzip", "zstd", "lz4", "none"]:
+    pyarrow.parquet.write_table(pyarrow.table(columns), folder / f"{packing}.parquet", compression=packing, row_group_size=20)
+lists = {name: list(values) for name, values in channels.items()}
+pyarrow.parquet.write_table(pyarrow.table({**lists, "mode": ["run"] * len(table)}), folder / "lists.parquet")
+pyarrow.parquet.write_table(pyarrow.table({**columns, "q2": [*gap[:, 1]]}), folder / "gap.parquet")
+ragged = [*channels["q"][:-1], channels["q"][-1][:1]]
+pyarrow.parquet.write_table(pyarrow.table({**lists, "q": ragged}), folder / "ragged.parquet")
+
+
+def episode(number, rows):
+    """The frames of an episode as LeRobot writes them: single precision."""
+    count = len(rows)
+    single = {
+        "observation.state": list(rows[:, 1:3].astype(numpy.float32)),
+        "action": list(rows[:, 5:7].astype(numpy.float32)),
+        "timestamp": rows[:, 0].astype(numpy.float32),
+    }
+    return pyarrow.table({**single, "frame_index": range(count), "episode_index": [number] * count})
+
+
+def lerobot(name, version, files):
+    """A data set: its description, and episodes by file."""
+    feature = {"dtype": "float32", "shape": [2]}
+    joints = ["elbow.pos", "wrist.pos"]
+    features = {"observation.state": {**feature, "names": joints}, "action": {**feature, "names": {"motors": joints}}}
+    (folder / name / "meta").mkdir(parents=True)
+    (folder / name / "meta/info.json").write_text(json.dumps({"codebase_version": version, "fps": 250, "features": features}))
+    (folder / name / "data/chunk-000").mkdir(parents=True)
+    for file, episodes in files.items():
+        pyarrow.parquet.write_table(pyarrow.concat_tables(episodes), folder / name / "data/chunk-000" / file)
+
+
+first, second = episode(0, table), episode(1, table[:30])
+lerobot("set_v2", "v2.1", {"episode_000000.parquet": [first], "episode_000001.parquet": [second]})
+lerobot("set_v3", "v3.0", {"file-000.parquet": [first, second]})
+lerobot("single", "v3.0", {"file-000.parquet": [first]})
 numpy.savez(folder / "pickled.npz", **{**channels, "q": numpy.array([{"q": 1}] * len(table), dtype=object)})

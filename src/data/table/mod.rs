@@ -2,8 +2,13 @@
 
 mod arrays;
 mod csv;
+#[cfg(feature = "parquet")]
+mod lerobot;
+mod mat;
 mod npy;
 mod npz;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod recording;
 
 use std::fs::File;
@@ -46,6 +51,7 @@ pub(super) trait Table {
 /// How files of each format but text begin.
 const GZIP: &[u8] = b"\x1f\x8b";
 const ZIP: &[u8] = b"PK\x03\x04";
+const PARQUET: &[u8] = b"PAR1";
 
 /// Files that are known and not read: how they begin, and the line that converts them.
 const FOREIGN: [(&[u8], &str); 6] = [
@@ -67,12 +73,14 @@ const FOREIGN: [(&[u8], &str); 6] = [
         "HDF5 is not read; convert it: `python -c \"import h5py, numpy; f = h5py.File('run.h5'); numpy.savez('run.npz', **{k: f[k][:] for k in f})\"`",
     ),
     (
-        b"MATLAB",
-        "MATLAB files are not read; convert it: `python -c \"import scipy.io, numpy; numpy.savez('run.npz', **{k: v for k, v in scipy.io.loadmat('run.mat').items() if k[0] != '_'})\"`",
+        b"MATLAB 7.3",
+        "MATLAB's version 7.3 is HDF5, which is not read; save it with '-v7', or convert it: \
+         `python -c \"import h5py, numpy; f = h5py.File('run.mat'); numpy.savez('run.npz', **{k: f[k][:].T for k in f if k[0] != '#'})\"`",
     ),
     (
-        b"PAR1",
-        "Parquet is not read; convert it: `python -c \"import pandas; pandas.read_parquet('run.parquet').to_csv('run.csv', index=False)\"`",
+        PARQUET,
+        "Parquet is not read by a program without the feature `parquet`, nor packed; build it with that, or convert it: \
+         `python -c \"import pandas; pandas.read_parquet('run.parquet').to_csv('run.csv', index=False)\"`",
     ),
 ];
 
@@ -82,6 +90,10 @@ const FOREIGN: [(&[u8], &str); 6] = [
 /// # Errors
 /// A file that cannot be read, or that is of none of the formats.
 pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+    #[cfg(feature = "parquet")]
+    if let Some(episode) = lerobot::Episode::of(path) {
+        return Ok(Box::new(episode.read()?));
+    }
     if path.is_dir() {
         return Ok(Box::new(recording::of_folder(path, columns)?));
     }
@@ -89,7 +101,9 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
         path: path.to_owned(),
         why,
     };
-    let begin = begin(path).map_err(unreadable)?;
+    // Opened once: what comes through a pipe cannot be read again.
+    let mut file = File::open(path).map_err(unreadable)?;
+    let begin = begin(&mut file).map_err(unreadable)?;
     // Recordings may be larger than the memory: they are not read at once.
     if begin.starts_with(recording::SQLITE) {
         return Ok(Box::new(recording::of_bag(path, columns)?));
@@ -97,7 +111,11 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
     if begin.starts_with(recording::MCAP) {
         return Ok(Box::new(recording::of_mcap(path, columns)?));
     }
-    let bytes = unpacked(path).map_err(unreadable)?;
+    #[cfg(feature = "parquet")]
+    if begin.starts_with(PARQUET) {
+        return Ok(Box::new(parquet::read(path)?));
+    }
+    let bytes = unpacked(begin, file).map_err(unreadable)?;
     if let Some((_, remedy)) = FOREIGN.iter().find(|(begin, _)| bytes.starts_with(begin)) {
         return Err(LogError::Form {
             path: path.to_owned(),
@@ -107,19 +125,23 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
     if bytes.starts_with(ZIP) {
         return Ok(Box::new(npz::read(path, bytes)?));
     }
+    if bytes.starts_with(mat::MAGIC) {
+        return Ok(Box::new(mat::read(path, &bytes)?));
+    }
     Ok(Box::new(Csv::of_bytes(path, &bytes)?))
 }
 
 /// The first bytes of a file.
-fn begin(path: &Path) -> io::Result<Vec<u8>> {
+fn begin(file: &mut File) -> io::Result<Vec<u8>> {
     let mut begin = Vec::new();
-    File::open(path)?.take(16).read_to_end(&mut begin)?;
+    file.take(16).read_to_end(&mut begin)?;
     Ok(begin)
 }
 
-/// The bytes of a file, unpacked where it is packed with gzip.
-fn unpacked(path: &Path) -> io::Result<Vec<u8>> {
-    let bytes = std::fs::read(path)?;
+/// The bytes of a file from its beginning, unpacked where it is packed with gzip.
+fn unpacked(begin: Vec<u8>, mut rest: File) -> io::Result<Vec<u8>> {
+    let mut bytes = begin;
+    rest.read_to_end(&mut bytes)?;
     if !bytes.starts_with(GZIP) {
         return Ok(bytes);
     }

@@ -4,11 +4,11 @@
 /// An array whose numbers are still to be read.
 pub(super) struct Array<'a> {
     /// `<f8`
-    kind: &'a str,
+    pub kind: &'a str,
     /// Whether a column follows the other, rather than a row.
     pub by_columns: bool,
     pub shape: Vec<usize>,
-    numbers: &'a [u8],
+    pub numbers: &'a [u8],
 }
 
 const MAGIC: &[u8] = b"\x93NUMPY";

@@ -14,62 +14,44 @@ impl Recording {
     /// As [`Recording::choose`], and messages of the topics asked for that cannot be decoded.
     pub(super) fn table(&self, columns: &Columns) -> Result<Arrays, LogError> {
         let chosen = self.choose(columns)?;
-        let others = self
-            .series
-            .iter()
-            .filter(|other| !std::ptr::eq(*other, chosen));
-        let is_asked = |other: &&Series| {
-            self.full_names(other)
-                .iter()
-                .any(|name| columns.names(name))
-        };
-        let (asked, unasked): (Vec<&Series>, Vec<&Series>) = others.partition(is_asked);
+        let (asked, unasked) = self.others(chosen, columns);
         let used: Vec<&Series> = [&[chosen], asked.as_slice()].concat();
         self.check(&used)?;
         let clock = Clock::of(&used);
-        let mut table = Arrays::default();
-        table.notes.extend(self.notes.iter().cloned());
-        table.notes.extend(self.told_of_rows(chosen, clock));
-
-        let rows = clock.rows(chosen);
-        let begins = |series: &&Series| clock.rows(series).first().map(|row| row.ns);
+        let all = clock.rows(chosen);
+        let begins = |series: &&Series| Some(clock.rows(series).first()?.ns);
         // Before its first message, nothing is known of a topic.
         let known = used.iter().filter_map(begins).max();
-        let unknown = rows.partition_point(|row| Some(row.ns) < known);
-        let (before, rows) = rows.split_at(unknown);
-        let begin = before.first().or(rows.first()).map_or(0, |row| row.ns);
-        table.add(
-            "time",
-            rows.iter().map(|row| seconds(row.ns, begin)).collect(),
-        );
-        for (index, name) in chosen.short_names().into_iter().enumerate() {
-            table.add(name, rows.iter().map(|row| row.values[index]).collect());
-        }
-        if !before.is_empty() {
-            let left_out = before.len();
-            table.notes.push(format!(
-                "{left_out} rows before the first command are left out"
-            ));
-        }
+        let rows = &all[all.partition_point(|row| Some(row.ns) < known)..];
+
+        let mut table = Arrays::default();
+        table.notes.extend(self.notes.iter().cloned());
+        table.notes.push(self.told_of_time(chosen, clock));
+        table
+            .notes
+            .extend(self.told_of_left_out(chosen, all.len() - rows.len()));
+        let since = |row: &Row<'_>| seconds(row.ns, all[0].ns);
+        table.add("time", rows.iter().map(since).collect());
+        add(&mut table, chosen.short_names(), rows);
         for other in asked {
             let held = held(&clock.rows(other), rows);
-            for (index, name) in self.full_names(other).into_iter().enumerate() {
-                table.add(name, held.iter().map(|row| row.values[index]).collect());
-            }
-            let longest = rows
-                .iter()
-                .zip(&held)
-                .map(|(row, held)| seconds(row.ns, held.ns));
-            let longest = longest.fold(0.0, f64::max);
-            table.notes.push(format!(
-                "{} is held from one message to the next, for {longest} s at most",
-                self.topics[other.topic].name
-            ));
+            add(&mut table, self.full_names(other), &held);
+            table.notes.push(self.told_of_held(other, rows, &held));
         }
         for name in unasked.into_iter().flat_map(|other| self.full_names(other)) {
             table.add(name, Vec::new());
         }
         Ok(table)
+    }
+
+    /// The series beside the rig's: those of which a column is asked, and the rest.
+    fn others(&self, chosen: &Series, columns: &Columns) -> (Vec<&Series>, Vec<&Series>) {
+        let series = self.series.iter();
+        let others = series.filter(|other| !std::ptr::eq(*other, chosen));
+        others.partition(|other| {
+            let mut names = self.full_names(other).into_iter();
+            names.any(|name| columns.names(&name))
+        })
     }
 
     /// Every message of these topics can be decoded.
@@ -90,20 +72,45 @@ impl Recording {
         names.map(|name| format!("{topic}/{name}")).collect()
     }
 
-    /// From which messages the rows are.
-    fn told_of_rows(&self, chosen: &Series, clock: Clock) -> Vec<String> {
-        let Topic { name, messages, .. } = &self.topics[chosen.topic];
+    fn told_of_time(&self, chosen: &Series, clock: Clock) -> String {
+        let name = &self.topics[chosen.topic].name;
         let times = match clock {
             Clock::Stamps => "by the stamps in their headers",
             Clock::Logged => "by when they were recorded, since not all messages have a stamp",
         };
+        format!("read from {name}, {times}")
+    }
+
+    /// Messages of the topic that are no rows of the log.
+    fn told_of_left_out(&self, chosen: &Series, early: usize) -> Vec<String> {
+        let Topic { name, messages, .. } = &self.topics[chosen.topic];
         let others = messages - chosen.samples.len();
-        let left_out =
-            format!("{others} of {messages} messages of {name} hold other joints and are left out");
-        let read = format!("read from {name}, {times}");
-        std::iter::once(read)
-            .chain((others > 0).then_some(left_out))
-            .collect()
+        let told = [
+            (others, "hold other joints"),
+            (early, "are earlier than the first of the other topics"),
+        ];
+        let told = told.into_iter().filter(|(count, _)| *count > 0);
+        told.map(|(count, why)| {
+            format!("{count} of {messages} messages of {name} {why} and are left out")
+        })
+        .collect()
+    }
+
+    fn told_of_held(&self, other: &Series, rows: &[Row<'_>], held: &[Row<'_>]) -> String {
+        let name = &self.topics[other.topic].name;
+        let for_s = rows
+            .iter()
+            .zip(held)
+            .map(|(row, held)| seconds(row.ns, held.ns));
+        let longest = for_s.fold(0.0, f64::max);
+        format!("{name} is held from one message to the next, for {longest} s at most")
+    }
+}
+
+/// Adds a column for each number of these rows.
+fn add(table: &mut Arrays, names: Vec<String>, rows: &[Row<'_>]) {
+    for (index, name) in names.into_iter().enumerate() {
+        table.add(name, rows.iter().map(|row| row.values[index]).collect());
     }
 }
 
