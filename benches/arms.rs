@@ -35,6 +35,7 @@ fn chain(joints: usize) -> Model {
         reference: 0.0,
         across: Vector3::x(),
         axis: Vector3::z(),
+        anchor: Vector3::zeros(),
         inertia: Inertia::central(
             1.5,
             Matrix3::from_diagonal(&Vector3::new(0.008, 0.009, 0.003)),

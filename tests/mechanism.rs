@@ -48,7 +48,7 @@ fn chain(name: &str) -> Chain {
     read(&fixture(name))
 }
 
-fn system(chain: &Chain) -> Model {
+pub fn system(chain: &Chain) -> Model {
     let library = Library::built_in();
     Model::from_text(
         Path::new(&chain.name),
@@ -59,7 +59,7 @@ fn system(chain: &Chain) -> Model {
 }
 
 /// The model with effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
-fn comparable(system: &Model) -> Dynamics {
+pub fn comparable(system: &Model) -> Dynamics {
     let others = ["coulomb_friction", "actuator_saturation"];
     let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
     let effects: Vec<FittedEffect> = system.effects.iter().filter(is_force).cloned().collect();
@@ -68,25 +68,29 @@ fn comparable(system: &Model) -> Dynamics {
 
 #[test]
 fn mujoco_finds_the_same_torques() {
-    let folder = tempfile::tempdir().unwrap();
     for name in FILES {
-        let model = comparable(&system(&chain(name)));
-        let n = model.joints;
-        let mut rng = rng(1);
-        let sample = |_| {
-            let mut draw = |bound: f64| (0..n).map(|_| rng.random_range(-bound..bound)).collect();
-            let [q, qd, tau]: [Vec<f64>; 3] = [draw(3.0), draw(4.0), draw(20.0)];
-            let inputs = [&q, &qd, &tau, &vec![0.0], &model.values()]
-                .map(Vec::as_slice)
-                .concat();
-            let qdd = &model.program.eval(&inputs)[n..];
-            json!({"q": q, "qd": qd, "tau": tau, "qdd": qdd})
-        };
-        let samples: Vec<_> = (0..200).map(sample).collect();
-        let file = folder.path().join("samples.json");
-        fs::write(&file, serde_json::to_string(&samples).unwrap()).unwrap();
-        client("mechanism.py", &[&fixture(name), &file]);
+        mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
     }
+}
+
+/// MuJoCo's inverse dynamics of a description gives back the torques that a model was moved by.
+pub fn mujoco_agrees(description: &Path, model: &Dynamics) {
+    let n = model.joints;
+    let mut rng = rng(1);
+    let sample = |_| {
+        let mut draw = |bound: f64| (0..n).map(|_| rng.random_range(-bound..bound)).collect();
+        let [q, qd, tau]: [Vec<f64>; 3] = [draw(3.0), draw(4.0), draw(20.0)];
+        let inputs = [&q, &qd, &tau, &vec![0.0], &model.values()]
+            .map(Vec::as_slice)
+            .concat();
+        let qdd = &model.program.eval(&inputs)[n..];
+        json!({"q": q, "qd": qd, "tau": tau, "qdd": qdd})
+    };
+    let samples: Vec<_> = (0..200).map(sample).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("samples.json");
+    fs::write(&file, serde_json::to_string(&samples).unwrap()).unwrap();
+    client("mechanism.py", &[description, &file]);
 }
 
 /// Positions, velocities, torques, time, and the parameters at their values.

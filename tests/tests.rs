@@ -55,3 +55,4 @@ mod train;
 mod undeclared_effect;
 mod unexplained;
 mod voice;
+mod write_back;

@@ -9,8 +9,10 @@ use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
 use super::{Answer, Common, voice};
-use crate::files::{OutputError, folder_of};
-use crate::formats::{ClientError, Difference, ExportModel, File, Format, find};
+use crate::files::{OutputError, folder_of, write_whole};
+use crate::formats::{
+    ClientError, Difference, ExportModel, File, Format, WrittenBack, find, write_back,
+};
 use crate::model::Library;
 use crate::sim::Integrator;
 use crate::train::{Checkpoint, Manifest};
@@ -19,13 +21,21 @@ use crate::train::{Checkpoint, Manifest};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     residyn export --checkpoint closeloop-report/checkpoint --format onnx --out pendulum.onnx\n  \
-    residyn export --model closeloop-report/model.toml --format c --out pendulum.h --step 0.001")]
+    residyn export --model closeloop-report/model.toml --format c --out pendulum.h --step 0.001\n  \
+    residyn export --model report/model.toml --into arm.urdf --out arm-fitted.urdf")]
 pub(super) struct Arguments {
     #[command(flatten)]
     model: inputs::ModelArguments,
     /// Format; `residyn list formats` shows all
-    #[arg(long, value_parser = find)]
-    format: &'static Format,
+    #[arg(long, value_parser = find, required_unless_present = "into")]
+    format: Option<&'static Format>,
+    /// In place of a format: the URDF or MJCF that the model was made from, written again with the model's inertias, damping
+    /// and friction. All else in it stays as it is
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["format", "checkpoint", "step", "integrator"])]
+    into: Option<PathBuf>,
+    /// Of --into: the last link, as `residyn new` was given it
+    #[arg(long, value_name = "LINK", requires = "into")]
+    tip: Option<String>,
     /// Output path
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
@@ -45,17 +55,20 @@ pub(super) struct Arguments {
 const STEP_S: f64 = 0.01;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
-    let format = arguments.format;
+    match (arguments.format, &arguments.into) {
+        (Some(format), _) => write(arguments, format),
+        (None, Some(file)) => write_into(arguments, file),
+        (None, None) => unreachable!("clap asks for one of both"),
+    }
+}
+
+fn write(arguments: &Arguments, format: &'static Format) -> Result<Answer> {
     let model = portable(arguments)?;
     let not_carried = (format.not_carried)(&model);
-    for what in &not_carried {
-        voice::say(format!("not carried: {what}"));
-    }
     if let Some(told) = told_of_steps(&model, arguments)? {
         voice::say(told);
     }
-    let folder = folder_of(&arguments.out);
-    std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?;
+    prepare(arguments, &not_carried)?;
     let files = voice::stage("writing", || format.write(&model, &arguments.out))?;
     let compare = || measure(format, &model, arguments);
     let measured = voice::stage("comparing with a client of the format", compare);
@@ -94,6 +107,35 @@ fn told_of_steps(model: &ExportModel, arguments: &Arguments) -> Result<Option<St
         "note: friction at rest is too steep for steps of {} s, in which the model creeps or chatters; {remedy}",
         model.step_s
     )))
+}
+
+/// Write a robot description again, with the values of a model that was made from it.
+fn write_into(arguments: &Arguments, file: &Path) -> Result<Answer> {
+    let Source::File(model) = arguments.model.source() else {
+        unreachable!("clap refuses a checkpoint beside --into");
+    };
+    let model = arguments.effects.library()?.model(model)?;
+    let WrittenBack { text, not_carried } = write_back(&model, file, arguments.tip.as_deref())?;
+    prepare(arguments, &not_carried)?;
+    write_whole(&arguments.out, text.as_bytes())?;
+    let (out, into) = (arguments.out.display(), file.display());
+    voice::print(&match arguments.common.json {
+        true => format!(
+            "{:#}\n",
+            json!({"into": file, "out": arguments.out, "not_carried": not_carried})
+        ),
+        false => format!("{out}: {into} with the values of {}\n", model.name),
+    })?;
+    Ok(Answer::Yes)
+}
+
+/// Say what is not carried, and make the folder of the output.
+fn prepare(arguments: &Arguments, not_carried: &[String]) -> Result<()> {
+    for what in not_carried {
+        voice::say(format!("not carried: {what}"));
+    }
+    let folder = folder_of(&arguments.out);
+    Ok(std::fs::create_dir_all(folder).map_err(OutputError::of(folder))?)
 }
 
 fn measure(

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::ExportModel;
 use super::verify::{Client, ClientError, Predictions, Samples};
+use super::{Change, ExportModel};
 use crate::files::{OutputError, write_whole};
 use crate::model::chain::{Chain, model_text};
 use crate::model::{FileError, Library, Model, NetworkError, ReadyDrive};
@@ -31,13 +31,19 @@ pub struct Format {
     pub robots: Option<RobotReader>,
 }
 
-/// Reads a serial chain of bodies from a robot description.
+/// Reads a serial chain of bodies from a robot description, and writes values into it.
 #[derive(Debug)]
 pub struct RobotReader {
     /// What can be read, in a few words.
     pub about: &'static str,
     /// The chain that ends at a body; without one at the end of the longest branch.
     pub read: fn(&Path, Option<&str>) -> Result<Chain, FileError>,
+    /// The root element of its files.
+    pub root: &'static str,
+    /// The effects that its joints hold.
+    pub effects: &'static [&'static str],
+    /// The text of a file with changes of its numbers.
+    pub rewrite: fn(&Path, &[Change]) -> Result<String, FileError>,
 }
 
 impl RobotReader {

@@ -23,6 +23,7 @@ mod xml;
 pub use export_model::{ExportModel, ExportedEffect};
 pub use format::{ExportError, File, Format, RobotReader};
 pub use json::{ImportError, Imported};
+pub use robot::write_back::{Change, WrittenBack, write_back};
 pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples};
 
 use crate::expr::suggestion;

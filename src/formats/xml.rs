@@ -65,7 +65,7 @@ impl<'x> Source<'x> {
 
     /// The root element, which must have this name.
     pub fn root(&self, name: &str) -> Result<Node<'_, 'x>, FileError> {
-        let root = self.document.root_element();
+        let root = self.document_root();
         if root.has_tag_name(name) {
             return Ok(root);
         }
@@ -77,6 +77,11 @@ impl<'x> Source<'x> {
         };
         let message = format!("the root element is <{found}>, expected <{name}>{format}");
         Err(self.error(root, message))
+    }
+
+    /// The root element, whatever its name.
+    pub fn document_root(&self) -> Node<'_, 'x> {
+        self.document.root_element()
     }
 
     /// An element without defaults.

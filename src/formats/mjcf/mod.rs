@@ -1,4 +1,4 @@
-//! MJCF, the format of MuJoCo: read and written.
+//! MJCF, the format of MuJoCo: read, written and written into.
 
 mod actuator;
 mod classes;
@@ -6,6 +6,7 @@ mod equality;
 mod geom;
 mod orientation;
 mod read;
+mod rewrite;
 mod write;
 
 pub(super) use write::FORMAT;

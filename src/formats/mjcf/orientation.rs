@@ -13,7 +13,7 @@ pub(super) struct Angles {
     sequence: String,
 }
 
-const WAYS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
+pub(super) const WAYS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
 impl Angles {
     pub fn new(compiler: &Element<'_, '_>) -> Result<Self, FileError> {

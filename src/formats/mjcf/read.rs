@@ -56,14 +56,14 @@ const BODY: &str = "name childclass pos quat axisangle euler xyaxes zaxis mocap 
 /// Flags that switch forces of the joints off.
 const FORCES: &[&str] = &["passive", "spring", "damper", "frictionloss"];
 
-struct Reader<'s, 'x> {
-    source: &'s Source<'x>,
+pub(super) struct Reader<'s, 'x> {
+    pub source: &'s Source<'x>,
     root: Node<'s, 'x>,
     classes: Classes<'s, 'x>,
-    angles: Angles,
+    pub angles: Angles,
     autolimits: bool,
     /// `auto`, `true` or `false`.
-    inertia_from_geom: String,
+    pub inertia_from_geom: String,
     /// Effort limit of the drive (N m or N), by joint.
     drives: HashMap<String, Drive>,
     /// What joints follow others, by their names.
@@ -71,7 +71,7 @@ struct Reader<'s, 'x> {
 }
 
 impl<'s, 'x> Reader<'s, 'x> {
-    fn new(source: &'s Source<'x>) -> Result<Self, FileError> {
+    pub fn new(source: &'s Source<'x>) -> Result<Self, FileError> {
         let root = source.root("mujoco")?;
         if let Some(include) = root.descendants().find(|node| node.has_tag_name("include")) {
             let message = "<include> is not followed; save the whole model as one file, with MuJoCo's mj_saveLastXML";
@@ -108,6 +108,33 @@ impl<'s, 'x> Reader<'s, 'x> {
             classes,
             autolimits,
         })
+    }
+
+    /// The joint of a name.
+    pub fn joint(&self, name: &str) -> Result<Node<'s, 'x>, FileError> {
+        let worlds = named(self.root, "worldbody");
+        let mut joints = worlds.flat_map(|world| world.descendants());
+        joints
+            .find(|node| node.has_tag_name("joint") && node.attribute("name") == Some(name))
+            .ok_or_else(|| {
+                let message = format!(
+                    "no joint has the name `{name}`; give the joints of the model names, and make the model from the file again"
+                );
+                self.source.error(self.root, message)
+            })
+    }
+
+    /// The default class of what is in a body.
+    pub fn class_of(&self, body: Node<'s, 'x>) -> &'s str {
+        let mut around = body.ancestors();
+        let given = around.find_map(|node| node.attribute("childclass"));
+        given.unwrap_or_else(|| self.classes.outermost())
+    }
+
+    /// A joint with its defaults.
+    pub fn element(&self, joint: Node<'s, 'x>) -> Result<Element<'s, 'x>, FileError> {
+        self.classes
+            .element(joint, self.class_of(joint), &["joint"])
     }
 
     fn gravity(&self) -> Result<Vector3<f64>, FileError> {
@@ -251,7 +278,12 @@ impl<'s, 'x> Reader<'s, 'x> {
         Ok([own, of_drive].into_iter().flatten().reduce(f64::min))
     }
 
-    fn inertia(&self, body: Node<'s, 'x>, class: &str, name: &str) -> Result<Inertia, FileError> {
+    pub fn inertia(
+        &self,
+        body: Node<'s, 'x>,
+        class: &str,
+        name: &str,
+    ) -> Result<Inertia, FileError> {
         let given = named(body, "inertial").next();
         let of_geoms = || {
             let mut sum = Inertia::none();
@@ -315,7 +347,7 @@ fn is_of_body(node: Node<'_, '_>) -> bool {
 }
 
 /// A linear coefficient; higher ones, of a polynomial, must be zero.
-fn linear(joint: &Element<'_, '_>, key: &str) -> Result<f64, FileError> {
+pub(super) fn linear(joint: &Element<'_, '_>, key: &str) -> Result<f64, FileError> {
     let all = joint.list(key)?.unwrap_or_default();
     if all.iter().skip(1).any(|higher| *higher != 0.0)
         || all.first().is_some_and(|first| *first < 0.0)

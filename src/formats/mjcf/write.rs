@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::read::read_mjcf;
+use super::rewrite::rewrite;
 use crate::formats::robot::mechanism::{
     Drive, Link, Mechanism, file, friction_widths, head, numbers, option,
 };
@@ -27,6 +28,9 @@ pub(in crate::formats) const FORMAT: Format = Format {
     robots: Some(RobotReader {
         about: "up to twelve hinge or slide joints, one carrying the next",
         read: read_mjcf,
+        root: "mujoco",
+        effects: &["viscous_friction", "coulomb_friction", "rotor_inertia"],
+        rewrite,
     }),
 };
 

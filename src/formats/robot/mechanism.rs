@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::servo::{Servo, servos};
 use crate::formats::xml::escaped;
 use crate::formats::{ExportError, ExportModel, ExportedEffect, File};
-use crate::model::chain::{Inertia, Joint, Pose, Spring, recover, rounded};
+use crate::model::chain::{Joint, Pose, Spring, recover, rounded};
 use crate::sim::{RK4, SEMI_IMPLICIT_EULER, Scheme};
 
 /// A mechanism with its drives.
@@ -158,30 +158,25 @@ impl Mechanism {
     pub fn links(&self) -> Vec<Link> {
         let mut parent = Pose::identity();
         let link = |joint: &Joint| {
-            let own = frame(joint);
+            // The body's frame is put at the joint.
+            let own = Pose {
+                origin: Vector3::zeros(),
+                ..joint.in_body()
+            };
             let pose = parent.then(&joint.at_zero()).then(&own.inverse());
             parent = own;
             let inertia = joint.inertia.seen_from(&own);
-            let centre = inertia.moment / inertia.mass;
-            let back = Pose {
-                rotation: Matrix3::identity(),
-                origin: -centre,
-            };
+            let (centre, tensor) = inertia.about_centre();
             Link {
                 pose,
                 axis: joint.axis,
                 mass: inertia.mass,
                 centre,
-                tensor: central(&inertia, &back),
+                tensor,
             }
         };
         self.joints.iter().map(link).collect()
     }
-}
-
-fn central(inertia: &Inertia, back: &Pose) -> Matrix3<f64> {
-    let tensor = inertia.seen_from(back).tensor;
-    (tensor + tensor.transpose()) * 0.5
 }
 
 /// The drives of a model, which are like `still` where torques are commanded.
@@ -202,18 +197,6 @@ fn drives(model: &ExportModel, still: &Drive) -> Result<Vec<Drive>, String> {
         ..still.clone()
     };
     Ok(servos.into_iter().map(drive).collect())
-}
-
-/// The joint's frame in the frame of its body.
-fn frame(joint: &Joint) -> Pose {
-    Pose {
-        rotation: Matrix3::from_columns(&[
-            joint.across,
-            joint.axis.cross(&joint.across),
-            joint.axis,
-        ]),
-        origin: Vector3::zeros(),
-    }
 }
 
 /// For each joint the velocity (rad/s or m/s) over which dry friction reverses; 0 where it jumps.

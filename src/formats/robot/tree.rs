@@ -270,6 +270,7 @@ fn joint(body: &Body, hinge: &Hinge, pose: Pose) -> Result<Joint, FileError> {
         reference: hinge.reference,
         across: with_z_along(hinge.axis).column(0).into(),
         axis: hinge.axis,
+        anchor: hinge.anchor,
         inertia: Inertia::none(),
         follows: None,
         drivetrain: hinge.drivetrain,

@@ -1,6 +1,7 @@
-//! URDF, the format of ROS: read and written.
+//! URDF, the format of ROS: read, written and written into.
 
 mod read;
+mod rewrite;
 mod write;
 
 pub(super) use write::FORMAT;

@@ -23,10 +23,7 @@ const GRAVITY: f64 = 9.81;
 pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
     let text = xml::text(path)?;
     let source = Source::new(path, &text)?;
-    let file = Robot {
-        root: source.root("robot")?,
-        source: &source,
-    };
+    let file = Robot::new(&source)?;
     let base = file.base()?;
     let tree = file.body(base, None)?;
     file.check_all_hang_on(&tree)?;
@@ -45,12 +42,28 @@ pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
     })
 }
 
-struct Robot<'s, 'x> {
-    source: &'s Source<'x>,
+pub(super) struct Robot<'s, 'x> {
+    pub source: &'s Source<'x>,
     root: Node<'s, 'x>,
 }
 
 impl<'s, 'x> Robot<'s, 'x> {
+    pub fn new(source: &'s Source<'x>) -> Result<Self, FileError> {
+        let root = source.root("robot")?;
+        Ok(Self { source, root })
+    }
+
+    /// The joint of a name.
+    pub fn joint(&self, name: &str) -> Result<Node<'s, 'x>, FileError> {
+        let mut joints = named(self.root, "joint");
+        joints
+            .find(|joint| joint.attribute("name") == Some(name))
+            .ok_or_else(|| {
+                let message = format!("there is no joint `{name}`; correct the name");
+                self.source.error(self.root, message)
+            })
+    }
+
     /// The root link, which is the child of no joint.
     fn base(&self) -> Result<Node<'s, 'x>, FileError> {
         let mut children = HashSet::new();
@@ -77,7 +90,7 @@ impl<'s, 'x> Robot<'s, 'x> {
     }
 
     /// The link that a joint's `<parent>` or `<child>` names.
-    fn end(&self, joint: Node<'s, 'x>, which: &'static str) -> Result<Node<'s, 'x>, FileError> {
+    pub fn end(&self, joint: Node<'s, 'x>, which: &'static str) -> Result<Node<'s, 'x>, FileError> {
         let Some(end) = named(joint, which).next() else {
             return Err(self
                 .source
@@ -128,7 +141,7 @@ impl<'s, 'x> Robot<'s, 'x> {
     }
 
     /// `<origin>` of an element: rotations about the fixed x, then y, then z.
-    fn pose(&self, of: Node<'s, 'x>) -> Result<Pose, FileError> {
+    pub fn pose(&self, of: Node<'s, 'x>) -> Result<Pose, FileError> {
         let Some(origin) = named(of, "origin").next() else {
             return Ok(Pose::identity());
         };
@@ -142,7 +155,7 @@ impl<'s, 'x> Robot<'s, 'x> {
         })
     }
 
-    fn inertia(&self, link: Node<'s, 'x>) -> Result<Inertia, FileError> {
+    pub fn inertia(&self, link: Node<'s, 'x>) -> Result<Inertia, FileError> {
         let Some(inertial) = named(link, "inertial").next() else {
             return Ok(Inertia::none());
         };

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::{Rotation3, Vector3};
 
 use super::read::read_urdf;
+use super::rewrite::rewrite;
 use crate::formats::robot::mechanism::{
     Link, Mechanism, file, friction_widths, head, numbers, option,
 };
@@ -29,6 +30,9 @@ pub(in crate::formats) const FORMAT: Format = Format {
     robots: Some(RobotReader {
         about: "up to twelve revolute, continuous or prismatic joints, one carrying the next",
         read: read_urdf,
+        root: "robot",
+        effects: &["viscous_friction", "coulomb_friction"],
+        rewrite,
     }),
 };
 

@@ -50,6 +50,18 @@ impl Bodies<'_> {
         text
     }
 
+    /// The parameters of the bodies: name, kind and joint.
+    pub fn parameters(&self) -> Vec<(String, Kind, data::Joint)> {
+        let links = self.links().filter(|(_, joint)| has_inertia(joint));
+        let all = |number| {
+            let kinds = [&[Kind::Mass], &MOMENT[..], &TENSOR[..]].concat();
+            kinds
+                .into_iter()
+                .map(move |kind| (name(kind, number), kind, number))
+        };
+        links.flat_map(|(number, _)| all(number)).collect()
+    }
+
     /// With their numbers along the chain, which name their parameters.
     fn links(&self) -> impl Iterator<Item = (data::Joint, &Joint)> {
         let joints = self.0.joints.iter().enumerate();

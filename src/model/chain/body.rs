@@ -66,6 +66,8 @@ pub struct Joint {
     pub across: Vector3<f64>,
     /// The axis in the frame of the file's body.
     pub axis: Vector3<f64>,
+    /// The frame's origin in the frame of the file's body, m.
+    pub anchor: Vector3<f64>,
     /// In the joint's frame.
     pub inertia: Inertia,
     /// Another joint of the chain that moves it.
@@ -74,6 +76,18 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// The joint's frame in that of the file's body.
+    pub fn in_body(&self) -> Pose {
+        Pose {
+            rotation: Matrix3::from_columns(&[
+                self.across,
+                self.axis.cross(&self.across),
+                self.axis,
+            ]),
+            origin: self.anchor,
+        }
+    }
+
     /// The joint's frame in that of the previous joint (or the world) where its coordinate is zero.
     pub fn at_zero(&self) -> Pose {
         let back = if self.slides {

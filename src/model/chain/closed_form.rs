@@ -45,6 +45,16 @@ impl<'c> ClosedForm<'c> {
         [self.parameters(), self.dynamics(), self.energy()].concat()
     }
 
+    /// What each parameter is a sum of: factor, kind and joint.
+    pub fn sums(&self) -> impl Iterator<Item = (&str, Vec<(f64, Kind, data::Joint)>)> {
+        let parts = |base: &Base| {
+            let own = (1.0, base.column.kind, base.column.joint);
+            [&[own], &base.others[..]].concat()
+        };
+        let names = self.names.iter().map(String::as_str);
+        names.zip(self.base.iter().map(parts))
+    }
+
     /// For each joint the inertia of its rotor that is no part of another parameter.
     pub fn rotors(&self) -> Vec<f64> {
         let of_joint = |joint: data::Joint| {

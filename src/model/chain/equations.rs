@@ -51,6 +51,9 @@ pub(super) struct Column {
 }
 
 impl Kind {
+    /// Those of a body.
+    pub const OF_BODY: [Self; 10] = OF_TURNING;
+
     /// `zz`, `mx`, `m`, `J`.
     pub fn stem(self) -> String {
         let axis = |k: usize| ["x", "y", "z"][k];

@@ -13,10 +13,12 @@ mod closed_form;
 mod equations;
 mod formula;
 mod model_file;
+mod nearest;
 mod recover;
 mod recursive;
 mod series;
 mod spatial;
+mod values;
 mod weightless;
 
 pub use body::{Chain, Drivetrain, Follows, Joint, Servo, Spring};
@@ -26,4 +28,5 @@ pub use recursive::{Body, Links, Place};
 pub(crate) use series::rounded;
 pub use spatial::{Inertia, Pose};
 pub(crate) use spatial::{fault, turn, with_z_along};
+pub(crate) use values::added;
 pub(crate) use weightless::without_inertia;

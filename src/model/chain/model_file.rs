@@ -24,17 +24,21 @@ const ABOUT: &str = "equations derived from the description of a serial mechanis
 /// The text of a model file for a chain: of up to three joints its equations in closed form with base parameters, of more
 /// its bodies; damping, dry friction, rotors, springs and effort limits as effects.
 pub fn model_text(chain: &Chain) -> String {
-    let follows = |joint: &Joint| joint.follows.is_some();
-    let is_long = chain.joints.len() > LONGEST_CLOSED_FORM;
-    let (equations, rotors) = if is_long || chain.joints.iter().any(follows) {
-        let armatures = chain.leaders().map(|(_, joint)| joint.drivetrain.armature);
-        (Bodies(chain).text(), armatures.collect())
-    } else {
+    let (equations, rotors) = if is_short(chain) {
         let closed = ClosedForm::of(chain);
         (closed.text(), closed.rotors())
+    } else {
+        let armatures = chain.leaders().map(|(_, joint)| joint.drivetrain.armature);
+        (Bodies(chain).text(), armatures.collect())
     };
     let declared = with_drives([head(chain), equations].concat(), chain);
     declared + &effects(chain, &rotors)
+}
+
+/// Whether its equations are written in closed form.
+pub(super) fn is_short(chain: &Chain) -> bool {
+    let follows = |joint: &Joint| joint.follows.is_some();
+    chain.joints.len() <= LONGEST_CLOSED_FORM && !chain.joints.iter().any(follows)
 }
 
 /// The text with the drives of the joints, where some joint is not driven by a torque.

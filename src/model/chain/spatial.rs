@@ -114,6 +114,17 @@ impl Inertia {
         }
     }
 
+    /// The centre of mass (m), and the tensor about it (kg m^2).
+    pub fn about_centre(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        let centre = self.moment / self.mass;
+        let back = Pose {
+            rotation: Matrix3::identity(),
+            origin: -centre,
+        };
+        let tensor = self.seen_from(&back).tensor;
+        (centre, (tensor + tensor.transpose()) * 0.5)
+    }
+
     /// Two bodies that move as one.
     #[must_use]
     pub fn with(&self, other: &Self) -> Self {

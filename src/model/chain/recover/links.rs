@@ -219,6 +219,7 @@ fn plain(number: usize, axis: Vector3<f64>, origin: Vector3<f64>, inertia: Inert
         reference: 0.0,
         across: rotation.column(0).into(),
         axis,
+        anchor: Vector3::zeros(),
         inertia,
         follows: None,
         drivetrain: Drivetrain::default(),

@@ -36,6 +36,7 @@ impl Recovered {
                 reference: 0.0,
                 across: Vector3::x(),
                 axis: Vector3::z(),
+                anchor: Vector3::zeros(),
                 inertia: *inertia,
                 follows: follows(places, k),
                 drivetrain: Drivetrain::default(),
