@@ -413,7 +413,7 @@ fn mended_from(study: &Study<'_>, library: &[Effect], trial: &Trial, below: f64)
     if trial.is_consistent(study) {
         return None;
     }
-    let set = mended(library, trial.added(study));
+    let set = mended(library, &study.declared.effects, trial.added(study));
     fitted_from(study, trial, &set, below).filter(|found| found.is_valid(study))
 }
 

@@ -3,7 +3,8 @@ use std::ops::Range;
 use super::trial::is_consistent;
 use crate::model::{Effect, FittedEffect};
 
-/// Every set of effects in which one is replaced by some of those that it contains, fewest first. Only effects at the places `added` change.
+/// Every set of effects in which one is replaced by some of those that it contains and that the set has not, fewest first. Only
+/// effects at the places `added` change.
 pub(super) fn simpler(
     library: &[Effect],
     effects: &[FittedEffect],
@@ -13,18 +14,33 @@ pub(super) fn simpler(
     for k in added {
         let old = &effects[k];
         for parts in parts_of(library, &old.effect) {
-            let parts = parts.into_iter().map(|effect| part_of(old, effect));
-            let mut replaced = effects.to_vec();
-            replaced.splice(k..=k, parts);
-            all.push(replaced);
+            let parts: Vec<FittedEffect> = (parts.into_iter())
+                .map(|effect| part_of(old, effect))
+                .collect();
+            let mut rest = effects.to_vec();
+            rest.remove(k);
+            if parts.iter().all(|part| is_free_of(part, &rest)) {
+                rest.splice(k..k, parts);
+                all.push(rest);
+            }
         }
     }
     all
 }
 
-/// A set of effects with what it contains in place of each whose values are not consistent: all of it, since the simpler
-/// ones are found from there.
-pub(super) fn mended(library: &[Effect], effects: &[FittedEffect]) -> Vec<FittedEffect> {
+/// Whether an effect can act beside others: the same one twice cannot.
+fn is_free_of(new: &FittedEffect, others: &[FittedEffect]) -> bool {
+    !others.iter().any(|other| other.excludes(new))
+}
+
+/// A set of effects with what it contains in place of each whose values are not consistent: all of it that the set and the
+/// declared effects have not, since the simpler ones are found from there.
+pub(super) fn mended(
+    library: &[Effect],
+    declared: &[FittedEffect],
+    effects: &[FittedEffect],
+) -> Vec<FittedEffect> {
+    let present = [declared, effects].concat();
     let mend = |effect: &FittedEffect| {
         if is_consistent(effect) {
             return vec![effect.clone()];
@@ -33,6 +49,7 @@ pub(super) fn mended(library: &[Effect], effects: &[FittedEffect]) -> Vec<Fitted
         richest
             .into_iter()
             .map(|part| part_of(effect, part))
+            .filter(|part| is_free_of(part, &present))
             .collect()
     };
     effects.iter().flat_map(mend).collect()

@@ -89,7 +89,7 @@ fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
     let fastest = stribeck.effect.parameters[2].bounds[1];
     stribeck.values = vec![(0.1, None), (0.2, None), (fastest, None)];
     let set = [absent("joint_spring"), stribeck];
-    let mended = mended(library.effects(), &set);
+    let mended = mended(library.effects(), &[], &set);
     let labels: Vec<String> = mended.iter().map(FittedEffect::label).collect();
     assert_eq!(
         labels,
@@ -120,6 +120,25 @@ fn simpler_sets_have_fewer_parameters() {
     let most = key(sets.last().unwrap());
     let parts = ["constant_torque", "coulomb_friction", "viscous_friction"];
     assert_eq!(most, parts.map(|name| format!("{name} on joint 1")));
+}
+
+/// The friction that a file declares is not added to it once more: no file may hold it twice.
+#[test]
+fn simpler_sets_hold_no_effect_twice() {
+    let library = Library::built_in();
+    let effects = ["viscous_friction", "asymmetric_friction"].map(absent);
+    let sets = simpler(library.effects(), &effects, 1..2);
+    let is_twice = |set: &Vec<FittedEffect>| {
+        let again = |effect: &FittedEffect| effect.label() == effects[0].label();
+        set.iter().filter(|effect| again(effect)).count() > 1
+    };
+    assert!(!sets.is_empty() && !sets.iter().any(is_twice));
+    let [declared, whole] = effects;
+    let mut broken = whole;
+    broken.values[0].0 = f64::NAN;
+    let mended = mended(library.effects(), &[declared], &[broken]);
+    let names: Vec<&str> = mended.iter().map(|effect| &*effect.effect.name).collect();
+    assert!(!names.contains(&"viscous_friction"), "{names:?}");
 }
 
 /// The lag takes over the value of the delay, and the ripple is tried with the number of periods that the rig has and
