@@ -58,14 +58,15 @@ fn library(folders: Vec<PathBuf>) -> PyResult<Library> {
 }
 
 impl Model {
-    /// A model file from a robot description.
+    /// The model of a robot description, with a warning of what that has and the model has not.
     fn described(
+        py: Python<'_>,
         format: &str,
         path: &Path,
         tip: Option<&str>,
         drive: Option<&str>,
         effects: Vec<PathBuf>,
-    ) -> PyResult<(Self, Vec<String>)> {
+    ) -> PyResult<Self> {
         let format = formats::find(format).expect("called with the names of formats");
         let reader = format
             .robots
@@ -73,11 +74,11 @@ impl Model {
             .expect("called with robot descriptions");
         let (inner, notes) = reader.model(path, tip, drive).or_raise()?;
         let library = library(effects)?;
-        Ok((Self { inner, library }, notes))
+        warn(py, &notes).map(|()| Self { inner, library })
     }
 }
 
-/// Warn of what a robot description has and the model has not.
+/// A warning for each note.
 fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
     let category = py.get_type::<pyo3::exceptions::PyUserWarning>();
     for note in notes {
@@ -135,8 +136,7 @@ impl Model {
         drive: Option<&str>,
         effects: Vec<PathBuf>,
     ) -> PyResult<Self> {
-        let (model, notes) = Self::described("urdf", &path, tip, drive, effects)?;
-        warn(py, &notes).map(|()| model)
+        Self::described(py, "urdf", &path, tip, drive, effects)
     }
 
     /// The serial chain of an MJCF file of MuJoCo: as `from_urdf`; position actuators are taken over.
@@ -149,8 +149,7 @@ impl Model {
         drive: Option<&str>,
         effects: Vec<PathBuf>,
     ) -> PyResult<Self> {
-        let (model, notes) = Self::described("mjcf", &path, tip, drive, effects)?;
-        warn(py, &notes).map(|()| model)
+        Self::described(py, "mjcf", &path, tip, drive, effects)
     }
 
     /// The name of the system.
@@ -240,7 +239,7 @@ impl Model {
         horizon_s: f64,
     ) -> PyResult<Vec<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)>> {
         self.check(log)?;
-        check_horizon(horizon_s)?;
+        check_seconds("horizon", horizon_s)?;
         let found = py.detach(|| traces(&self.inner.dynamics(), &log.0, horizon_s));
         let arrays = found.into_iter().map(|trace| {
             let q = matrix(py, &trace.q);
@@ -298,7 +297,7 @@ impl Model {
         logs.iter().try_for_each(|log| self.check(log))?;
         horizons_s
             .iter()
-            .try_for_each(|horizon_s| check_horizon(*horizon_s))?;
+            .try_for_each(|horizon_s| check_seconds("horizon", *horizon_s))?;
         let logs: Vec<Recorded> = logs.iter().map(|log| log.0.clone()).collect();
         let summary = py.detach(|| {
             let assessed = assess(&self.inner.dynamics(), &logs, &horizons_s);
@@ -348,7 +347,7 @@ impl Model {
             )));
         }
         let integrator = integrator_of(integrator)?;
-        check_step(step_s)?;
+        check_seconds("step", step_s)?;
         let dynamics = self.inner.dynamics();
         let mut environment = Environment::new(&dynamics, integrator, step_s);
         let mut states: Vec<Vec<f64>> = state.iter().map(|value| vec![*value]).collect();
@@ -386,7 +385,7 @@ impl Model {
         integrator: &str,
     ) -> PyResult<Vec<String>> {
         let format = formats::find(format).map_err(ResidynError::new_err)?;
-        check_step(step_s)?;
+        check_seconds("step", step_s)?;
         let origin = json!({"config": {"model": self.inner.name}, "seed": 0});
         let model = ExportModel::of_system(&self.inner, integrator_of(integrator)?, step_s, origin);
         py.detach(|| format.write(&model, &path)).or_raise()?;
@@ -437,20 +436,12 @@ impl Model {
     }
 }
 
-fn check_horizon(horizon_s: f64) -> PyResult<()> {
-    match horizon_s > 0.0 && horizon_s.is_finite() {
+/// Whether a length of time can be one; `what` is for the message.
+fn check_seconds(what: &str, seconds: f64) -> PyResult<()> {
+    match seconds > 0.0 && seconds.is_finite() {
         true => Ok(()),
         false => Err(ResidynError::new_err(format!(
-            "a horizon of {horizon_s} s: give a number of seconds above zero"
-        ))),
-    }
-}
-
-fn check_step(step_s: f64) -> PyResult<()> {
-    match step_s > 0.0 && step_s.is_finite() {
-        true => Ok(()),
-        false => Err(ResidynError::new_err(format!(
-            "a step of {step_s} s: give a number of seconds above zero"
+            "a {what} of {seconds} s: give a number of seconds above zero"
         ))),
     }
 }
