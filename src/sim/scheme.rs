@@ -16,6 +16,8 @@ pub struct Scheme {
     /// For schemes of one stage: positions move with the new velocities, v' = v + h f_v and q' = q + h (f_q + h f_v).
     /// Where f_q = v this is q' = q + h v'; whatever else f_q holds is taken at the step's start.
     pub semi_implicit: bool,
+    /// Rate of decay times the length of a step up to which the steps decay as well.
+    pub most_damping: f64,
 }
 
 /// One evaluation of the derivative within a step of length h.
@@ -36,6 +38,7 @@ pub const SEMI_IMPLICIT_EULER: &Scheme = &Scheme {
     order: 1,
     stages: &stages([0.0], [1.0]),
     semi_implicit: true,
+    most_damping: 2.0,
 };
 
 /// Kutta 1901.
@@ -48,6 +51,7 @@ pub const RK4: &Scheme = &Scheme {
         [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
     ),
     semi_implicit: false,
+    most_damping: 2.785,
 };
 
 /// Every scheme. A new one is one more entry here.
@@ -59,6 +63,7 @@ pub const SCHEMES: [&Scheme; 3] = [
         order: 2,
         stages: &stages([0.0, 1.0], [0.5, 0.5]),
         semi_implicit: false,
+        most_damping: 2.0,
     },
     RK4,
 ];
