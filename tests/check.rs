@@ -131,6 +131,13 @@ const BROKEN: &[(&str, [&str; 2], Kind, usize, &str)] = &[
     ),
     (
         "acrobot",
+        ["(qd2 + 2*qd1)", "(qd2 - 2*qd1)"],
+        Kind::Power,
+        24,
+        "in products of velocities take ",
+    ),
+    (
+        "acrobot",
         ["m1*lc1^2 +", "m1*lc1 +"],
         Kind::Units,
         17,

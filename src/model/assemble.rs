@@ -89,14 +89,15 @@ impl Model {
         })
     }
 
-    /// The mass matrix, row by row, as a program of the inputs of [`Dynamics`]; `None` for a model that gives accelerations.
-    pub(super) fn mass_program(&self) -> Option<Program> {
+    /// The mass matrix, row by row, and the bias as a program of the inputs of [`Dynamics`]; `None` for a model that gives
+    /// accelerations.
+    pub(super) fn mass_and_bias_program(&self) -> Option<Program> {
         let sign = self.sign();
         let mut assembly = Assembly::new(self, &self.effects, &sign);
         assembly.apply_drive();
         assembly.apply_sensors();
-        let (matrix, _) = assembly.mass_and_bias()?;
-        Some(assembly.graph.finish(&matrix.concat()))
+        let (matrix, bias) = assembly.mass_and_bias()?;
+        Some(assembly.graph.finish(&[matrix.concat(), bias].concat()))
     }
 
     /// Every parameter of the model: the declared ones, then those of the effects, in their order.

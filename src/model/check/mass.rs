@@ -8,7 +8,7 @@ use super::{Finding, Kind, Severity};
 use crate::data::Joint;
 use crate::model::system::{Model, Motion};
 
-/// States that are looked at, beside that with all joints at zero.
+/// States that are drawn.
 const STATES: usize = 200;
 /// Within this share of the largest entry or eigenvalue numbers are equal, or zero.
 const ROUNDING: f64 = 1e-10;
@@ -41,23 +41,27 @@ pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Fi
 
 /// None for a model that gives accelerations.
 fn samples(model: &Model, rng: &mut impl Rng) -> Vec<Sample> {
-    let Some(program) = model.mass_program() else {
+    let Some(program) = model.mass_and_bias_program() else {
         return Vec::new();
     };
     let n = model.joints;
-    let mut drawn = || {
-        (0..2 * n)
-            .map(|_| rng.random_range(-REACH..REACH))
-            .collect()
-    };
     let mut states = vec![vec![0.0; 2 * n]];
-    states.extend((0..STATES).map(|_| -> Vec<f64> { drawn() }));
+    states.extend(drawn(n, rng));
     let sample = |state: Vec<f64>| {
         let inputs = [&state, vec![0.0; n + 1].as_slice(), &model.values()].concat();
-        let matrix = DMatrix::from_row_slice(n, n, &program.eval(&inputs));
+        let matrix = DMatrix::from_row_slice(n, n, &program.eval(&inputs)[..n * n]);
         Sample { state, matrix }
     };
     states.into_iter().map(sample).collect()
+}
+
+/// States of so many joints, anywhere.
+pub(super) fn drawn(joints: usize, rng: &mut impl Rng) -> Vec<Vec<f64>> {
+    let mut state = || {
+        let values = (0..2 * joints).map(|_| rng.random_range(-REACH..REACH));
+        values.collect()
+    };
+    (0..STATES).map(|_| state()).collect()
 }
 
 fn not_finite(samples: &[Sample]) -> Option<(&Sample, String)> {
@@ -108,7 +112,7 @@ fn not_positive(samples: &[Sample]) -> Option<(&Sample, String)> {
 }
 
 /// `q1 = 0, q2 = 1.571`; the velocities say something only where there are formulas of them.
-fn at(model: &Model, state: &[f64]) -> String {
+pub(super) fn at(model: &Model, state: &[f64]) -> String {
     let angles = Joint::all(model.joints).zip(state);
     let angles = angles.map(|(joint, q)| format!("{} = {q:.4}", joint.name("q")));
     angles.collect::<Vec<_>>().join(", ")

@@ -4,6 +4,7 @@ mod inputs;
 mod mass;
 mod names;
 mod places;
+mod power;
 mod units;
 mod unused;
 
@@ -40,6 +41,8 @@ pub enum Kind {
     Input,
     /// A mass matrix that no rigid bodies have.
     Mass,
+    /// Coriolis and centrifugal forces that do not belong to the mass matrix.
+    Power,
     /// Units that do not fit.
     Units,
     /// A name that hides another one or is easily taken for it.
@@ -75,6 +78,7 @@ impl Model {
             unused::find(self, &places),
             inputs::find(self, &places),
             mass::find(self, &places, rng),
+            power::find(self, &places, rng),
             units::find(self, &places),
             names::find(self, &places),
         ]
@@ -101,6 +105,16 @@ impl Model {
     }
 }
 
+impl fmt::Display for Finding {
+    /// `line 7: no equation uses `m``
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
+        }
+        f.write_str(&self.text)
+    }
+}
+
 impl fmt::Display for Check {
     /// The model in a line, then the findings; no line is longer than 80 characters, but for a word that is.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -119,10 +133,7 @@ impl fmt::Display for Check {
                 Severity::Error => "error",
                 Severity::Warning => "warning",
             };
-            let place = finding
-                .line
-                .map_or_else(String::new, |line| format!("line {line}: "));
-            f.write_str(&hanging(label, &format!("{place}{}", finding.text), WIDTH))?;
+            f.write_str(&hanging(label, &finding.to_string(), WIDTH))?;
         }
         Ok(())
     }

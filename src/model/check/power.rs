@@ -1,0 +1,89 @@
+//! Coriolis and centrifugal forces that do not belong to the mass matrix. Those that do neither add nor take energy,
+//! qd' (dM/dt / 2) qd = qd' c: the kinetic energy changes by what gravity, friction and motors do, and by nothing else.
+
+use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+
+use super::mass::{at, drawn};
+use super::places::Places;
+use super::{Finding, Kind, Severity};
+use crate::model::system::{Model, Motion};
+
+/// How far joints move along their velocities for the slope of the mass matrix \[s\].
+const STEP_S: f64 = 1e-5;
+/// A difference below this share of either power is that of numerical slopes, or of rounded numbers in the file.
+const SAME: f64 = 1e-3;
+/// Both powers are nothing below this share of the kinetic energy, per second.
+const NOTHING: f64 = 1e-6;
+
+/// The two powers in a state \[W\].
+struct Powers {
+    state: Vec<f64>,
+    energy: f64,
+    of_mass: f64,
+    of_bias: f64,
+}
+
+impl Powers {
+    /// The difference as a share of the larger; 0 where both are nothing.
+    fn apart(&self) -> f64 {
+        let largest = self.of_mass.abs().max(self.of_bias.abs());
+        match largest > NOTHING * self.energy {
+            true => (self.of_mass - self.of_bias).abs() / largest,
+            false => 0.0,
+        }
+    }
+}
+
+pub(super) fn find(model: &Model, places: &Places, rng: &mut impl Rng) -> Vec<Finding> {
+    let Motion::MassAndBias { bias, .. } = &model.equations.motion else {
+        return Vec::new();
+    };
+    let powers = powers(&model.with_effects(Vec::new()), rng);
+    let differ = powers.into_iter().filter(|powers| powers.apart() > SAME);
+    let worst = differ.max_by(|a, b| a.apart().total_cmp(&b.apart()));
+    let finding = |worst: Powers| Finding {
+        severity: Severity::Warning,
+        kind: Kind::Power,
+        line: places.line(bias[0].at),
+        text: format!(
+            "the terms of `bias` in products of velocities take {:.4} W where the mass matrix asks for {:.4}: check their signs \
+             and factors; at {}",
+            worst.of_bias,
+            worst.of_mass,
+            at(model, &worst.state)
+        ),
+    };
+    worst.map(finding).into_iter().collect()
+}
+
+fn powers(model: &Model, rng: &mut impl Rng) -> Vec<Powers> {
+    let Some(program) = model.mass_and_bias_program() else {
+        return Vec::new();
+    };
+    let n = model.joints;
+    let values = model.values();
+    let mass_and_bias = |q: &[f64], qd: &[f64]| {
+        let mut mass = program.eval(&[q, qd, &vec![0.0; n + 1], &values].concat());
+        let bias = mass.split_off(n * n);
+        (DMatrix::from_row_slice(n, n, &mass), DVector::from(bias))
+    };
+    let of_state = |state: Vec<f64>| {
+        let (q, qd) = state.split_at(n);
+        let moved = |by: f64| -> Vec<f64> { q.iter().zip(qd).map(|(q, qd)| q + by * qd).collect() };
+        let mass_at = |by: f64| mass_and_bias(&moved(by), qd).0;
+        let slope = (mass_at(STEP_S) - mass_at(-STEP_S)) / (2.0 * STEP_S);
+        let back: Vec<f64> = qd.iter().map(|qd| -qd).collect();
+        // Friction changes its sign with the velocity, gravity is there without.
+        let bias_at = |qd: &[f64]| mass_and_bias(q, qd).1;
+        let even = 0.5 * (bias_at(qd) + bias_at(&back)) - bias_at(&vec![0.0; n]);
+        let (mass, qd) = (mass_at(0.0), DVector::from_column_slice(qd));
+        Powers {
+            energy: 0.5 * qd.dot(&(mass * &qd)),
+            of_mass: 0.5 * qd.dot(&(slope * &qd)),
+            of_bias: qd.dot(&even),
+            state,
+        }
+    };
+    drawn(n, rng).into_iter().map(of_state).collect()
+}
