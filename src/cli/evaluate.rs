@@ -115,7 +115,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         voice::print(&(serde_json::to_string_pretty(&printed)? + "\n"))?;
     } else {
         let torque = torque.as_ref().map_or_else(String::new, torques);
-        voice::print(&(table(&summary) + &torque))?;
+        voice::answer(headline(&summary), &(table(&summary) + &torque))?;
     }
     Ok(Answer::Yes)
 }
@@ -160,6 +160,19 @@ fn torques(error: &TorqueError) -> String {
         100.0 * error.relative
     );
     out
+}
+
+/// `position error 0.5 s ahead, rms: 0.0183 on joint 1, 0.0308 on joint 2`
+fn headline(summary: &Summary) -> String {
+    let middle = summary.horizons_s.len() / 2;
+    let errors = &summary.position_rmse[middle];
+    let of_joint = |joint: Joint| format!("{:.4} on joint {joint}", errors[joint]);
+    let errors: Vec<String> = Joint::all(errors.len()).map(of_joint).collect();
+    format!(
+        "position error {} s ahead, rms: {}",
+        summary.horizons_s[middle],
+        errors.join(", ")
+    )
 }
 
 fn table(summary: &Summary) -> String {

@@ -67,12 +67,15 @@ fn lines(bar: ProgressBar, line: fn(&ProgressBar) -> String) -> Sender<()> {
 }
 
 /// `34 %: 3400 of 10000 epochs, loss 1.2e-3; about 25 s left`
+#[allow(clippy::cast_precision_loss)] // counts are far fewer than 2^52
 fn step_line(bar: &ProgressBar) -> String {
     let (done, of) = (bar.position(), bar.length().unwrap_or(0));
     let percent = 100 * done / of.max(1);
-    let left = match bar.eta().as_secs() {
-        0 => String::new(),
-        left => format!("; about {left} s left"),
+    // The bar's own estimate grows without bound while one long step is not done.
+    let each_s = bar.elapsed().as_secs_f64() / done as f64;
+    let left = match each_s * of.saturating_sub(done) as f64 {
+        left if left >= 1.0 && left.is_finite() => format!("; about {left:.0} s left"),
+        _ => String::new(),
     };
     format!("{percent} %: {done} of {of} {}{left}", bar.message())
 }

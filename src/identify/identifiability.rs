@@ -31,6 +31,9 @@ pub struct Open {
 impl Identifiability {
     /// Take over a combination that was found open later.
     pub fn leave(&mut self, open: Open) {
+        if self.hold.contains(&open.hold) {
+            return;
+        }
         self.determined = self.determined.saturating_sub(1);
         self.undetermined.push(open.combination);
         self.hold.push(open.hold);

@@ -107,7 +107,10 @@ impl Library {
             return Model::from_text(path, text, &self.effects);
         }
         Model::read(path, &self.effects).map_err(|mut error| {
-            if error.place.is_none() {
+            let within = path.join("model.toml");
+            if within.is_file() {
+                error.message += &format!("; give {}", within.display());
+            } else if error.place.is_none() {
                 error.message += &format!(
                     "; give a model file or one of {}",
                     Self::system_names().join(", ")
