@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{Answer, Common, inputs, voice};
-use crate::data::{Audit, Columns, Log, Severity, audit, tell_repeats};
+use crate::data::{Audit, Columns, Log, Severity, audit_together, tell_repeats};
 use crate::model::Library;
 
 /// Audit logs: units, signs, sampling, noise, jumps, lags, excitation, what they cannot show, and what mends them
@@ -26,7 +26,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let (logs, columns) = voice::stage("reading the logs", || read(arguments))?;
     inputs::print_notes(&logs);
-    let mut audits: Vec<Audit> = logs.iter().map(|log| audit(log, &columns)).collect();
+    let mut audits = audit_together(&logs, &columns);
     tell_repeats(&logs, &mut audits);
     if arguments.common.json {
         voice::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;

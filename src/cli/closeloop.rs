@@ -171,10 +171,12 @@ fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + '
 
 fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {
     let declared = library.model(model)?;
+    inputs::print_findings(model, &declared, arguments.common.seed);
     let mut train = inputs::logs(&arguments.train, &declared)?;
     let mut test = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
-    inputs::print_notes_and_faults(train.iter().chain(&test), &declared.columns);
+    inputs::print_notes_and_faults(&train, &declared.columns);
+    inputs::print_notes_and_faults(&test, &declared.columns);
     let split = if test.is_empty() {
         Split::of(train, &Settings::default().split)
     } else {

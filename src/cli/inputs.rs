@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::voice;
-use crate::data::{Columns, LeaveOut, Log, audit, leave_out};
+use crate::data::{Columns, LeaveOut, Log, audit_together, leave_out};
 use crate::model::{Library, Model, effect_files};
 
 /// The effects that model files may name: the built-in ones and the user's own.
@@ -80,6 +80,13 @@ pub(super) fn leave_out(
     Ok(())
 }
 
+/// Print on standard error what in a model cannot be meant, before anything is computed with it.
+pub(super) fn print_findings(path: &Path, model: &Model, seed: u64) {
+    for finding in model.check(&mut crate::rng(seed)).findings {
+        voice::say(format!("check: {}: {finding}", path.display()));
+    }
+}
+
 /// Print the notes of logs on standard error.
 pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     for log in logs {
@@ -89,14 +96,16 @@ pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     }
 }
 
-/// Print the notes of logs and what is serious about them on standard error, before anything is computed from them.
+/// Print the notes of logs that are used together and what is serious about them on standard error, before anything is computed from them.
 pub(super) fn print_notes_and_faults<'l>(
     logs: impl IntoIterator<Item = &'l Log>,
     columns: &Columns,
 ) {
-    for log in logs {
+    let logs: Vec<&Log> = logs.into_iter().collect();
+    let audits = audit_together(logs.iter().copied(), columns);
+    for (log, audit) in logs.into_iter().zip(audits) {
         print_notes([log]);
-        for finding in audit(log, columns).serious() {
+        for finding in audit.serious() {
             voice::say(format!("serious: {}: {finding}", log.name()));
         }
     }

@@ -18,9 +18,8 @@ type Declared = (Fitted, Identifiability);
 /// So many fits that begin at values around the declared ones are compared: one alone may end in a local minimum.
 const FITTED_AROUND: usize = 3;
 
-/// Costs of fits are in units of each one's own scale.
 fn cost((fitted, _): &Declared) -> f64 {
-    fitted.fit.cost * fitted.fit.scale.powi(2)
+    fitted.loss()
 }
 
 impl Study<'_> {
@@ -115,6 +114,22 @@ impl Study<'_> {
         }
     }
 
+    /// The declared model with the friction that most machines have on every joint, fitted from where the declared one began;
+    /// `None` where it diverges.
+    pub(super) fn with_usual_friction(&self, library: &[Effect]) -> Option<Fitted> {
+        let friction = usual_friction(self, library);
+        self.fitted_beside(&self.started_from(), &friction).ok()
+    }
+
+    /// The declared model with these effects, fitted from these values: over short windows, then over those of the study.
+    fn fitted_beside(&self, start: &Model, effects: &[FittedEffect]) -> Result<Fitted, FitError> {
+        let short = self.windows_of(self.settings.fit.short_window_s);
+        let own = &self.declared.effects;
+        let model = start.with_effects([own.as_slice(), effects].concat());
+        let first = self.fitted_over(&short, &model)?;
+        self.fitted_over(&self.shooting, &first.model)
+    }
+
     /// The declared model, fitted from these values beside some effects and then alone, and what the logs determine of it
     /// beside them.
     fn declared_beside(
@@ -122,16 +137,12 @@ impl Study<'_> {
         start: &Model,
         effects: &[FittedEffect],
     ) -> Result<Declared, FitError> {
-        let short = self.windows_of(self.settings.fit.short_window_s);
-        let own = &self.declared.effects;
-        let model = start.with_effects([own.as_slice(), effects].concat());
-        let first = self.fitted_over(&short, &model)?;
-        let fitted = self.fitted_over(&self.shooting, &first.model)?;
+        let fitted = self.fitted_beside(start, effects)?;
         let identifiability = self.identifiability_of(&fitted);
         if effects.is_empty() {
             return Ok((fitted, identifiability));
         }
-        let own = fitted.model.effects[..own.len()].to_vec();
+        let own = fitted.model.effects[..self.declared.effects.len()].to_vec();
         let alone = self.fitted_over(&self.shooting, &fitted.model.with_effects(own))?;
         Ok((alone, identifiability))
     }

@@ -26,6 +26,11 @@ impl Fitted {
         }
     }
 
+    /// What the fit leaves, in squares of the noise: its cost is in those of its own scale.
+    pub(super) fn loss(&self) -> f64 {
+        self.fit.cost * self.fit.scale.powi(2)
+    }
+
     /// The effects of the model and more.
     pub(super) fn effects_and(&self, more: &[FittedEffect]) -> Vec<FittedEffect> {
         [self.model.effects.as_slice(), more].concat()

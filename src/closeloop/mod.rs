@@ -23,6 +23,7 @@ mod refine;
 mod remainder;
 mod request;
 mod reversal;
+mod reversed;
 mod run;
 mod score;
 mod select;
@@ -54,7 +55,7 @@ pub use remainder::{
 };
 pub use request::{Reference, Request};
 pub use run::close_loop;
-pub use score::{Contradicted, Errors, Finding, TorqueErrors};
+pub use score::{Contradicted, Errors, Finding, TestLog, TorqueErrors};
 pub use select::{Rival, Round, Tried};
 pub use settings::{
     CalibrateSettings, CurveSettings, DiscriminateSettings, EstablishSettings, FitSettings,

@@ -5,7 +5,7 @@ use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::space::Space;
 use super::split::Split;
-use crate::data::{Finding, Log, audit};
+use crate::data::{Finding, Log, audit_together};
 use crate::model::{Library, Model};
 use crate::sim::metric::window_count;
 
@@ -79,12 +79,8 @@ impl<'a> Request<'a> {
 
     /// The first serious finding about a test log, as the end of a sentence; empty without one.
     fn serious_in_test(&self) -> String {
-        let audits = self
-            .split
-            .test
-            .iter()
-            .map(|log| audit(log, &self.model.columns));
-        let mut found = audits.flat_map(|audit| {
+        let audits = audit_together(&self.split.test, &self.model.columns);
+        let mut found = audits.iter().flat_map(|audit| {
             let told = |finding: &Finding| format!("; {}: {finding}", audit.log);
             audit.serious().map(told).next()
         });

@@ -12,12 +12,12 @@ use super::pushes::tell_pushes;
 use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
-use super::score::{Scorer, contradicted, findings};
+use super::score::{Scored, Scorer, contradicted, findings};
 use super::space::Space;
 use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
-use crate::data::{Audit, Log, audit, tell_repeats};
+use crate::data::{Log, audit_together, tell_repeats};
 use crate::model::{Library, Status};
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
@@ -48,9 +48,7 @@ pub fn close_loop(
         progress(now);
     };
     progress(Stage::Audit.into());
-    let audits = |logs: &[Log]| -> Vec<Audit> {
-        logs.iter().map(|log| audit(log, &model.columns)).collect()
-    };
+    let audits = |logs: &[Log]| audit_together(logs, &model.columns);
     let for_fits = |logs: &[Log]| -> Vec<Log> {
         logs.iter()
             .map(|log| log.for_fits(settings.fit.window_s))
@@ -77,6 +75,8 @@ pub fn close_loop(
     study.identifiability = refined.identifiability.clone();
     let remainder = remainder(&study, &found, &refined);
     let mut of_train = of_train;
+    let with_friction = study.with_usual_friction(library.effects());
+    study.tell_reversed(library.effects(), with_friction.as_ref(), &mut of_train);
     tell_gravity(&found.gravity, &mut of_train);
     // Logs over which the model diverges tell of no push.
     if let Ok(residual) = &remainder.after {
@@ -97,8 +97,18 @@ pub fn close_loop(
         settings: &settings.score,
     };
     let hybrid = learned.as_ref().map(|learned| learned.network.hybrid());
-    let models = [&refined.before, &refined.after];
-    let errors = scorer.errors(model, models, hybrid, &against, rng);
+    let models = Scored {
+        space: study.space,
+        declared: model,
+        before: &refined.before,
+        with_friction: with_friction
+            .as_ref()
+            .filter(|model| !study.added(&model.model).is_empty()),
+        after: &refined.after,
+        hybrid,
+        against: &against,
+    };
+    let errors = scorer.errors(models, rng);
     let (verdict, reason) = verdict(&study, &found, &refined, &errors);
     let mut findings = findings(&study, &found.chosen, &refined, &scorer);
     findings.sort_by_key(|finding| finding.effect.joint.index());

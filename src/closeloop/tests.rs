@@ -12,7 +12,7 @@ use super::refine::refine;
 use super::remainder::ResidualForce;
 use super::request::Request;
 use super::run::close_loop;
-use super::score::{Scorer, findings};
+use super::score::{Scored, Scorer, findings};
 use super::select::{Search, Trial};
 use super::settings::Settings;
 use super::split::Split;
@@ -109,8 +109,16 @@ fn a_fit_that_fails_allows_no_verdict() {
     };
     let refined = refine(&study, &found.before, &found.chosen.after);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let models = [&refined.before, &refined.after];
-    let errors = scorer.errors(&declared, models, None, &[], &mut rng);
+    let models = Scored {
+        space: study.space,
+        declared: &declared,
+        before: &refined.before,
+        with_friction: None,
+        after: &refined.after,
+        hybrid: None,
+        against: &[],
+    };
+    let errors = scorer.errors(models, &mut rng);
     let of = |found: &Found, refined: &_| verdict(&study, found, refined, &errors);
     assert_eq!(of(&found, &refined).0, Verdict::Explained);
 
@@ -487,4 +495,37 @@ fn a_result_predicts_a_log() {
         .unwrap();
     let predicted = model.predict(&logs[0], 0.5);
     assert!(predicted.len() > 10);
+}
+
+/// Two joints whose torques are logged as the model means them, or the other way round.
+#[test]
+fn torques_that_are_reversed_on_all_joints_are_told() {
+    let rig = r#"
+model = "acrobot"
+sensor = { rate_hz = 100, position_noise = 5e-4, position_step = 0.0 }
+excitation = { amplitude = [8.0, 4.0], band_hz = [0.2, 2.0], tones = 8 }
+recording = { logs = 1, duration_s = 6, start = [0, 0, 0, 0] }
+effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
+"#;
+    let library = Library::built_in();
+    let declared = library.model(Path::new("acrobot")).unwrap();
+    let settings = Settings::default();
+    let told = |logs: &[Log]| {
+        let study = Study::new(&declared, logs, &settings);
+        let usual = study.with_usual_friction(library.effects());
+        let mut audits = study.audits().to_vec();
+        study.tell_reversed(library.effects(), usual.as_ref(), &mut audits);
+        let texts = audits[0].serious().map(|finding| finding.to_string());
+        texts
+            .filter(|text| text.contains("with every tau reversed"))
+            .collect::<Vec<_>>()
+    };
+    let mut logs = recorded(rig, 0);
+    assert!(told(&logs).is_empty());
+    for value in logs[0].tau.iter_mut().flatten() {
+        *value = -*value;
+    }
+    let told = told(&logs);
+    assert_eq!(told.len(), 1);
+    assert!(told[0].contains("[columns] tau = "), "{}", told[0]);
 }

@@ -29,9 +29,10 @@ pub(crate) mod statistics;
 mod table;
 mod trajectory;
 
+pub(crate) use audit::reversed_driving;
 pub use audit::{
     Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Response, Severity, TorqueDemand,
-    TorqueLag, VelocityCheck, audit, tell_repeats,
+    TorqueLag, VelocityCheck, audit, audit_together, tell_repeats,
 };
 pub use channels::Channels;
 pub use column::{Column, Quantity};

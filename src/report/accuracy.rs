@@ -4,11 +4,15 @@ use std::fmt::Write;
 
 use super::schema::{ErrorEntry, IdentifiabilityEntry, ModelError, Report, TorqueEntry};
 use super::wording::{
-    AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_NETWORK, ZEROED, amount, listed, small, value,
+    AS_WRITTEN, FITTED, WITH_EFFECTS, WITH_FRICTION, WITH_NETWORK, ZEROED, amount, listed, small,
+    value,
 };
-use crate::closeloop::Space;
+use crate::closeloop::{Space, TestLog};
 use crate::data::{Joint, Quantity};
 use crate::sim::metric::TorqueError;
+
+/// An error that is so many times its median is that of a few windows.
+const UNEVEN: f64 = 5.0;
 
 /// More parameters than this that trade with one another are counted.
 const MOST_NAMED: usize = 6;
@@ -25,16 +29,36 @@ pub(super) fn position_unit(report: &Report) -> &'static str {
 /// Every model that was scored on the test logs, with its name in a table.
 pub(super) fn scored(report: &Report) -> Vec<(&str, &ModelError)> {
     let error = &report.error;
-    let mut models = vec![
-        (AS_WRITTEN, &error.declared),
-        (FITTED, &error.before),
-        (WITH_EFFECTS, &error.after),
-    ];
+    let mut models = vec![(AS_WRITTEN, &error.declared), (FITTED, &error.before)];
+    models.extend(error.with_friction.iter().map(|m| (WITH_FRICTION, m)));
+    models.push((WITH_EFFECTS, &error.after));
     models.extend(error.zeroed.iter().map(|m| (ZEROED, m)));
     models.extend(error.hybrid.iter().map(|m| (WITH_NETWORK, m)));
     let against = error.against.iter();
     models.extend(against.map(|other| (other.name.as_str(), &other.error)));
     models
+}
+
+/// Every model whose torques were scored, with its name in a table.
+pub(super) fn scored_torques(errors: &TorqueEntry) -> Vec<(&'static str, &TorqueError)> {
+    let mut models = vec![(AS_WRITTEN, &errors.as_declared), (FITTED, &errors.before)];
+    models.extend(errors.with_friction.iter().map(|m| (WITH_FRICTION, m)));
+    models.push((WITH_EFFECTS, &errors.after));
+    models
+}
+
+/// What the models of a table are.
+pub(super) fn about_models(has_friction: bool) -> String {
+    let friction = match has_friction {
+        true => {
+            " \"With usual friction\" has Coulomb and viscous friction on every joint as well: what most would try first."
+        }
+        false => "",
+    };
+    format!(
+        "\"Fitted\" is the declared model with its own parameters fitted to the training logs and no effect added: the fair \
+         \"before\" of every comparison.{friction}"
+    )
 }
 
 const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zeros of each test log's sensors are estimated on \
@@ -66,38 +90,39 @@ pub(super) fn torques(report: &Report) -> String {
     let Some(errors) = (report.torque.as_ref()).filter(|_| report.compared == Space::Torque) else {
         return String::new();
     };
+    let models = scored_torques(errors);
+    let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let mut out = format!(
         "## Torque error on the test logs\n\nRoot mean square of the difference between the torques that the logged motion needs \
-         and those logged, both low-passed, in N m (N where a joint slides). \"Fitted\" is the declared model with its own \
-         parameters fitted to the training logs and no effect added.\n\n\
-         | joint | {AS_WRITTEN} | {FITTED} | {WITH_EFFECTS} | with effects / fitted |\n|---|---|---|---|---|\n"
+         and those logged, both low-passed, in N m (N where a joint slides). {}\n\n\
+         | joint | {} | with effects / fitted |\n|---|{}---|\n",
+        about_models(errors.with_friction.is_some()),
+        names.join(" | "),
+        "---|".repeat(names.len())
     );
-    let TorqueEntry {
-        as_declared: declared,
-        before,
-        after,
-        reduction_ci95,
-    } = errors;
-    for joint in Joint::all(before.rms.len()) {
-        let [declared, before, after] = [declared, before, after].map(|error| error.rms[joint]);
-        let _ = writeln!(
-            out,
-            "| {} | {} | {} | {} | {:.2} |",
-            report.label(joint),
-            small(declared),
-            small(before),
-            small(after),
-            after / before.max(f64::MIN_POSITIVE)
+    let mut row = |name: &str, cells: Vec<String>, ratio: f64| {
+        let _ = writeln!(out, "| {name} | {} | {ratio:.2} |", cells.join(" | "));
+    };
+    let ratio = |error: &dyn Fn(&TorqueError) -> f64| {
+        error(&errors.after) / error(&errors.before).max(f64::MIN_POSITIVE)
+    };
+    for joint in Joint::all(report.joints) {
+        let cells = models.iter().map(|(_, error)| small(error.rms[joint]));
+        row(
+            &report.label(joint),
+            cells.collect(),
+            ratio(&|error| error.rms[joint]),
         );
     }
-    let percent = |error: &TorqueError| 100.0 * error.relative;
-    let [declared, before, after] = [declared, before, after].map(percent);
-    let _ = writeln!(
-        out,
-        "| all, share of the logged torques | {declared:.2} % | {before:.2} % | {after:.2} % | {:.2} |",
-        after / before.max(f64::MIN_POSITIVE)
+    let percent = |error: &TorqueError| format!("{:.2} %", 100.0 * error.relative);
+    let cells = models.iter().map(|(_, error)| percent(error));
+    row(
+        "all, share of the logged torques",
+        cells.collect(),
+        ratio(&|error| error.relative),
     );
-    out += &paragraph(removed(*reduction_ci95, "error"));
+    out += &of_test_logs(report);
+    out += &paragraph(removed(errors.reduction_ci95, "error"));
     out + &repeated(report) + "\n"
 }
 
@@ -125,9 +150,14 @@ pub(super) fn repeated(report: &Report) -> String {
     )
 }
 
+/// Whether a reduction is one: without an effect the two models are the same.
+pub(super) fn is_some_reduction(ci95: &[f64; 2]) -> bool {
+    *ci95 != [0.0, 0.0]
+}
+
 /// How much of an error of the fitted declared model the effects remove, where an interval is known.
 pub(super) fn removed(reduction_ci95: Option<[f64; 2]>, error: &str) -> Option<String> {
-    let [low, high] = reduction_ci95?;
+    let [low, high] = reduction_ci95.filter(is_some_reduction)?;
     Some(format!(
         "The effects remove {:.0} to {:.0} % of the fitted declared model's {error} (95 % interval, bootstrap over parts of the test logs).",
         100.0 * low,
@@ -149,6 +179,77 @@ pub(super) fn diverged(name: &str, model: &ModelError) -> Option<String> {
     })
 }
 
+/// What is compared on single test logs.
+pub(super) fn compared_on_logs(report: &Report) -> String {
+    match report.compared {
+        Space::Motion => format!(
+            "Position errors at {} s on each test log, in {}.",
+            report.error.middle().1,
+            position_unit(report)
+        ),
+        Space::Torque => {
+            "Torque errors on each test log, in N m (N where a joint slides).".to_owned()
+        }
+    }
+}
+
+/// The errors on single test logs as a table; empty for a single log.
+fn of_test_logs(report: &Report) -> String {
+    let logs = &report.error.by_log;
+    if logs.is_empty() {
+        return String::new();
+    }
+    let mut out = format!(
+        "\n{}\n\n| log | joint | {FITTED} | {WITH_EFFECTS} | with effects / fitted |\n|---|---|---|---|---|\n",
+        compared_on_logs(report)
+    );
+    for TestLog { log, before, after } in logs {
+        for joint in Joint::all(report.joints) {
+            let (before, after) = (before[joint], after[joint]);
+            let _ = writeln!(
+                out,
+                "| {log} | {} | {} | {} | {:.2} |",
+                report.label(joint),
+                small(before),
+                small(after),
+                after / before.max(f64::MIN_POSITIVE)
+            );
+        }
+    }
+    out
+}
+
+/// Which joints owe most of their error to a few windows.
+pub(super) fn uneven(report: &Report) -> Option<String> {
+    let (h, horizon_s) = report.error.middle();
+    let after = &report.error.after;
+    let share = |joint: Joint| {
+        after.position_rmse[h][joint] / after.position_median[h][joint].max(f64::MIN_POSITIVE)
+    };
+    let uneven = Joint::all(report.joints).filter(|joint| share(*joint) > UNEVEN);
+    let told: Vec<String> = uneven
+        .map(|joint| format!("{:.0} times on joint {}", share(joint), report.label(joint)))
+        .collect();
+    (!told.is_empty()).then(|| {
+        format!(
+            "With effects, the error at {horizon_s} s is many times its median over windows ({}): a few windows make up most of \
+             it. The pictures show the worst one.",
+            listed(&told)
+        )
+    })
+}
+
+/// That zeros of the first second do worse than none, where they do.
+pub(super) fn zeroed_in_vain(error: &ErrorEntry) -> Option<String> {
+    let sum = |model: &ModelError| model.position_rmse[error.middle().0].iter().sum::<f64>();
+    let zeroed = error.zeroed.as_ref()?;
+    (sum(zeroed) > sum(&error.after)).then(|| {
+        "Zeroing makes it worse here: the first second of these logs does not tell their zeros from what else is off. Zero the \
+         rig itself, or leave the zeros out."
+            .to_owned()
+    })
+}
+
 /// A paragraph, where there is something to say.
 fn paragraph(sentence: Option<String>) -> String {
     sentence.map_or_else(String::new, |sentence| format!("\n{sentence}\n"))
@@ -159,10 +260,10 @@ pub(super) fn errors(report: &Report) -> String {
     let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let mut out = format!(
         "## Open-loop error on the test logs\n\nRoot mean square of the position error in {}; in brackets the median over \
-         windows. \"Fitted\" is the declared model with its own parameters fitted to the training logs and no effect added: \
-         the fair \"before\" of every comparison in this report.{}\n\n\
+         windows. {}{}\n\n\
          | horizon | joint | windows | {} | with effects / fitted |\n|---|---|---|{}---|\n",
         position_unit(report),
+        about_models(report.error.with_friction.is_some()),
         [
             report.error.zeroed.as_ref().map_or("", |_| ABOUT_ZEROED),
             if report.error.against.is_empty() {
@@ -200,6 +301,11 @@ pub(super) fn errors(report: &Report) -> String {
     for (name, model) in &models {
         out += &paragraph(diverged(name, model));
     }
+    if report.compared == Space::Motion {
+        out += &of_test_logs(report);
+    }
+    out += &paragraph(uneven(report));
+    out += &paragraph(zeroed_in_vain(&report.error));
     if let (Some(torque), Space::Motion) = (&report.torque, report.compared) {
         let percent = |error: &TorqueError| 100.0 * error.relative;
         let _ = writeln!(

@@ -24,7 +24,9 @@ pub(super) fn headline(outcome: &Outcome) -> String {
             format!("{title} on joint{plural} {}", listed(joints))
         })
         .collect();
+    let is_fitted = outcome.models.after.fit.termination.has_converged();
     match (outcome.verdict, found.is_empty()) {
+        (Verdict::Inconclusive, _) if !is_fitted => "No verdict: the final fit failed".to_owned(),
         (Verdict::Inconclusive, _) => "The logs do not allow a verdict".to_owned(),
         (_, false) => format!("The model lacks {}", listed(&found)),
         (Verdict::Unexplained, true) => {

@@ -160,6 +160,7 @@ pub(super) fn parameter(parameter: &Parameter) -> ParameterEntry {
         ci95: parameter.ci95,
         unit: parameter.unit.clone(),
         identifiable: parameter.ci95.is_some_and(narrow),
+        at_bound: parameter.ci95.is_some() && parameter.bounds.contains(&parameter.value),
     }
 }
 
@@ -289,11 +290,13 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
         unscored_s: outcome.given.unscored_s.clone(),
         declared: model(&errors.declared),
         before: model(&errors.before),
+        with_friction: errors.with_friction.as_ref().map(model),
         after: model(&errors.after),
         zeroed: errors.zeroed.as_ref().map(model),
         hybrid: errors.hybrid.as_ref().map(model),
         against: errors.against.iter().map(contender).collect(),
         reduction_ci95: errors.reduction_ci95,
+        by_log: errors.by_log.clone(),
         integrator_step_s: errors.before.step_s.min(errors.after.step_s),
     }
 }
@@ -359,6 +362,7 @@ impl From<TorqueErrors> for TorqueEntry {
         Self {
             as_declared: errors.declared,
             before: errors.before,
+            with_friction: errors.with_friction,
             after: errors.after,
             reduction_ci95: errors.reduction_ci95,
         }

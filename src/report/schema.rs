@@ -11,7 +11,8 @@ use super::by_log::{OfLogEntry, RangeEntry};
 use super::calibration::CalibrationEntry;
 use super::shown::ShownEntry;
 use crate::closeloop::{
-    Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, Unexplained, Verdict,
+    Curve, NetworkCheck, Proposal, Separation, Settings, Space, SplitMethod, TestLog, Unexplained,
+    Verdict,
 };
 use crate::data::{Finding as AuditFinding, Joint, Severity};
 use crate::runs::Call;
@@ -170,6 +171,8 @@ pub(super) struct ParameterEntry {
     pub unit: String,
     /// whether the interval is narrower than the parameter's magnitude
     pub identifiable: bool,
+    /// whether the fit ended at a bound of the parameter's range: the logs ask for a value beyond it
+    pub at_bound: bool,
 }
 
 /// value and ci95 are those of the final fit
@@ -293,6 +296,8 @@ pub(super) struct CombinationEntry {
 pub(super) struct TorqueEntry {
     pub as_declared: TorqueError,
     pub before: TorqueError,
+    /// with Coulomb and viscous friction on every joint, fitted; null where the declared model has both
+    pub with_friction: Option<TorqueError>,
     pub after: TorqueError,
     /// 95 % interval of the relative reduction of the error, before to after
     pub reduction_ci95: Option<[f64; 2]>,
@@ -310,7 +315,10 @@ pub(super) struct ErrorEntry {
     pub declared: ModelError,
     /// the declared model, its own parameters fitted
     pub before: ModelError,
-    /// the same with the effects added, refitted
+    /// the declared model with Coulomb and viscous friction on every joint, fitted: what most would try first; null where it
+    /// has both
+    pub with_friction: Option<ModelError>,
+    /// the declared model with the effects added, refitted
     pub after: ModelError,
     /// the same with the zeros of each test log's sensors estimated on its first second, scored on the rest; null where
     /// no zero differs from log to log
@@ -321,6 +329,8 @@ pub(super) struct ErrorEntry {
     pub against: Vec<ContenderEntry>,
     /// 95 % interval of the relative reduction of the position error, before to after; null where the logs are too few
     pub reduction_ci95: Option<[f64; 2]>,
+    /// the errors that are compared, on each test log; empty for a single one
+    pub by_log: Vec<TestLog>,
     /// integrator step of the declared model or of that with effects, the shorter one, s
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub integrator_step_s: f64,

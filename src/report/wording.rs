@@ -9,6 +9,7 @@ use crate::model::{OwnValue, Parameter};
 /// The models that a report compares, by one name each in tables, plots and on the terminal.
 pub(super) const AS_WRITTEN: &str = "declared model as written";
 pub(super) const FITTED: &str = "declared model, fitted";
+pub(super) const WITH_FRICTION: &str = "with usual friction";
 pub(super) const WITH_EFFECTS: &str = "with effects";
 pub(super) const ZEROED: &str = "with effects, zeroed";
 pub(super) const WITH_NETWORK: &str = "with effects and network";
@@ -67,13 +68,16 @@ pub(super) fn value(parameter: &ParameterEntry) -> String {
     format!("{} = {}", parameter.name, amount(parameter))
 }
 
-/// `0.1598 N m (0.1593 to 0.1603)`; a value that holds in one log alone names it.
+/// `0.1598 N m (0.1593 to 0.1603)`; a value that holds in one log alone names it, and one at a bound of its range says so.
 pub(super) fn amount(parameter: &ParameterEntry) -> String {
-    let amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
-    match &parameter.log {
-        Some(log) => format!("{amount} in {log}"),
-        None => amount,
+    let mut amount = amount_of(parameter.value, parameter.ci95, &parameter.unit);
+    if let Some(log) = &parameter.log {
+        amount += &format!(" in {log}");
     }
+    if parameter.at_bound {
+        amount += ", at the bound of its range";
+    }
+    amount
 }
 
 /// The same of a number with its interval and unit.

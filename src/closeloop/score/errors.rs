@@ -1,6 +1,7 @@
 use rand::Rng;
 
 use super::bootstrap::{interval, reduction_interval};
+use super::test_log::TestLog;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::request::Reference;
 use crate::closeloop::settings::ScoreSettings;
@@ -16,6 +17,9 @@ pub struct Errors {
     pub declared: Assessment,
     /// The declared model, fitted.
     pub before: Assessment,
+    /// The declared model with Coulomb and viscous friction on every joint, fitted: what most would try first. `None` where it
+    /// has both already, and where no effects are looked for.
+    pub with_friction: Option<Assessment>,
     /// With the effects that were found, fitted.
     pub after: Assessment,
     /// The same with the zeros of each test log's sensors estimated on its beginning, scored on the rest; where a zero
@@ -27,6 +31,8 @@ pub struct Errors {
     pub against: Vec<(String, Assessment)>,
     /// Of the torques that the logged motion needs; where the model has torques.
     pub torque: Option<TorqueErrors>,
+    /// Of the two fitted models on each test log; empty for a single one.
+    pub by_log: Vec<TestLog>,
     /// 95 % interval of the relative reduction of the position error, before to after.
     pub reduction_ci95: Option<[f64; 2]>,
 }
@@ -37,6 +43,8 @@ pub struct TorqueErrors {
     /// Of the declared model with the values in its file.
     pub declared: TorqueError,
     pub before: TorqueError,
+    /// With Coulomb and viscous friction on every joint, fitted.
+    pub with_friction: Option<TorqueError>,
     pub after: TorqueError,
     /// 95 % interval of the relative reduction, before to after.
     pub reduction_ci95: Option<[f64; 2]>,
@@ -52,6 +60,21 @@ impl Errors {
     }
 }
 
+/// The models that are compared.
+#[derive(Clone, Copy)]
+pub(in crate::closeloop) struct Scored<'m> {
+    /// By which errors.
+    pub space: Space,
+    /// With the values in its file.
+    pub declared: &'m Model,
+    pub before: &'m Fitted,
+    /// The declared model with the usual friction.
+    pub with_friction: Option<&'m Fitted>,
+    pub after: &'m Fitted,
+    pub hybrid: Option<&'m Dynamics>,
+    pub against: &'m [Reference],
+}
+
 /// Scores models on the test logs.
 pub(in crate::closeloop) struct Scorer<'a> {
     pub test: &'a [Log],
@@ -59,39 +82,35 @@ pub(in crate::closeloop) struct Scorer<'a> {
 }
 
 impl Scorer<'_> {
-    /// Score the declared model as it is, before and after the effects were added, and what else is to be compared.
-    pub fn errors(
-        &self,
-        declared: &Model,
-        [before, after]: [&Fitted; 2],
-        hybrid: Option<&Dynamics>,
-        against: &[Reference],
-        rng: &mut impl Rng,
-    ) -> Errors {
+    /// Score each of them.
+    pub fn errors(&self, models: Scored<'_>, rng: &mut impl Rng) -> Errors {
         let scored = |other: &Reference| (other.name.clone(), self.as_it_is(&other.model));
-        let zeroed = self.zeroed(after);
-        let torque = self.torques([declared, &before.model, &after.model], rng);
-        let (before, after) = rayon::join(|| self.fitted(before), || self.fitted(after));
+        let torque = self.torques(models, rng);
+        let fitted = [models.before, models.after];
+        let (before, after) = rayon::join(|| self.fitted(fitted[0]), || self.fitted(fitted[1]));
         Errors {
-            declared: self.as_it_is(declared),
-            hybrid: hybrid.map(|model| self.dynamics(model)),
-            against: against.iter().map(scored).collect(),
+            declared: self.as_it_is(models.declared),
+            with_friction: models.with_friction.map(|model| self.fitted(model)),
+            hybrid: models.hybrid.map(|model| self.dynamics(model)),
+            against: models.against.iter().map(scored).collect(),
             reduction_ci95: reduction_interval(before.middle(), after.middle(), self.settings, rng),
-            zeroed,
+            zeroed: self.zeroed(models.after),
+            by_log: self.log_by_log(models.space, fitted, [&before, &after]),
             torque,
             before,
             after,
         }
     }
 
-    fn torques(&self, models: [&Model; 3], rng: &mut impl Rng) -> Option<TorqueErrors> {
-        let [declared, before, after] = models.map(|model| torque_error(model, self.test));
-        let (declared, before, after) = (declared?, before?, after?);
+    fn torques(&self, models: Scored<'_>, rng: &mut impl Rng) -> Option<TorqueErrors> {
+        let error = |model: &Model| torque_error(model, self.test);
+        let (before, after) = (error(&models.before.model)?, error(&models.after.model)?);
         let stretches = before.stretches.iter().copied();
         let blocks: Vec<(f64, f64)> = stretches.zip(after.stretches.iter().copied()).collect();
         Some(TorqueErrors {
             reduction_ci95: interval(&blocks, self.settings, rng),
-            declared,
+            declared: error(models.declared)?,
+            with_friction: models.with_friction.and_then(|model| error(&model.model)),
             before,
             after,
         })

@@ -14,6 +14,7 @@ mod quality;
 mod regressors;
 mod repeats;
 mod response;
+mod rest;
 mod stretches;
 mod table;
 
@@ -21,6 +22,7 @@ pub use channel::Channel;
 pub use compare::{MAX_LAG_S, TorqueLag, VelocityCheck};
 pub use demand::TorqueDemand;
 pub use joint::JointAudit;
+pub(crate) use misread::reversed_driving;
 pub use quality::{Audit, Finding, Remedy, Severity};
 pub use repeats::tell_repeats;
 pub use response::Response;
@@ -39,6 +41,25 @@ use super::statistics::{deviation, median};
 /// Works on any log that [`Log::read`] returns; quantities that need more rows or more motion than
 /// the log has are `None` or 0, as their documentation says.
 pub fn audit(log: &Log, columns: &Columns) -> Audit {
+    let mut audit = of_log(log, columns);
+    rest::tell_rest(std::slice::from_mut(&mut audit));
+    audit
+}
+
+/// Measures the quality of logs that are used together, as [`audit`] does that of each: a joint may rest in one that moves
+/// in another.
+pub fn audit_together<'l>(
+    logs: impl IntoIterator<Item = &'l Log>,
+    columns: &Columns,
+) -> Vec<Audit> {
+    let logs = logs.into_iter();
+    let mut audits: Vec<Audit> = logs.map(|log| of_log(log, columns)).collect();
+    rest::tell_rest(&mut audits);
+    audits
+}
+
+/// What a log alone tells.
+fn of_log(log: &Log, columns: &Columns) -> Audit {
     let (meant, misread) = misread::as_meant(log, columns);
     let mut audit = measured(&meant.log, meant.joints);
     let findings = findings::of(&audit, &meant.log);

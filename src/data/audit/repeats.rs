@@ -7,6 +7,9 @@ use crate::data::smooth::resampled;
 /// leaves that follows the same reference twice.
 const SAME: f64 = 0.02;
 
+/// No encoder repeats a motion as closely as this: the file does.
+const IDENTICAL: f64 = 1e-9;
+
 /// A log that is shorter than this share of another repeats no more than a part of it.
 const WHOLE: f64 = 0.8;
 
@@ -18,16 +21,26 @@ pub fn tell_repeats<'l>(logs: impl IntoIterator<Item = &'l Log>, audits: &mut [A
         let differs = |other: &&Log| Some((other.name(), difference(log, other)?));
         let mut alike = before.iter().filter_map(differs);
         if let Some((name, share)) = alike.find(|(_, share)| *share < SAME) {
-            let text = format!(
-                "the motion is that of {name} once more (the angles differ by {} % of it): one of the two as a test of the \
-                 other tells how well torques repeat, and nothing of other motions",
-                short(100.0 * share)
-            );
-            audit.add(Finding::new(Severity::Warning, text));
+            audit.add(finding(&name, share));
             audit.repeats = Some(name);
         }
         before.push(log);
     }
+}
+
+fn finding(name: &str, share: f64) -> Finding {
+    if share < IDENTICAL {
+        let text = format!(
+            "every angle is that of {name}: this is the same log once more, and no test of what was fitted to the other"
+        );
+        return Finding::new(Severity::Serious, text);
+    }
+    let text = format!(
+        "the motion is that of {name} once more (the angles differ by {} % of it): one of the two as a test of the other tells \
+         how well torques repeat, and nothing of other motions",
+        short(100.0 * share)
+    );
+    Finding::new(Severity::Warning, text)
 }
 
 /// Difference of the angles of two logs, each in the time since its start, as a share of their motion; `None` where they
@@ -62,7 +75,7 @@ fn mean_square(numbers: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::tell_repeats;
-    use crate::data::{Columns, Log, audit};
+    use crate::data::{Audit, Columns, Log, audit};
 
     /// Two joints on sines of this frequency, from this time on.
     fn log(name: &str, start: f64, frequency: f64, off: f64) -> Log {
@@ -87,16 +100,20 @@ mod tests {
             log("b.csv", 5.0, 2.0, 0.004),
             log("c.csv", 0.0, 2.3, 0.0),
             log("d.csv", 0.0, 2.0, 0.1),
+            log("e.csv", 7.0, 2.3, 0.0),
         ];
         let mut audits: Vec<_> = logs
             .iter()
             .map(|log| audit(log, &Columns::default()))
             .collect();
         tell_repeats(&logs, &mut audits);
-        let told = audits.iter().map(|audit| {
-            let mut findings = audit.findings.iter();
-            findings.any(|finding| finding.text.contains("motion is that of a.csv once more"))
-        });
-        assert_eq!(told.collect::<Vec<_>>(), [false, true, false, false]);
+        let told = |words: &str| -> Vec<bool> {
+            let says = |audit: &Audit| audit.findings.iter().any(|f| f.text.contains(words));
+            audits.iter().map(says).collect()
+        };
+        let repeats = told("the motion is that of a.csv once more");
+        assert_eq!(repeats, [false, true, false, false, false]);
+        let is_same = told("every angle is that of c.csv");
+        assert_eq!(is_same, [false, false, false, false, true]);
     }
 }

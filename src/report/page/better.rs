@@ -3,12 +3,14 @@
 use maud::{Markup, html};
 
 use super::Section;
+use crate::closeloop::TestLog;
 use crate::data::Joint;
 use crate::report::accuracy::{
-    compared, diverged, position_unit, removed, removed_of_motion, repeated, scored,
+    compared, compared_on_logs, diverged, position_unit, removed, removed_of_motion, repeated,
+    scored, scored_torques, uneven, zeroed_in_vain,
 };
 use crate::report::schema::{Report, TorqueEntry};
-use crate::report::wording::{AS_WRITTEN, FITTED, WITH_EFFECTS, small};
+use crate::report::wording::{FITTED, WITH_EFFECTS, WITH_FRICTION, capitalised, small};
 
 pub(super) fn section(report: &Report) -> Section {
     let torque = report
@@ -26,7 +28,12 @@ pub(super) fn section(report: &Report) -> Section {
         answer: html! {
             p { "All errors are on the test logs, to which nothing was fitted. \u{201c}" (FITTED) "\u{201d} has its own parameters "
                 "fitted and no effect added: the fair \u{201c}before\u{201d} of every comparison. " (compared(report)) }
+            @if report.error.with_friction.is_some() {
+                p { "\u{201c}" (capitalised(WITH_FRICTION)) "\u{201d} has Coulomb and viscous friction on every joint as well: what "
+                    "most would try first." }
+            }
             @for table in ordered.iter().flatten() { (table) }
+            @if !report.error.by_log.is_empty() { (of_test_logs(report)) }
         },
     }
 }
@@ -39,23 +46,23 @@ fn ratio(after: f64, before: f64) -> Markup {
 }
 
 fn of_torques(report: &Report, errors: &TorqueEntry) -> Markup {
-    let models = [&errors.as_declared, &errors.before, &errors.after];
+    let models = scored_torques(errors);
     html! {
         h3 { "Torques that the motion needs" }
         p { "Root mean square of their difference from the logged ones, both low-passed, in N m (N where a joint slides)." }
         div.table tabindex="0" { table {
-            thead { tr { th { "joint" } @for name in [AS_WRITTEN, FITTED, WITH_EFFECTS] { th { (name) } } th { "with effects / fitted" } } }
+            thead { tr { th { "joint" } @for (name, _) in &models { th { (name) } } th { "with effects / fitted" } } }
             tbody {
                 @for joint in Joint::all(report.joints) {
                     tr {
                         th scope="row" { (report.label(joint)) }
-                        @for model in models { td { (small(model.rms[joint])) } }
+                        @for (_, model) in &models { td { (small(model.rms[joint])) } }
                         (ratio(errors.after.rms[joint], errors.before.rms[joint]))
                     }
                 }
                 tr {
                     th scope="row" { "all, share of the logged torques" }
-                    @for model in models { td { (format!("{:.2} %", 100.0 * model.relative)) } }
+                    @for (_, model) in &models { td { (format!("{:.2} %", 100.0 * model.relative)) } }
                     (ratio(errors.after.relative, errors.before.relative))
                 }
             }
@@ -88,9 +95,32 @@ fn of_motion(report: &Report) -> Markup {
                 }
             }
         } }
-        @if let Some(removed) = removed_of_motion(error) { p { (removed) } }
+        @for said in [removed_of_motion(error), uneven(report), zeroed_in_vain(error)].iter().flatten() { p { (said) } }
         @for (name, model) in &models {
             @if let Some(diverged) = diverged(name, model) { p { (diverged) } }
         }
+    }
+}
+
+fn of_test_logs(report: &Report) -> Markup {
+    html! {
+        h3 { "Log by log" }
+        p { (compared_on_logs(report)) }
+        div.table tabindex="0" { table {
+            thead { tr { @for name in ["log", "joint", FITTED, WITH_EFFECTS, "with effects / fitted"] { th { (name) } } } }
+            tbody {
+                @for TestLog { log, before, after } in &report.error.by_log {
+                    @for joint in Joint::all(report.joints) {
+                        tr {
+                            th scope="row" { (log) }
+                            th scope="row" { (report.label(joint)) }
+                            td { (small(before[joint])) }
+                            td { (small(after[joint])) }
+                            (ratio(after[joint], before[joint]))
+                        }
+                    }
+                }
+            }
+        } }
     }
 }

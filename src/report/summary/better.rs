@@ -3,14 +3,14 @@
 use super::{cut, listed};
 use crate::closeloop::Space;
 use crate::data::Joint;
-use crate::report::accuracy::position_unit;
+use crate::report::accuracy::{is_some_reduction, position_unit};
 use crate::report::schema::{ModelError, Report, TorqueEntry};
-use crate::report::wording::small;
+use crate::report::wording::{WITH_FRICTION, small};
 
 /// Rows of the table at most, beside that of all joints.
 const ROWS: usize = 7;
-/// Models of `--against` that are listed at most.
-const OTHERS: usize = 2;
+/// Other models that are listed at most.
+const OTHERS: usize = 3;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
     match (report.compared, &report.torque) {
@@ -25,7 +25,7 @@ fn table(title: &str, rows: Vec<String>, reduction: Option<[f64; 2]>) -> Vec<Str
         "",
         ["as written", "fitted", "with effects"].map(str::to_owned),
     );
-    let removed = reduction.map(|[low, high]| {
+    let removed = reduction.filter(is_some_reduction).map(|[low, high]| {
         format!(
             "  the effects remove {:.0} to {:.0} % of the fitted model's error (95 % interval)",
             100.0 * low,
@@ -53,6 +53,10 @@ fn of_torques(report: &Report, errors: &TorqueEntry) -> Vec<String> {
     let mut rows = listed(rows, ROWS, "joints");
     let share = models.map(|model| format!("{:.2} %", 100.0 * model.relative));
     rows.push(row("all, share of the logged torques", share));
+    let friction = errors.with_friction.as_ref();
+    rows.extend(
+        friction.map(|model| format!("  {WITH_FRICTION} alone: {:.2} %", 100.0 * model.relative)),
+    );
     table(
         "Torque errors on the test logs, N m",
         rows,
@@ -79,9 +83,12 @@ fn of_motion(report: &Report) -> Vec<String> {
     };
     let rows = horizons.flat_map(|h| Joint::all(report.joints).map(move |joint| (h, joint)));
     let rows = rows.map(|(h, joint)| of(h, joint)).collect();
-    let others: Vec<String> = (error.against.iter())
-        .map(|other| contender(report, &other.name, &other.error))
-        .collect();
+    let friction = error.with_friction.iter();
+    let friction =
+        friction.map(|model| contender(report, &format!("{WITH_FRICTION} alone"), model));
+    let others = (error.against.iter())
+        .map(|other| contender(report, &format!("{}, no fit", other.name), &other.error));
+    let others: Vec<String> = friction.chain(others).collect();
     let others = listed(others, OTHERS, "models");
     let rows = listed(rows, ROWS - others.len(), "joints");
     let title = format!(
@@ -91,7 +98,7 @@ fn of_motion(report: &Report) -> Vec<String> {
     table(&title, [rows, others].concat(), error.reduction_ci95)
 }
 
-/// A model that was scored as it is, at the middle horizon.
+/// Another model, at the middle horizon.
 fn contender(report: &Report, name: &str, model: &ModelError) -> String {
     let (middle, horizon_s) = report.error.middle();
     let errors: Vec<String> = model.position_rmse[middle]
@@ -99,7 +106,7 @@ fn contender(report: &Report, name: &str, model: &ModelError) -> String {
         .map(|e| small(*e))
         .collect();
     cut(&format!(
-        "  {name}, no fit, {horizon_s} s ahead: {}",
+        "  {name}, {horizon_s} s ahead: {}",
         errors.join(", ")
     ))
 }

@@ -6,7 +6,7 @@ mod stuck;
 mod torque;
 mod velocity;
 
-use super::joint::{JointAudit, VISIBLE_STEPS};
+use super::joint::JointAudit;
 use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::column::Quantity;
@@ -56,7 +56,7 @@ pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
         } else if !passive {
             found.about_torque(joint, audit, log);
         }
-        if found.moves(joint) {
+        if joint.moves() {
             found.about_excitation(joint);
             found.about_angle(joint, log);
             found.about_jumps(joint, log);
@@ -194,23 +194,6 @@ impl Found {
                 (motion_s / 0.5).floor()
             ),
         );
-    }
-
-    /// Whether a joint moves at all; says so if not.
-    fn moves(&mut self, joint: &JointAudit) -> bool {
-        if !joint.moves() {
-            self.add_of(
-                joint,
-                Serious,
-                format!(
-                    "joint {} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or noise \
-                     deviations: its parameters will not be identifiable from this log",
-                    joint.joint,
-                    short(joint.q.range())
-                ),
-            );
-        }
-        joint.moves()
     }
 
     fn about_excitation(&mut self, joint: &JointAudit) {

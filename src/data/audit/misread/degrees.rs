@@ -42,10 +42,21 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
         .flat_map(changes)
         .for_each(|change| change.apply(&mut log));
     let in_degrees = Reading::of(Cow::Owned(log));
-    let misread = |audit: &&JointAudit| {
+    let left = |audit: &JointAudit| {
         let left = |joints: &[JointAudit]| Some(1.0 - joints[audit.joint].response?.explained);
-        let (radians, degrees) = (left(&reading.joints)?, left(&in_degrees.joints)?);
-        (degrees < MUCH_BETTER * radians && degrees < radians - MUCH_MORE).then(|| {
+        Some((left(&reading.joints)?, left(&in_degrees.joints)?))
+    };
+    let is_beyond_doubt = |audit: &&JointAudit| {
+        let is_much_better = |(radians, degrees): (f64, f64)| {
+            degrees < MUCH_BETTER * radians && degrees < radians - MUCH_MORE
+        };
+        left(audit).is_some_and(is_much_better)
+    };
+    // One program writes all joints: where one is in degrees, another is that in degrees looks no worse.
+    let any = far.iter().any(is_beyond_doubt);
+    let misread = |audit: &&JointAudit| {
+        let (radians, degrees) = left(audit)?;
+        (any && degrees <= radians).then(|| {
             let q = &audit.q.name;
             Misread {
                 joint: Some(audit.joint),

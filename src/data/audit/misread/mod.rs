@@ -13,6 +13,7 @@ use std::borrow::Cow;
 
 use super::joint::{JointAudit, audit_joints};
 use super::quality::{Finding, Remedy, Severity};
+use super::table::short;
 use crate::data::column::{Quantity, unwrap};
 use crate::data::columns::Columns;
 use crate::data::local_cubic::slopes;
@@ -73,6 +74,31 @@ pub(super) fn as_meant<'l>(log: &'l Log, columns: &Columns) -> (Reading<'l>, Vec
     }
     let findings = with_remedies(&found, columns, log.joints());
     (reading, findings)
+}
+
+/// That what drives all joints has the opposite sign: reversed, it leaves the declared model this share of its error.
+pub fn reversed_driving(
+    share: f64,
+    columns: &Columns,
+    driven_by: Quantity,
+    joints: usize,
+) -> Finding {
+    let opposite = |joint| Change {
+        quantity: driven_by,
+        joint: Some(joint),
+        to: To::Opposite,
+    };
+    let key = driven_by.key();
+    let misread = Misread {
+        joint: None,
+        text: format!(
+            "with every {key} reversed, the declared model with friction leaves {} % of the error that it leaves as it is: all of \
+             them look like the opposite of what the model means",
+            short(100.0 * share)
+        ),
+        changes: Joint::all(joints).map(opposite).collect(),
+    };
+    with_remedies(&[misread], columns, joints).remove(0)
 }
 
 impl<'l> Reading<'l> {

@@ -1,0 +1,50 @@
+//! Whether the logs drive the joints the other way round than the model does.
+
+use super::fitted::Fitted;
+use super::study::Study;
+use crate::data::{Audit, Log, reversed_driving};
+use crate::model::Effect;
+
+/// The torques have the opposite sign where the model leaves this share of its loss with all of them reversed: half the error.
+const MUCH_LESS: f64 = 0.25;
+
+impl Study<'_> {
+    /// Add to the audits of the study's logs that their torques, or commands, look reversed on all joints at once. The audit
+    /// of a log alone tells so of single joints, where the acceleration follows them closely; here the model tells.
+    pub(super) fn tell_reversed(
+        &self,
+        library: &[Effect],
+        usual: Option<&Fitted>,
+        audits: &mut [Audit],
+    ) {
+        if !self.moves() {
+            return;
+        }
+        let reversed: Vec<Log> = self.logs.iter().map(reversed).collect();
+        let other = self.on(&reversed).with_usual_friction(library);
+        let (Some(usual), Some(other)) = (usual, other) else {
+            return;
+        };
+        let share = other.loss() / usual.loss().max(f64::MIN_POSITIVE);
+        if share < MUCH_LESS {
+            let columns = &self.declared.columns;
+            let driven_by = self.declared.driven_by();
+            for audit in audits {
+                audit.add(reversed_driving(
+                    share.sqrt(),
+                    columns,
+                    driven_by,
+                    self.declared.joints,
+                ));
+            }
+        }
+    }
+}
+
+fn reversed(log: &Log) -> Log {
+    let mut log = log.clone();
+    for value in log.tau.iter_mut().flatten() {
+        *value = -*value;
+    }
+    log
+}

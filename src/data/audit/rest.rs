@@ -1,0 +1,77 @@
+//! Joints that rest: nothing is learned of one that rests in all logs that are used together.
+
+use super::joint::VISIBLE_STEPS;
+use super::quality::{Audit, Finding, Severity};
+use super::table::short;
+use crate::data::Joint;
+
+/// Say of each log which joints do not move in it. That is serious where none of the other logs moves the joint.
+pub(super) fn tell_rest(audits: &mut [Audit]) {
+    let joints = audits.iter().map(|audit| audit.joints.len()).max();
+    for joint in Joint::all(joints.unwrap_or(0)) {
+        let moves = |audit: &Audit| Some(audit.joints.get(joint.index())?.moves());
+        let is_moved = audits.iter().any(|audit| moves(audit) == Some(true));
+        let resting = audits
+            .iter_mut()
+            .filter(|audit| moves(audit) == Some(false));
+        for audit in resting {
+            let range = audit.joints[joint].q.range();
+            audit.add(finding(joint, range, is_moved));
+        }
+    }
+}
+
+fn finding(joint: Joint, range: f64, is_moved_by_others: bool) -> Finding {
+    let (severity, therefore) = match is_moved_by_others {
+        true => (Severity::Info, "the other logs tell its parameters"),
+        false => (Severity::Serious, "nothing tells its parameters"),
+    };
+    let text = format!(
+        "joint {joint} moves by {} rad, less than {VISIBLE_STEPS} resolution steps or noise deviations: {therefore}",
+        short(range)
+    );
+    Finding::new(severity, text).of(joint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::audit_together;
+    use crate::data::{Columns, Log, Severity};
+
+    /// Two joints, of which the second moves so far.
+    fn log(name: &str, second: f64) -> Log {
+        let mut log = Log::empty(2);
+        log.path = name.into();
+        for row in 0..600 {
+            let t = 0.01 * f64::from(row);
+            log.time.push(t);
+            for (j, amplitude) in [1.0, second].into_iter().enumerate() {
+                log.q[j].push(amplitude * (2.0 * t).sin());
+                log.qd[j].push(2.0 * amplitude * (2.0 * t).cos());
+                log.tau[j].push(amplitude * (2.0 * t).cos());
+            }
+        }
+        log
+    }
+
+    fn told(logs: &[Log]) -> Vec<Vec<Severity>> {
+        let audits = audit_together(logs, &Columns::default());
+        let of_log = |audit: super::Audit| {
+            let findings = audit.findings.into_iter();
+            let rest = findings.filter(|finding| finding.text.contains("joint 2 moves by"));
+            rest.map(|finding| finding.severity).collect()
+        };
+        audits.into_iter().map(of_log).collect()
+    }
+
+    #[test]
+    fn a_joint_that_rests_in_one_log_is_serious_where_no_other_moves_it() {
+        let (moves, rests) = (log("moves.csv", 0.5), log("rests.csv", 0.0));
+        assert_eq!(told(&[rests.clone()]), [[Severity::Serious]]);
+        assert_eq!(
+            told(&[rests.clone(), rests.clone()]),
+            [[Severity::Serious], [Severity::Serious]]
+        );
+        assert_eq!(told(&[moves, rests]), [vec![], vec![Severity::Info]]);
+    }
+}
