@@ -23,6 +23,7 @@ mod export_fmu;
 mod front_door;
 mod functions;
 mod gradients;
+mod guide;
 mod identify;
 mod interrupts;
 mod log_formats;
