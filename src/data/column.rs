@@ -91,6 +91,9 @@ pub struct Column {
     pub factor: f64,
     /// Of an angle: the file starts each full turn anew, as from -pi to pi. Full turns are then counted.
     pub wrapped: bool,
+    /// How long before the times of their rows the values were taken, s: another clock, a bus, a filter. Below zero for values
+    /// that are of a later time.
+    pub late_s: f64,
 }
 
 impl Column {
@@ -101,6 +104,7 @@ impl Column {
             unit: None,
             factor: 1.0,
             wrapped: false,
+            late_s: 0.0,
         }
     }
 
@@ -132,6 +136,7 @@ impl fmt::Display for Column {
             unit,
             factor,
             wrapped,
+            late_s,
         } = self;
         if *self == Self::named(name.as_str()) {
             return write!(f, "{name:?}");
@@ -145,6 +150,9 @@ impl fmt::Display for Column {
         }
         if *wrapped {
             write!(f, ", wrapped = true")?;
+        }
+        if *late_s != 0.0 {
+            write!(f, ", late = {late_s}")?;
         }
         write!(f, " }}")
     }
@@ -176,11 +184,12 @@ mod tests {
             unit: Some("deg"),
             factor: -0.5,
             wrapped: true,
+            late_s: 0.004,
             ..Column::named("a b")
         };
         assert_eq!(
             column.to_string(),
-            "{ column = \"a b\", unit = \"deg\", factor = -0.5, wrapped = true }"
+            "{ column = \"a b\", unit = \"deg\", factor = -0.5, wrapped = true, late = 0.004 }"
         );
         let scale = column.scale(Quantity::Angle);
         assert!((scale + PI / 360.0).abs() < 1e-15);

@@ -165,6 +165,7 @@ pub(super) struct Cell {
     pub index: usize,
     pub scale: f64,
     pub wrapped: bool,
+    pub late_s: f64,
 }
 
 /// Words in the names of columns that hold torques or commands, and of those that hold velocities.
@@ -189,6 +190,14 @@ pub(super) struct Layout {
     pub tau: Option<Vec<Cell>>,
     /// Names of the columns that nothing reads.
     pub ignored: Vec<String>,
+}
+
+impl Layout {
+    /// How late each channel is, s.
+    pub fn late_s(&self) -> impl Iterator<Item = f64> {
+        let driven = self.qd.iter().chain(&self.tau).flatten();
+        self.q.iter().chain(driven).map(|cell| cell.late_s)
+    }
 }
 
 impl Header<'_> {
@@ -277,6 +286,7 @@ impl Header<'_> {
                 index,
                 scale: wanted.scale(quantity),
                 wrapped: wanted.wrapped,
+                late_s: wanted.late_s,
             }),
             (Some(_), Some(_)) => Err(LogError::DuplicateColumn {
                 path,
@@ -363,11 +373,12 @@ mod tests {
     }
 
     fn cell(index: usize) -> Cell {
-        let (scale, wrapped) = (1.0, false);
+        let (scale, wrapped, late_s) = (1.0, false, 0.0);
         Cell {
             index,
             scale,
             wrapped,
+            late_s,
         }
     }
 

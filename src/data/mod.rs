@@ -17,6 +17,7 @@ mod error;
 mod joint;
 mod jumps;
 mod lag;
+mod late;
 pub mod leave_out;
 mod local_cubic;
 mod log;

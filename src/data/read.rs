@@ -6,6 +6,7 @@ use std::path::Path;
 use super::column::unwrap;
 use super::columns::{Cell, Columns, Header, Layout, joints};
 use super::error::{CellFault, LogError};
+use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
 use super::table::{Table, open};
@@ -79,7 +80,6 @@ pub(super) fn log(
         };
         (0..rows).map(number).collect()
     };
-    let channel = |cells: &[Cell]| cells.iter().map(column).collect::<Result<Vec<_>, _>>();
     let time = column(&layout.time)?;
     if let Some(previous) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
         let late = CellFault::NotLater {
@@ -89,23 +89,24 @@ pub(super) fn log(
         };
         return Err(fault(previous + 1, layout.time.index, late));
     }
-    let mut q = channel(&layout.q)?;
     let mut notes = [table.notes().to_vec(), notes(&layout)].concat();
-    for (angles, cell) in q.iter_mut().zip(&layout.q).filter(|(_, cell)| cell.wrapped) {
-        let (name, passed) = (&header.names[cell.index], unwrap(angles, TAU));
-        notes.push(format!(
-            "{name} passes the end of its turn {passed} times: full turns are counted"
-        ));
-    }
-    Ok(Log {
-        qd: match &layout.qd {
-            Some(qd) => channel(qd)?,
-            None => q.iter().map(|q| slopes(&time, q)).collect(),
-        },
-        tau: match &layout.tau {
-            Some(tau) => channel(tau)?,
-            None => vec![vec![0.0; time.len()]; joints],
-        },
+    let mut values = |cell: &Cell| -> Result<Vec<f64>, LogError> {
+        let mut values = column(cell)?;
+        if cell.wrapped {
+            let (name, passed) = (&header.names[cell.index], unwrap(&mut values, TAU));
+            notes.push(format!(
+                "{name} passes the end of its turn {passed} times: full turns are counted"
+            ));
+        }
+        Ok(late::undone(&time, values, cell.late_s))
+    };
+    let mut channel = |cells: &[Cell]| cells.iter().map(&mut values).collect::<Result<Vec<_>, _>>();
+    let q = channel(&layout.q)?;
+    let qd = layout.qd.as_deref().map(&mut channel).transpose()?;
+    let tau = layout.tau.as_deref().map(&mut channel).transpose()?;
+    let log = Log {
+        qd: qd.unwrap_or_else(|| q.iter().map(|q| slopes(&time, q)).collect()),
+        tau: tau.unwrap_or_else(|| vec![vec![0.0; time.len()]; joints]),
         driven_by: columns.driven_by,
         masked: vec![vec![]; joints],
         filled: vec![],
@@ -114,7 +115,15 @@ pub(super) fn log(
         leave_out: vec![],
         notes,
         path,
-    })
+    };
+    let log = late::cut(log, layout.late_s());
+    match log.rows() {
+        rows @ (0 | 1) => Err(LogError::TooFewRows {
+            path: log.path,
+            rows,
+        }),
+        _ => Ok(log),
+    }
 }
 
 fn notes(layout: &Layout) -> Vec<String> {
@@ -219,6 +228,33 @@ mod tests {
         assert!((log.time[1] - 0.01).abs() < 1e-15);
         assert!((log.q[0][1].to_degrees() - 190.0).abs() < 1e-9);
         assert_eq!((log.qd[0][1], log.tau[0][1]), (1.0, -12.0));
+    }
+
+    #[test]
+    fn a_late_column_is_moved_and_rows_without_a_value_are_dropped() {
+        let columns = Columns {
+            tau: vec![Column {
+                late_s: 0.5,
+                ..Column::named("tau1")
+            }],
+            ..Columns::default()
+        };
+        let text = "time,q1,qd1,tau1\n0,1,0,0\n1,2,0,10\n2,3,0,20\n3,4,0,30\n";
+        let log = read_as(text, 1, &columns).unwrap();
+        assert_eq!(log.time, [0.0, 1.0, 2.0]);
+        assert_eq!(
+            (&log.q[0], &log.tau[0]),
+            (&vec![1.0, 2.0, 3.0], &vec![5.0, 15.0, 25.0])
+        );
+        let columns = Columns {
+            tau: vec![Column {
+                late_s: 2.5,
+                ..Column::named("tau1")
+            }],
+            ..columns
+        };
+        let few = read_as(text, 1, &columns).unwrap_err().to_string();
+        assert!(few.contains("has 1 row(s)"), "{few}");
     }
 
     #[test]

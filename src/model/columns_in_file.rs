@@ -3,7 +3,7 @@
 use super::reader::{FileError, NameOrTable, Section};
 use crate::data::{Column, Columns, Quantity};
 
-const KEYS: &[&str] = &["column", "unit", "factor", "wrapped"];
+const KEYS: &[&str] = &["column", "unit", "factor", "wrapped", "late"];
 
 pub(super) fn columns(
     section: Option<Section<'_>>,
@@ -66,7 +66,7 @@ fn list(
     columns.collect::<Result<_, _>>().map(Some)
 }
 
-/// `"position"`, or `{ column = "position", unit = "deg", factor = -1, wrapped = true }`.
+/// `"position"`, or `{ column = "position", unit = "deg", factor = -1, wrapped = true, late = 0.004 }`.
 fn column(entry: NameOrTable<'_>, quantity: Quantity) -> Result<Column, FileError> {
     let table = match entry {
         NameOrTable::Name(name) => return Ok(Column::named(name.value)),
@@ -81,11 +81,17 @@ fn column(entry: NameOrTable<'_>, quantity: Quantity) -> Result<Column, FileErro
     if factor == 0.0 || !factor.is_finite() || (factor < 0.0 && quantity == Quantity::Time) {
         return Err(table.error_at("factor", format!("`factor` cannot be {factor} here")));
     }
+    let late_s = table.number("late")?.unwrap_or(0.0);
+    if !late_s.is_finite() || (late_s != 0.0 && quantity == Quantity::Time) {
+        let message = "`late` is a time in s, of columns other than `time`";
+        return Err(table.error_at("late", message));
+    }
     Ok(Column {
         name: table.required_text("column")?.value,
         unit: unit(&table, quantity)?,
         factor,
         wrapped,
+        late_s,
     })
 }
 

@@ -3,13 +3,14 @@
 use super::paragraph;
 use crate::report::calibration;
 use crate::report::remainder::{proposal_line, structure};
-use crate::report::schema::Report;
+use crate::report::schema::{EffectEntry, Report};
 
 /// Remarks beside what is left.
 const REMARKS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
     let remarks = [
+        harmful(report),
         calibrated(report),
         held(report),
         rivals(report),
@@ -24,6 +25,25 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
         .flatten()
         .chain(remarks)
         .collect()
+}
+
+/// Effects that are told by the training logs, and raise the error on the test logs by more than a percent.
+fn harmful(report: &Report) -> Option<String> {
+    let raise = |effect: &EffectEntry| {
+        let rise = -effect.error_reduction?;
+        let told = || {
+            format!(
+                "{} on joint {} (by {:.0} %)",
+                effect.title,
+                effect.place,
+                100.0 * rise
+            )
+        };
+        (rise > 0.01).then(told)
+    };
+    let effects: Vec<String> = report.effects.iter().filter_map(raise).collect();
+    (!effects.is_empty())
+        .then(|| format!("raise the error on the test logs: {}", effects.join(", ")))
 }
 
 fn calibrated(report: &Report) -> Option<String> {
