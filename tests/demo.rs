@@ -54,6 +54,33 @@ fn the_true_value_lies_inside_its_interval() {
 }
 
 #[test]
+fn the_effect_is_drawn_by_its_formula_with_its_interval() {
+    let (report, _folder) = demo("0");
+    let parameter = &report["effects"][0]["parameters"][0];
+    let curve = &report["shown"]["residuals"][0]["effects"][0];
+    assert_eq!(
+        (&curve["variable"], &curve["effects"]),
+        (&"qd".into(), &serde_json::json!(["coulomb_friction"]))
+    );
+    let ends = |of: &Value| -> [f64; 2] {
+        let all: Vec<f64> = serde_json::from_value(of.clone()).unwrap();
+        [all[0], all[all.len() - 1]]
+    };
+    let [backwards, forwards] = ends(&curve["x"]);
+    assert!(backwards < 0.0 && 0.0 < forwards, "{curve}");
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-4;
+    let size = parameter["value"].as_f64().unwrap();
+    let [against, along] = ends(&curve["force"]);
+    assert!(near(against, size) && near(along, -size), "{curve}");
+    let interval = ends(&parameter["ci95"]);
+    let band = [ends(&curve["low"])[0], ends(&curve["high"])[0]];
+    assert!(
+        near(band[0], interval[0]) && near(band[1], interval[1]),
+        "{curve}"
+    );
+}
+
+#[test]
 fn the_same_seed_gives_the_same_report() {
     let [(first, _a), (second, _b)] = ["3", "3"].map(demo);
     assert_eq!(without_call(first), without_call(second));

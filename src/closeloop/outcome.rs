@@ -13,7 +13,7 @@ use super::stage::Stage;
 use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
-use crate::identify::{BodiesTold, FitError, Identifiability};
+use crate::identify::{BodiesTold, FitError, Identifiability, Uncertainty};
 use crate::model::{Model, Parameter};
 
 /// Everything that closing the loop found out.
@@ -65,6 +65,8 @@ pub struct Models {
     pub before: Fitted,
     /// With the effects that were found, and with 95 % intervals.
     pub after: Fitted,
+    /// How well the fit of `after` determines its values.
+    pub uncertainty: Uncertainty,
     /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
     /// else empty.
     pub moved_to: Vec<Parameter>,

@@ -22,6 +22,8 @@ pub(super) struct Refined<'a> {
     pub identifiability: Identifiability,
     /// Of the bodies of a chain, where torques were compared.
     pub bodies: BodiesTold,
+    /// How well the fit of the chosen model determines its values.
+    pub uncertainty: Uncertainty,
     /// Why the steps are not fine, if they are not.
     pub failure: Option<FitError>,
 }
@@ -54,6 +56,7 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
     after.model = with_intervals(&study, &after, &uncertainty, &chosen.model);
     Refined {
         bodies,
+        uncertainty,
         study,
         before,
         after,

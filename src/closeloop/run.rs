@@ -167,6 +167,7 @@ fn models_of(study: &Study<'_>, refined: Refined<'_>) -> Models {
         before: refined.before,
         after: refined.after,
         bodies: refined.bodies,
+        uncertainty: refined.uncertainty,
         moved_to: study.moved_to.clone(),
         identifiability: study.identifiability.clone(),
     }

@@ -172,6 +172,16 @@ impl Uncertainty {
         quantiles.fold(0.0, f64::max) * variance.max(0.0).sqrt()
     }
 
+    /// Correlation of the i-th and the j-th column; 0 between two where one is not determined.
+    pub fn correlation(&self, i: usize, j: usize) -> f64 {
+        let variances = self.covariance[(i, i)] * self.covariance[(j, j)];
+        match self.covariance[(i, j)] / variances.sqrt() {
+            _ if i == j => 1.0,
+            found if found.is_finite() => found,
+            _ => 0.0,
+        }
+    }
+
     /// Two-sided p-value of the hypothesis that the i-th column is `null`, given `value`.
     pub fn p_value(&self, i: usize, value: f64, null: f64) -> f64 {
         let deviation = self.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();

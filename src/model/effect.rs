@@ -1,5 +1,5 @@
 use super::filter::CommandFilter;
-use crate::expr::{Formula, Graph, Program, Scope, SignForm, suggestion};
+use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
 
 /// What a formula of an effect may mention besides its parameters.
 pub const EFFECT_NAMES: [&str; 5] = ["q", "qd", "tau", "load", "t"];
@@ -153,6 +153,39 @@ impl Effect {
         Some(graph.finish(&[at_rest, inertia]))
     }
 
+    /// The variable that the force of the effect depends on, where that is one of `q`, `qd`, `tau` and `t` alone, with the force
+    /// and its derivatives by the parameters as a program of the variable and the parameters.
+    pub fn over_one_variable(&self) -> Option<(&'static str, Program)> {
+        let (formula, replaced) = match &self.entry {
+            Entry::Force(formula) => (formula, None),
+            Entry::Torque(formula) => (formula, Some("tau")),
+            _ => return None,
+        };
+        let names = formula.names();
+        let is_used = |name: &&str| names.contains(name) || replaced == Some(*name);
+        let used: Vec<&str> = EFFECT_NAMES.into_iter().filter(is_used).collect();
+        let [variable @ ("q" | "qd" | "tau" | "t")] = used[..] else {
+            return None;
+        };
+        let mut graph = Graph::new();
+        let parameters = || self.parameters.iter().map(|p| p.name.as_str());
+        let inputs = std::iter::once(variable).chain(parameters());
+        let scope = Scope::of_inputs(&mut graph, inputs);
+        let acting = scope.lower(&mut graph, formula);
+        let acting = acting.expect("formulas were checked when the file was read");
+        let force = match replaced.and_then(|name| scope.get(name)) {
+            Some(commanded) => graph.sub(acting, commanded),
+            None => acting,
+        };
+        let parameters: Vec<Node> = parameters().filter_map(|name| scope.get(name)).collect();
+        let one = graph.constant(1.0);
+        let slopes = graph.gradient(&[force], &[one], &parameters);
+        Some((
+            variable,
+            graph.finish(&[&[force], slopes.as_slice()].concat()),
+        ))
+    }
+
     /// The effect of this name.
     ///
     /// # Errors
@@ -257,5 +290,37 @@ impl EffectParameter {
     /// Whether the effect is absent at zero of this parameter.
     pub fn is_switch(&self) -> bool {
         self.starts == [0.0]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::Library;
+
+    /// The variable of a built-in effect, and its force there with the derivatives by the parameters.
+    fn over(name: &str, inputs: &[f64]) -> Option<(&'static str, Vec<f64>)> {
+        let library = Library::built_in();
+        let effect = library.effect(name).unwrap();
+        let (variable, program) = effect.over_one_variable()?;
+        Some((variable, program.eval(inputs)))
+    }
+
+    #[test]
+    fn effects_of_one_variable_are_curves_over_it() {
+        let dry = over("coulomb_friction", &[-2.0, 0.16]);
+        assert_eq!(dry, Some(("qd", vec![0.16, 1.0])));
+        // What the drive gives beside what it was told to give.
+        let gain = over("actuator_gain", &[3.0, 0.1]).unwrap();
+        assert_eq!((gain.0, gain.1[1]), ("tau", 3.0));
+        assert!((gain.1[0] - 0.3).abs() < 1e-12);
+        for other in [
+            "load_friction",
+            "constant_torque",
+            "rotor_inertia",
+            "backlash",
+            "actuator_delay",
+        ] {
+            assert_eq!(over(other, &[]), None, "{other}");
+        }
     }
 }

@@ -4,6 +4,7 @@ mod accuracy;
 mod bodies;
 mod by_log;
 mod calibration;
+mod effect_curve;
 mod film;
 mod folder;
 mod headline;

@@ -4,6 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::effect_curve::{EffectCurveEntry, effect_curves};
 use super::headline::label;
 use crate::closeloop::{ForceSample, Outcome, ResidualForce, Space};
 use crate::data::{Joint, Log};
@@ -54,6 +55,8 @@ pub(super) struct CloudEntry {
     pub before: Vec<f64>,
     /// of the model with the effects, N m or N; empty where one of the two was not computed
     pub after: Vec<f64>,
+    /// what the effects add by their formulas
+    pub effects: Vec<EffectCurveEntry>,
 }
 
 /// Length of a stretch of torques, s.
@@ -307,13 +310,28 @@ fn clouds(outcome: &Outcome) -> Vec<CloudEntry> {
         after: after.map_or_else(Vec::new, |after| {
             values(after, &|sample| sample.force[joint])
         }),
+        effects: effect_curves(outcome, joint, |variable| range(before, joint, variable)),
     };
     Joint::all(outcome.models.after.model.joints)
         .map(of_joint)
         .collect()
 }
 
+/// Where a variable of a joint (q, qd, tau or t) lies.
+fn range(force: &ResidualForce, joint: Joint, variable: &str) -> [f64; 2] {
+    let value = |sample: &ForceSample| match variable {
+        "q" => sample.q[joint],
+        "qd" => sample.qd[joint],
+        "tau" => sample.tau[joint],
+        _ => sample.time_s,
+    };
+    let all = force.samples.iter().map(value);
+    all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+        [low.min(x), high.max(x)]
+    })
+}
+
 /// To five digits.
-fn rounded(value: f64) -> f64 {
+pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }

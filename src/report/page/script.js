@@ -32,6 +32,16 @@
     return new uPlot(options(place, series, { scales: { x: { time: false } } }), [stretch.time, ...kinds.map((kind) => tracks[kind])], place);
   };
 
+  // Layers with abscissae of their own as the columns of one table, sorted.
+  const merged = (layers) => {
+    const lines = layers.flatMap(({ x, lines }) => lines.map(({ y }) => ({ x, y })));
+    const rows = layers.flatMap(({ x }) => x.map((value, k) => [value, ...lines.map((line) => (line.x === x ? line.y[k] : null))]));
+    rows.sort((a, b) => a[0] - b[0]);
+    return rows[0].map((_, k) => rows.map((row) => row[k]));
+  };
+  const points = (kind) => ({ label: names[kind], stroke: colour(kind), paths: () => null, points: { show: true, size: 4, fill: colour(kind) } });
+  const line = (kind, width, label) => ({ label, stroke: colour(kind), width, spanGaps: true, points: { show: false } });
+
   // The mean over runs of equally many points, over the variable.
   const mean = (x, y, runs) => {
     const order = x.map((_, k) => k).sort((a, b) => x[a] - x[b]);
@@ -45,26 +55,40 @@
     return means;
   };
 
-  // What is left over a variable: points, what the effects explain as the difference of the two, averaged, and the band in which
-  // the mean of what they leave lies.
+  // Whether the effects on a joint are more than those that are drawn by their formulas.
+  const has_others = ({ joint, effects }) => {
+    const added = [...report.effects, ...report.supported].filter((effect) => (effect.joints ?? [effect.joint]).includes(joint));
+    return added.length > effects.flatMap((curve) => curve.effects).length;
+  };
+
+  // What is left over a variable: points; what the effects add, by the formulas of those that depend on this variable alone, with the
+  // band of their intervals, else, if others act on the joint, as the difference of the two, averaged; and the band in which the mean of what they leave lies.
   const cloud = (place) => {
     const data = report.shown.residuals[place.dataset.cloud];
-    const x = data[place.dataset.over];
-    const has_after = data.after.length > 0;
-    const explained = has_after ? mean(x, data.before.map((force, k) => force - data.after[k]), 24) : [];
-    const variable = place.dataset.over === "time" ? "t" : place.dataset.over + data.joint;
-    const band = report.unexplained.curves.find((curve) => curve.joint === data.joint && curve.variable === variable);
-    const rows = x.map((value, k) => [value, data.before[k], has_after ? data.after[k] : null, null, null, null]);
-    rows.push(...explained.map(([value, force]) => [value, null, null, force, null, null]));
-    if (band) rows.push(...band.x.map((value, k) => [value, null, null, null, band.high[k], band.low[k]]));
-    rows.sort((a, b) => a[0] - b[0]);
-    const columns = [0, 1, 2, 3, 4, 5].map((k) => rows.map((row) => row[k]));
-    const points = (kind) => ({ label: names[kind], stroke: colour(kind), paths: () => null, points: { show: true, size: 4, fill: colour(kind) } });
-    const line = { label: "explained by the effects", stroke: colour("ink"), width: 2, spanGaps: true, points: { show: false } };
-    const end = (label) => ({ label, stroke: colour("after"), width: 0.5, spanGaps: true, points: { show: false } });
-    const series = [points("before"), points("after"), line, end("95 % band of what is left"), end("")];
-    const bands = [{ series: [4, 5], fill: colour("after") + "33" }];
-    return new uPlot(options(place, series, { bands, scales: { x: { time: false } } }), columns, place);
+    const over = place.dataset.over;
+    const x = data[over];
+    const variable = over === "time" ? "t" : over;
+    const numbered = over === "time" ? "t" : over + data.joint;
+    const formula = data.effects.find((curve) => curve.variable === variable);
+    const left = report.unexplained.curves.find((curve) => curve.joint === data.joint && curve.variable === numbered);
+    const layers = [{ x, lines: [{ ...points("before"), y: data.before }] }];
+    const bands = [];
+    const band = (of, kind, label) => {
+      const last = layers.reduce((sum, layer) => sum + layer.lines.length, 0);
+      layers.push({ x: of.x, lines: [{ ...line(kind, 0.5, label), y: of.high }, { ...line(kind, 0.5, ""), class: "unlisted", y: of.low }] });
+      bands.push({ series: [last + 1, last + 2], fill: colour(kind) + "33" });
+    };
+    if (data.after.length > 0) layers[0].lines.push({ ...points("after"), y: data.after });
+    if (left) band(left, "after", "95 % band of what is left");
+    if (formula?.low.length > 0) band(formula, "ink", "95 % band of the effect");
+    if (formula) {
+      layers.push({ x: formula.x, lines: [{ ...line("ink", 2, formula.effects.join(" + ")), y: formula.force }] });
+    } else if (data.after.length > 0 && has_others(data)) {
+      const means = mean(x, data.before.map((force, k) => force - data.after[k]), 24);
+      layers.push({ x: means.map((one) => one[0]), lines: [{ ...line("ink", 2, "explained by the effects"), y: means.map((one) => one[1]) }] });
+    }
+    const series = layers.flatMap((layer) => layer.lines);
+    return new uPlot(options(place, series, { bands, scales: { x: { time: false } } }), merged(layers), place);
   };
 
   // Zoom by keys: uPlot knows the mouse.

@@ -17,6 +17,9 @@ pub(super) fn section(report: &Report) -> Section {
             @for (k, stretch) in shown.stretches.iter().enumerate() { (curves(k, stretch)) }
             @if !shown.residuals.is_empty() {
                 h3 { "Residual force: what each model leaves unexplained" }
+                p.small { "A point is the force that a short stretch of motion needs beside that of the model. The line is what the effects add by "
+                    "their formulas, with the band of their intervals; where effects depend on more, it is the mean of what all of "
+                    "them explain." }
                 @for (k, cloud) in shown.residuals.iter().enumerate() { (clouds(report, k, cloud)) }
             }
         },

@@ -21,6 +21,38 @@ pub fn decimate(points: &[(f64, f64)], limit: usize) -> Vec<(f64, f64)> {
     kept
 }
 
+/// The places between which straight lines are at most `off` away from every curve over `x`, the ends among them.
+pub(in crate::report) fn bends(x: &[f64], curves: &[Vec<f64>], off: f64) -> Vec<usize> {
+    let last = x.len() - 1;
+    let inner = bends_between(x, curves, off, 0, last);
+    [vec![0], inner, vec![last]].concat()
+}
+
+/// The inner ones (Ramer 1972; Douglas and Peucker 1973).
+fn bends_between(
+    x: &[f64],
+    curves: &[Vec<f64>],
+    off: f64,
+    first: usize,
+    last: usize,
+) -> Vec<usize> {
+    let away = |k: usize| {
+        let share = (x[k] - x[first]) / (x[last] - x[first]);
+        let line = |curve: &Vec<f64>| curve[first] + share * (curve[last] - curve[first]);
+        let of_each = curves.iter().map(|curve| (curve[k] - line(curve)).abs());
+        of_each.fold(0.0, f64::max)
+    };
+    let farthest = (first + 1..last).max_by(|a, b| away(*a).total_cmp(&away(*b)));
+    match farthest.filter(|k| away(*k) > off) {
+        Some(k) => {
+            let [before, after] =
+                [[first, k], [k, last]].map(|[a, b]| bends_between(x, curves, off, a, b));
+            [before, vec![k], after].concat()
+        }
+        None => Vec::new(),
+    }
+}
+
 fn extremes(run: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
     let by_height = |a: &usize, b: &usize| run[*a].1.total_cmp(&run[*b].1);
     let lowest = (0..run.len()).min_by(by_height);
@@ -41,7 +73,7 @@ pub(in crate::report) fn drawable_pieces(
 
 #[cfg(test)]
 mod tests {
-    use super::decimate;
+    use super::{bends, decimate};
 
     fn sine_with_spike() -> Vec<(f64, f64)> {
         let mut points: Vec<_> = (0..100_000)
@@ -74,6 +106,15 @@ mod tests {
             let points: Vec<_> = (0..length).map(|i| (f64::from(i), 1.0)).collect();
             assert_eq!(decimate(&points, 6), points);
         }
+    }
+
+    #[test]
+    fn a_jump_and_two_straight_lines_are_four_points() {
+        let x: Vec<f64> = (-50..=50).map(f64::from).collect();
+        let dry: Vec<f64> = x.iter().map(|x| x - 20.0 * x.signum()).collect();
+        assert_eq!(bends(&x, &[dry], 0.1), [0, 49, 50, 100]);
+        let flat = vec![1.0; x.len()];
+        assert_eq!(bends(&x, &[flat], 0.1), [0, 100]);
     }
 
     #[test]
