@@ -81,6 +81,36 @@ fn the_effect_is_drawn_by_its_formula_with_its_interval() {
 }
 
 #[test]
+fn the_pendulum_is_drawn_at_its_logged_angles() {
+    let (report, _folder) = demo("0");
+    let numbers = |of: &Value| -> Vec<f64> { serde_json::from_value(of.clone()).unwrap() };
+    let (motion, stretch) = (&report["shown"]["motion"], &report["shown"]["stretches"][0]);
+    let (logged_s, angles) = (
+        numbers(&stretch["time"]),
+        numbers(&stretch["joints"][0]["measured"]),
+    );
+    let lines = motion["pictures"][0]["measured"].as_array().unwrap();
+    let mut sides = Vec::new();
+    for (time_s, line) in numbers(&motion["time"]).iter().zip(lines) {
+        let Some(row) = logged_s.iter().position(|t| (t - time_s).abs() < 1e-6) else {
+            continue;
+        };
+        let tip = line.as_str().unwrap().split(' ').next_back().unwrap();
+        let (x, y) = tip.split_once(',').unwrap();
+        let [x, y]: [f64; 2] = [x, y].map(|text| text.parse().unwrap());
+        let angle = angles[row];
+        assert!(
+            (y / x.hypot(y) - angle.cos()).abs() < 5e-3,
+            "{tip} at {angle}"
+        );
+        if angle.sin().abs() > 0.1 {
+            sides.push((x * angle.sin()).signum());
+        }
+    }
+    assert!(sides.len() > 50 && sides.iter().all(|side| *side == sides[0]));
+}
+
+#[test]
 fn the_same_seed_gives_the_same_report() {
     let [(first, _a), (second, _b)] = ["3", "3"].map(demo);
     assert_eq!(without_call(first), without_call(second));

@@ -10,6 +10,7 @@ mod folder;
 mod headline;
 mod json;
 mod model_file;
+mod motion;
 mod page;
 mod picture;
 pub mod plot;

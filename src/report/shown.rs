@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::effect_curve::{EffectCurveEntry, effect_curves};
 use super::headline::label;
+use super::motion::MotionEntry;
 use crate::closeloop::{ForceSample, Outcome, ResidualForce, Space};
 use crate::data::{Joint, Log};
 use crate::model::{Dynamics, Model};
@@ -16,6 +17,8 @@ use crate::sim::metric::{needed_torques, traces};
 pub(super) struct ShownEntry {
     /// measured and predicted: the beginning of the first test log, and the predictions with the median and the largest error
     pub stretches: Vec<StretchEntry>,
+    /// null where no stretch of the first test log is as long as the middle horizon
+    pub motion: Option<MotionEntry>,
     /// residual generalised force, joint by joint
     pub residuals: Vec<CloudEntry>,
 }
@@ -75,21 +78,22 @@ impl ShownEntry {
         };
         Self {
             stretches: stretches(outcome, &courses),
+            motion: MotionEntry::of(outcome),
             residuals: clouds(outcome),
         }
     }
 }
 
 /// Measured and predicted along a log.
-struct Course<'a> {
-    log: &'a Log,
-    time: Vec<f64>,
+pub(super) struct Course<'a> {
+    pub log: &'a Log,
+    pub time: Vec<f64>,
     /// The window of each row: predictions begin anew with it.
     window: Vec<usize>,
     /// `[joint][row]`
-    measured: Vec<Vec<f64>>,
+    pub measured: Vec<Vec<f64>>,
     /// The fitted declared model, that with effects and, if one is used, that with a network: `[model][joint][row]`.
-    models: Vec<Vec<Vec<f64>>>,
+    pub models: Vec<Vec<Vec<f64>>>,
 }
 
 /// Open-loop predictions over the longest horizon, one after the other.
@@ -108,7 +112,8 @@ fn motions(outcome: &Outcome) -> Vec<Course<'_>> {
         .collect()
 }
 
-fn motion<'a>(log: &'a Log, models: &[Dynamics], horizon_s: f64) -> Course<'a> {
+/// Open-loop predictions of a log.
+pub(super) fn motion<'a>(log: &'a Log, models: &[Dynamics], horizon_s: f64) -> Course<'a> {
     let of_models: Vec<_> = (models.iter())
         .map(|model| traces(model, log, horizon_s))
         .collect();
@@ -232,7 +237,7 @@ fn error(course: &Course<'_>, rows: &Rows) -> f64 {
 }
 
 #[allow(clippy::cast_precision_loss)] // many rows
-fn variance(values: &[f64]) -> f64 {
+pub(super) fn variance(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count

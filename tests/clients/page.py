@@ -63,7 +63,9 @@ const blank = (place) => {
 return [...document.querySelectorAll(".plot")].filter((p) => p.clientWidth > 0 && blank(p)).map((p) => p.ariaLabel);
 """
 
-FOCUSABLE = "return [...document.querySelectorAll('a, summary, .plot, [tabindex]')].filter((e) => e.checkVisibility()).length"
+KINDS = ("measured", "before", "after")
+
+FOCUSABLE = "return [...document.querySelectorAll('a, summary, .plot, button, input, [tabindex]')].filter((e) => e.checkVisibility()).length"
 
 
 def media(kind, scheme):
@@ -120,7 +122,40 @@ place.send_keys("+")
 browser.execute_async_script("setTimeout(arguments[0], 100)")
 assert browser.execute_script(shown, place) != before, "+ does not zoom"
 
+# The rig moves by the slider and by the button; who wants less motion has the slider alone.
+player = browser.find_elements(By.CSS_SELECTOR, ".motion")
+if player:
+    slider, button = (player[0].find_element(By.CSS_SELECTOR, part) for part in ("input", "button"))
+
+    def drawn():
+        return {kind: player[0].find_element(By.CSS_SELECTOR, f".{kind}[data-kind]").get_attribute("points") for kind in KINDS}
+
+    def waited(seconds):
+        browser.execute_async_script(f"setTimeout(arguments[0], {1000 * seconds})")
+        return int(slider.get_attribute("value"))
+
+    still = drawn()
+    assert still["before"] != still["measured"], "it does not stand where the two differ"
+    slider.send_keys(Keys.HOME)
+    first = drawn()
+    slider.send_keys(*[Keys.ARROW_RIGHT] * 5)
+    later = drawn()
+    assert all(first[kind] != later[kind] for kind in KINDS), "the slider does not move it"
+    slider.send_keys(Keys.HOME)
+    assert drawn() == first, "the slider does not move it back"
+    button.send_keys(Keys.ENTER)
+    at = waited(0.5)
+    assert button.text == "Pause" and 0 < at < waited(0.3), "it does not play"
+    button.send_keys(Keys.ENTER)
+    assert button.text == "Play" and waited(0) == waited(0.2), "it does not stop"
+    reduced = [{"name": "prefers-reduced-motion", "value": "reduce"}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "screen", "features": reduced})
+    assert slider.is_displayed() and not button.is_displayed(), "it plays for those who want less motion"
+
 media("print", "light")
+if player:
+    waited(0.1)
+    assert drawn() == still, "paper has another moment than the text says"
 assert browser.execute_script("return getComputedStyle(document.querySelector('nav')).display") == "none"
 paper = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", {"printBackground": False})["data"])
 assert paper.startswith(b"%PDF") and len(paper) > 20_000, len(paper)

@@ -90,18 +90,24 @@ impl Joint {
 
     /// The joint's frame in that of the previous joint (or the world) where its coordinate is zero.
     pub fn at_zero(&self) -> Pose {
-        let back = if self.slides {
+        self.at(0.0)
+    }
+
+    /// The same where its coordinate (rad or m) is this.
+    pub fn at(&self, coordinate: f64) -> Pose {
+        let moved = coordinate - self.reference;
+        let moved = if self.slides {
             Pose {
                 rotation: Matrix3::identity(),
-                origin: -Vector3::z() * self.reference,
+                origin: Vector3::z() * moved,
             }
         } else {
             Pose {
-                rotation: turn(Vector3::z(), -self.reference),
+                rotation: turn(Vector3::z(), moved),
                 origin: Vector3::zeros(),
             }
         };
-        self.pose.then(&back)
+        self.pose.then(&moved)
     }
 
     /// The inertia of its body, part by part.

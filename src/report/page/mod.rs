@@ -6,6 +6,7 @@ mod logs;
 mod made;
 mod maths;
 mod missing;
+mod motion;
 mod next;
 mod show;
 mod trust;

@@ -91,6 +91,46 @@
     return new uPlot(options(place, series, { bands, scales: { x: { time: false } } }), merged(layers), place);
   };
 
+  // The rig in motion: a slider over its frames, and a button that moves it in real time, over and over.
+  const player = document.querySelector(".motion");
+  const play = ({ time, pictures, still }) => {
+    const [button, slider, clock] = ["button", "input", "output"].map((name) => player.querySelector(name));
+    const lines = [...player.querySelectorAll("[data-kind]")];
+    const show = (frame) => {
+      slider.value = frame;
+      for (const line of lines) line.setAttribute("points", pictures[line.dataset.picture][line.dataset.kind][frame]);
+      clock.textContent = "at " + time[frame].toFixed(2) + " s";
+    };
+    // When the first frame would have been shown; null while it stands.
+    let began = null;
+    const start = () => {
+      began = performance.now() - 1000 * (time[slider.value] - time[0]);
+      button.textContent = "Pause";
+      requestAnimationFrame(step);
+    };
+    const stop = () => {
+      began = null;
+      button.textContent = "Play";
+    };
+    const step = (now) => {
+      if (began === null) return;
+      const next = time.findIndex((t) => t - time[0] > (now - began) / 1000);
+      if (next < 0) began = now;
+      show(Math.max(next - 1, 0));
+      requestAnimationFrame(step);
+    };
+    button.addEventListener("click", () => (began === null ? start() : stop()));
+    slider.addEventListener("input", () => {
+      stop();
+      show(slider.value);
+    });
+    matchMedia("print").addEventListener("change", () => {
+      stop();
+      show(still);
+    });
+  };
+  if (player) play(report.shown.motion);
+
   // Zoom by keys: uPlot knows the mouse.
   const keys = (place, plot, event) => {
     const { min, max } = plot.scales.x;

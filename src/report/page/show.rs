@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::Section;
+use super::motion::motion;
 use crate::report::schema::Report;
 use crate::report::shown::{CloudEntry, StretchEntry};
 
@@ -14,6 +15,7 @@ pub(super) fn section(report: &Report) -> Section {
         answer: html! {
             p.small.screen { "Drag over a curve to zoom in, double-click to see all of it; on the keyboard + and \u{2212} zoom, "
                 "arrows move, 0 shows all." }
+            @if let Some(shown) = &shown.motion { (motion(shown)) }
             @for (k, stretch) in shown.stretches.iter().enumerate() { (curves(k, stretch)) }
             @if !shown.residuals.is_empty() {
                 h3 { "Residual force: what each model leaves unexplained" }
