@@ -170,8 +170,13 @@ fn calibration_reports_false_alarms_and_detection_limits() {
             out,
         ];
         let report: Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
-        let written = std::fs::read_to_string(folder.path().join(name).join("report.md")).unwrap();
-        assert!(written.contains("## What these logs could show"));
+        for (file, heading) in [
+            ("report.md", "## What these logs could show"),
+            ("report.html", "<h3>What these logs could show</h3>"),
+        ] {
+            let written = std::fs::read_to_string(folder.path().join(name).join(file)).unwrap();
+            assert!(written.contains(heading), "{file}");
+        }
         report
     };
     let (first, second) = (calibrated("3", "first"), calibrated("3", "second"));

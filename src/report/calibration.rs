@@ -30,7 +30,7 @@ pub(super) struct CalibrationEntry {
     hidden_at: f64,
     /// for each effect that the accepted model lacks, the smallest size that the search would name in four of five such
     /// logs
-    smallest: Vec<SmallestEntry>,
+    pub smallest: Vec<SmallestEntry>,
 }
 
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -42,11 +42,11 @@ struct AlarmEntry {
 }
 
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
-struct SmallestEntry {
+pub(super) struct SmallestEntry {
     effect: String,
     /// its name for people
-    title: String,
-    joint: Joint,
+    pub title: String,
+    pub joint: Joint,
     parameter: String,
     /// null where there is none; reason says why
     value: Option<f64>,
@@ -82,7 +82,7 @@ impl CalibrationEntry {
             alarms: calibration.alarms(),
             rate: calibration.rate(),
             rate_ci95: calibration.rate_ci95(),
-            named: alarms(calibration),
+            named: false_names(calibration),
             unexplained: calibration.unexplained,
             hidden_at: calibration.hidden,
             smallest: calibration
@@ -94,7 +94,7 @@ impl CalibrationEntry {
     }
 }
 
-fn alarms(calibration: &Calibration) -> Vec<AlarmEntry> {
+fn false_names(calibration: &Calibration) -> Vec<AlarmEntry> {
     let mut runs: BTreeMap<(&str, Joint), usize> = BTreeMap::new();
     for effect in calibration.named.iter().flatten() {
         *runs.entry((&effect.effect.name, effect.joint)).or_default() += 1;
@@ -174,34 +174,20 @@ fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &FittedEffect> {
 /// The section of `report.md`.
 pub(super) fn section(calibration: &CalibrationEntry) -> String {
     let mut out = format!(
-        "## What these logs could show\n\n{} were searched like the logs themselves, driven by the torques of the training logs \
-         and with the residuals of the fit as noise. {}.\n\n\
-         The table gives the smallest size at which the search would name each effect in four of five such sets of logs. As a \
-         check, common effects were hidden in a simulation at {} times that size.\n\n\
+        "## What these logs could show\n\n{} {}.\n\n{}\n\n\
          | effect | joint | smallest size | share of the top torque | hidden in a simulation |\n|---|---|---|---|---|\n",
         simulations(calibration),
-        alarms_in_words(calibration),
-        calibration.hidden_at,
+        alarms(calibration),
+        limits(calibration),
     );
     for entry in &calibration.smallest {
-        let size = entry.value.map_or_else(
-            || entry.reason.clone().unwrap_or_default(),
-            |value| {
-                let others = entry.with.iter();
-                std::iter::once(quantity(&entry.parameter, value, &entry.unit))
-                    .chain(others.map(|other| quantity(&other.name, other.value, &other.unit)))
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            },
-        );
-        let share = entry
-            .share_of_top_torque
-            .map_or_else(|| "-".to_owned(), |share| format!("{:.2} %", 100.0 * share));
         let _ = writeln!(
             out,
-            "| {} | {} | {size} | {share} | {} |",
+            "| {} | {} | {} | {} | {} |",
             entry.title,
             entry.joint,
+            size(entry),
+            share(entry),
             hidden(entry)
         );
     }
@@ -211,17 +197,23 @@ pub(super) fn section(calibration: &CalibrationEntry) -> String {
 /// The line for a terminal.
 pub(super) fn line(calibration: &CalibrationEntry) -> String {
     format!(
-        "{}: {}",
-        simulations(calibration),
-        alarms_in_words(calibration)
+        "{} simulations of the accepted model: {}",
+        calibration.runs,
+        alarms(calibration)
     )
 }
 
-fn simulations(calibration: &CalibrationEntry) -> String {
-    format!("{} simulations of the accepted model", calibration.runs)
+/// What was searched, in a sentence.
+pub(super) fn simulations(calibration: &CalibrationEntry) -> String {
+    format!(
+        "{} simulations of the accepted model were searched like the logs themselves, driven by the torques of the training \
+         logs and with the residuals of the fit as noise.",
+        calibration.runs
+    )
 }
 
-fn alarms_in_words(calibration: &CalibrationEntry) -> String {
+/// How often something was named that is absent.
+pub(super) fn alarms(calibration: &CalibrationEntry) -> String {
     let [low, high] = calibration.rate_ci95.map(|share| 100.0 * share);
     let mut out = format!(
         "{} named an effect that is absent: {:.0} % false alarms (95 % interval {low:.0} to {high:.0} %)",
@@ -242,7 +234,34 @@ fn alarms_in_words(calibration: &CalibrationEntry) -> String {
     out
 }
 
-fn hidden(entry: &SmallestEntry) -> String {
+/// What the table of smallest sizes gives.
+pub(super) fn limits(calibration: &CalibrationEntry) -> String {
+    format!(
+        "The table gives the smallest size at which the search would name each effect in four of five such sets of logs. As a \
+         check, common effects were hidden in a simulation at {} times that size.",
+        calibration.hidden_at
+    )
+}
+
+/// The smallest size of an effect, or why there is none.
+pub(super) fn size(entry: &SmallestEntry) -> String {
+    let Some(value) = entry.value else {
+        return entry.reason.clone().unwrap_or_default();
+    };
+    let leading = quantity(&entry.parameter, value, &entry.unit);
+    let others = entry.with.iter();
+    let others = others.map(|other| quantity(&other.name, other.value, &other.unit));
+    let all: Vec<String> = std::iter::once(leading).chain(others).collect();
+    all.join(", ")
+}
+
+pub(super) fn share(entry: &SmallestEntry) -> String {
+    let share = entry.share_of_top_torque;
+    share.map_or_else(|| "-".to_owned(), |share| format!("{:.2} %", 100.0 * share))
+}
+
+/// Whether an effect was named when it was hidden at that size.
+pub(super) fn hidden(entry: &SmallestEntry) -> String {
     let label = |other: &EffectEntry| format!("{} on joint {}", other.name, other.joint);
     let others: Vec<String> = entry.named_besides.iter().map(label).collect();
     match (entry.verified, others.is_empty()) {

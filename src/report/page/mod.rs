@@ -2,6 +2,7 @@
 //! reader's questions.
 
 mod better;
+mod calibration;
 mod logs;
 mod made;
 mod maths;

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 
 use super::Section;
+use super::calibration::calibration;
 use super::logs::by_log;
 use super::missing::value;
 use crate::data::{Finding, Severity};
@@ -18,6 +19,7 @@ pub(super) fn section(report: &Report) -> Section {
         answer: html! {
             (left(report))
             (alternatives(report))
+            @if let Some(found) = &report.calibration { (calibration(found)) }
             (parameters(report))
             (by_log(report))
             (contradicted(report))
