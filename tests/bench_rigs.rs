@@ -174,6 +174,7 @@ fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
     });
     let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
     assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
+    crate::page::look_at(&bench.path("out/report.html"));
     assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
 }
 

@@ -303,6 +303,7 @@ fn a_killed_experiment_resumes_to_the_same_numbers() {
         serde_json::from_slice(&fs::read(killed.path().join("x/results.json")).unwrap()).unwrap();
     assert_eq!(written, found);
     assert!(killed.path().join("x/results.svg").is_file());
+    crate::page::look_at(&killed.path().join("x/report.html"));
     let stretch = killed.path().join("x/runs/hybrid-01/stretch-003.csv");
     assert_eq!(
         Log::read(&stretch, 1, &Columns::default()).unwrap().rows(),

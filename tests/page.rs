@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::clients::{client, demo};
 use crate::support::{refuses, succeeds, text};
+use crate::train::configs;
 
 /// Whether there is a browser; without one, say so loudly. CI must have it.
 fn has_browser() -> bool {
@@ -24,11 +25,25 @@ fn has_browser() -> bool {
     false
 }
 
+/// Look at a page in a browser, where there is one.
+pub fn look_at(page: &Path) {
+    if has_browser() {
+        client("page.py", &[page]);
+    }
+}
+
 #[test]
 fn a_browser_shows_the_page_of_the_demo() {
-    if has_browser() {
-        client("page.py", &[&demo().join("report.html")]);
-    }
+    look_at(&demo().join("report.html"));
+}
+
+#[test]
+fn a_browser_shows_the_page_of_an_experiment_on_control() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = configs().join("smoke/undeclared-effect.toml");
+    let arguments = ["experiment", "undeclared-effect", "--config", text(&config)];
+    succeeds(&[&arguments[..], &["--out", text(folder.path())]].concat());
+    look_at(&folder.path().join("report.html"));
 }
 
 #[test]

@@ -10,6 +10,7 @@ use super::grid::{Cell, Group};
 use super::rows::{Done, Rate, Row, rows};
 use crate::closeloop::Verdict;
 use crate::data::statistics::rank_quantile;
+use crate::report::Share;
 
 /// One cell and its result; one line of `cells.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -152,6 +153,31 @@ fn seconds(lines: &[Line]) -> Seconds {
         median: rank_quantile(&all, 0.5),
         longest: rank_quantile(&all, 1.0),
         total: all.iter().sum(),
+    }
+}
+
+impl Summary {
+    /// The first row that counts any cell, in a sentence.
+    pub fn headline(&self) -> String {
+        let counted = self.rows.iter().find(|row| row.rate.of > 0);
+        counted.map_or_else(
+            || format!("{} cells", self.cells),
+            |Row { what, rate, .. }| format!("{what} in {} of {} cells", rate.hits, rate.of),
+        )
+    }
+
+    /// How often each row and each hidden effect was right.
+    pub fn shares(&self) -> Vec<Share> {
+        let share = |what: String, row: &Row| Share {
+            what,
+            share: row.rate.share(),
+            interval: row.wilson,
+        };
+        let counted = self.rows.iter().filter(|row| row.rate.of > 0);
+        let rows = counted.map(|row| share(row.what.clone(), row));
+        let effects = self.by_effect.iter();
+        let effects = effects.map(|row| share(format!("{} hidden: passed", row.what), row));
+        rows.chain(effects).collect()
     }
 }
 

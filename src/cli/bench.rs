@@ -7,11 +7,14 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Subcommand};
+use serde_json::json;
 
+use super::call::{Begun, files};
 use super::{Answer, Common, interrupt, progress, told, voice};
 use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
 use crate::files::content_id;
 use crate::model::Library;
+use crate::report::ResultsPage;
 use crate::runs::RunFolder;
 
 /// Measure the program on simulated and on measured rigs
@@ -29,8 +32,8 @@ enum What {
 
 /// Measure how often closing the loop names hidden effects, on a grid of rigs coded independently of the models
 ///
-/// Each cell is one line of DIR/cells.jsonl; an interrupted run is resumed. DIR/summary.json and DIR/table.md say how
-/// often the answer was right.
+/// Each cell is one line of DIR/cells.jsonl; an interrupted run is resumed. DIR/report.html, DIR/table.md and DIR/summary.json
+/// say how often the answer was right.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn bench effects --only pendulum/coulomb --out bench-effects"
@@ -64,6 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 }
 
 fn effects(arguments: &Effects) -> Result<Answer> {
+    let begun = Begun::now();
     let cells = wanted(arguments)?;
     fs::create_dir_all(&arguments.out).with_context(|| {
         format!(
@@ -79,6 +83,22 @@ fn effects(arguments: &Effects) -> Result<Answer> {
     let json = serde_json::to_string_pretty(&summary)? + "\n";
     folder.write_text("summary.json", &json)?;
     folder.write_text("table.md", &text)?;
+    let page = ResultsPage {
+        what: "bench effects",
+        headline: &summary.headline(),
+        text: &text,
+        shares: summary.shares(),
+        figure: None,
+        seed: None,
+        configuration: &json!({
+            "grid": arguments.grid,
+            "logs": arguments.logs,
+            "only": arguments.only,
+            "cells": cells.iter().map(|cell| &cell.id).collect::<Vec<_>>(),
+        }),
+        call: &begun.call(&files("grid", std::slice::from_ref(&arguments.grid))?),
+    };
+    page.write(&folder)?;
     voice::print(if arguments.common.json { &json } else { &text })?;
     Ok(Answer::Yes)
 }

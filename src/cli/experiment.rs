@@ -1,13 +1,16 @@
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
+use serde_json::Value;
 
+use super::call::{Begun, files};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
 use crate::experiment::undeclared_effect::{self, Trial};
 use crate::experiment::{Config, Experiment, FinishedRound, Session, picture};
 use crate::model::Library;
+use crate::report::{ResultsPage, Share};
 use crate::runs::RunFolder;
 
 /// Experiments: return against real transitions, against the receding horizon, and with undeclared effects
@@ -44,16 +47,27 @@ enum Name {
 /// The file with the time so far, s.
 const WALL: &str = "wall_s";
 
+/// Its files.
+const RESULTS: &str = "results.json";
+const FIGURE: &str = "results.svg";
+
 /// The results of an experiment, as printed and written.
 struct Finished {
-    json: String,
+    /// The experiment and what it is carried out on.
+    what: String,
     headline: String,
     text: String,
+    shares: Vec<Share>,
+    figure: Option<String>,
+    config: Value,
+    json: String,
     /// Whether its target was reached.
     answer: Answer,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
+    let begun = Begun::now();
+    let read = files("config", std::slice::from_ref(&arguments.config))?;
     let folder = RunFolder::open(&arguments.out)?;
     let clock = Clock::open(&folder)?;
     let library = arguments.effects.library()?;
@@ -65,11 +79,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         Name::UndeclaredEffect => undeclared_effect(arguments, library, &clock),
     }?;
     clock.save();
-    folder.write_text("results.json", &finished.json)?;
-    let json = arguments.common.json;
-    match json {
+    let page = ResultsPage {
+        what: &finished.what,
+        headline: &finished.headline,
+        text: &finished.text,
+        shares: finished.shares,
+        figure: finished.figure.as_deref(),
+        seed: Some(arguments.common.seed),
+        configuration: &finished.config,
+        call: &begun.call(&read),
+    };
+    let mut written = vec![page.write(&folder)?];
+    let others = [
+        (RESULTS, Some(&finished.json)),
+        (FIGURE, finished.figure.as_ref()),
+    ];
+    for (name, contents) in others {
+        if let Some(contents) = contents {
+            folder.write_text(name, contents)?;
+            written.push(arguments.out.join(name));
+        }
+    }
+    let paths: String = (written.iter())
+        .map(|path| format!("{}\n", path.display()))
+        .collect();
+    match arguments.common.json {
         true => voice::print(&finished.json)?,
-        false => voice::answer(&finished.headline, &finished.text)?,
+        false => voice::answer(&finished.headline, &(finished.text + &paths))?,
     }
     Ok(finished.answer)
 }
@@ -96,17 +132,14 @@ fn published(
     bar.finish_and_clear();
     voice::took("learning and judging", begun);
     let results = results?.finished(command_line(), clock.wall_s());
-    clock
-        .folder
-        .write_text("results.svg", &picture(&results)?)?;
     Ok(Finished {
+        what: format!("{}, {}", results.experiment, results.task),
+        headline: results.headline(),
+        text: results.text(),
+        shares: Vec::new(),
+        figure: Some(picture(&results)?),
         json: serde_json::to_string_pretty(&results)? + "\n",
-        headline: arguments.out.join("results.json").display().to_string(),
-        text: format!(
-            "{}{}",
-            results.text(),
-            files(&arguments.out, &["results.json", "results.svg"])
-        ),
+        config: results.config,
         answer: Answer::Yes,
     })
 }
@@ -136,26 +169,19 @@ fn undeclared_effect(
     value["command"] = command_line().into();
     value["wall_s"] = clock.wall_s().into();
     Ok(Finished {
+        what: format!("undeclared-effect, {}", session.task.name()),
+        headline: outcome.headline(),
+        text: outcome.text(),
+        shares: outcome.shares(),
+        figure: None,
         json: serde_json::to_string_pretty(&value)? + "\n",
-        headline: arguments.out.join("results.json").display().to_string(),
-        text: format!(
-            "{}{}",
-            outcome.text(),
-            files(&arguments.out, &["results.json"])
-        ),
+        config: value["config"].take(),
         answer: if outcome.reached {
             Answer::Yes
         } else {
             Answer::No
         },
     })
-}
-
-fn files(out: &Path, names: &[&str]) -> String {
-    names
-        .iter()
-        .map(|name| format!("{}\n", out.join(name).display()))
-        .collect()
 }
 
 /// The text of the progress bar.

@@ -116,10 +116,41 @@ impl Results {
         }
     }
 
-    /// The results as a table for the terminal.
+    /// The answer in a sentence.
+    pub fn headline(&self) -> String {
+        let (what, told): (_, Vec<String>) = match &self.receding_horizon {
+            Some(horizons) => {
+                let best = |name: &String| format!("{name} {}", self.methods[name].best(horizons));
+                let what = "receding horizon with the highest return, in steps".to_owned();
+                (what, self.reached.keys().map(best).collect())
+            }
+            None => {
+                let after = |(name, reached): (&String, &Reached)| {
+                    format!("{name} {}", self.after(name, reached))
+                };
+                let share = 100.0 * REACHED;
+                let what = format!("{share:.0} % of the return with the plant's equations");
+                (what, self.reached.iter().map(after).collect())
+            }
+        };
+        format!("{what}: {}", told.join(", "))
+    }
+
+    /// After how much data a method reached what counts.
+    fn after(&self, name: &str, reached: &Reached) -> String {
+        match reached.transitions_to_90_percent {
+            Some(transitions) => format!("after {transitions} transitions"),
+            None => {
+                let all = self.methods[name].transitions.last();
+                format!("not within {}", all.copied().unwrap_or_default())
+            }
+        }
+    }
+
+    /// The results as tables in Markdown.
     pub fn text(&self) -> String {
         let mut out = format!(
-            "{}, {}, {} seeds\n",
+            "{}, {}, {} seeds\n\n",
             self.experiment,
             self.task,
             self.seeds.len()
@@ -128,33 +159,40 @@ impl Results {
             Some(horizons) => self.table_of_horizons(horizons, &mut out),
             None => self.table_of_learning(&mut out),
         }
-        let _ = writeln!(out, "{:.0} s: {}", self.wall_s, self.command);
+        let _ = writeln!(out, "\n{:.0} s: `{}`", self.wall_s, self.command);
         out
     }
 
     fn table_of_learning(&self, out: &mut String) {
         out.push_str(
-            "method                  return at the end   upright   of perfect   90 % of it after\n",
+            "| method | return at the end | upright | of perfect | 90 % of it |\n|---|---|---|---|---|\n",
         );
         for (name, course) in &self.methods {
             let last = course.returns.len() - 1;
-            let _ = write!(out, "{name:<22}  {}", course.entry(last));
-            if let Some(reached) = self.reached.get(name) {
-                let after = match reached.transitions_to_90_percent {
-                    Some(transitions) => format!("{transitions} transitions"),
-                    None => format!("not within {}", course.transitions[last]),
-                };
-                let _ = write!(out, "   {:>10.3}   {after}", reached.final_share_of_perfect);
-            }
-            out.push('\n');
+            let (share, after) = match self.reached.get(name) {
+                Some(reached) => {
+                    let share = format!("{:.3}", reached.final_share_of_perfect);
+                    (share, self.after(name, reached))
+                }
+                None => Default::default(),
+            };
+            let _ = writeln!(
+                out,
+                "| {name:<22} | {} | {share:>5} | {after} |",
+                course.entry(last)
+            );
         }
     }
 
     fn table_of_horizons(&self, horizons: &[usize], out: &mut String) {
         for (name, course) in &self.methods {
-            let _ = writeln!(out, "{name}, after {} transitions", course.transitions[0]);
+            let _ = writeln!(
+                out,
+                "\n{name}, after {} transitions\n\n| receding horizon | return | upright |\n|---|---|---|",
+                course.transitions[0]
+            );
             for (entry, horizon) in horizons.iter().enumerate() {
-                let _ = writeln!(out, "  RH {horizon:>4}  {}", course.entry(entry));
+                let _ = writeln!(out, "| {horizon:>4} | {} |", course.entry(entry));
             }
         }
     }
@@ -166,11 +204,19 @@ impl Course {
         seeds.filter(|success| **success).count()
     }
 
+    /// The receding horizon with the highest mean return.
+    fn best(&self, horizons: &[usize]) -> usize {
+        let entries = horizons.iter().zip(&self.return_mean);
+        let best = entries.max_by(|a, b| a.1.total_cmp(b.1));
+        best.map_or(0, |(horizon, _)| *horizon)
+    }
+
+    /// Return and successes, two cells of a table.
     fn entry(&self, entry: usize) -> String {
         let upright = self.successes(entry);
         let seeds = self.success[entry].len();
         let (mean, std) = (self.return_mean[entry], self.return_std[entry]);
-        format!("{mean:>9.1} +- {std:>6.1}   {upright:>3}/{seeds:<3}")
+        format!("{mean:>9.1} +- {std:>6.1} | {upright:>3}/{seeds:<3}")
     }
 }
 

@@ -25,7 +25,7 @@ mod wording;
 pub use film::film;
 pub use folder::{ReadError, WriteError, write};
 pub use model_file::model_file;
-pub use page::page;
+pub use page::{ResultsPage, Share, page};
 pub use schema::{Report, schema};
 pub use summary::{answer, curves, summary};
 pub use tensorboard::EventFile;

@@ -197,8 +197,7 @@ pub(super) fn errors(outcome: &Outcome) -> Result<String, PlotError> {
     let others = errors.against.iter().enumerate();
     models.extend(others.map(|(k, (name, m))| named(Role::Against(k), name, m)));
     let row = |joint: Joint, h: usize| ErrorRow {
-        joint,
-        label: label(outcome, joint),
+        of: format!("Joint {}", label(outcome, joint)),
         kind: kind(outcome, joint),
         horizon_s: errors.before.horizons[h].horizon_s,
         bars: models

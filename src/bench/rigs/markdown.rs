@@ -19,11 +19,11 @@ pub fn markdown(summary: &Summary) -> String {
          the others | hybrid / after | s a fit |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     summary.rows.iter().for_each(|row| push_row(&mut text, row));
-    push_totals(&mut text, &summary.rows);
+    text += &totals(&summary.rows);
     text += "\n| rig | named (fits) | verdict (fits) |\n|---|---|---|\n";
     for row in &summary.rows {
         let (named, verdicts) = (listed(&row.named), listed(&row.verdicts));
-        let _ = writeln!(text, "| {} | {named} | {verdicts} |", name(row));
+        let _ = writeln!(text, "| {} | {named} | {verdicts} |", row.name());
     }
     for (method, reason) in &summary.not_run {
         let _ = writeln!(text, "\nNot run: {}: {reason}", method.name());
@@ -35,13 +35,6 @@ pub fn markdown(summary: &Summary) -> String {
         let _ = writeln!(text, "| {fold} | {} | {error} |", method.name());
     }
     text
-}
-
-fn name(row: &Row) -> String {
-    match &row.group {
-        Some(group) => format!("{}, {group}", row.rig),
-        None => row.rig.clone(),
-    }
 }
 
 fn push_row(text: &mut String, row: &Row) {
@@ -58,7 +51,7 @@ fn push_row(text: &mut String, row: &Row) {
     let _ = writeln!(
         text,
         "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
-        name(row),
+        row.name(),
         row.folds,
         of("declared"),
         of("declared, fitted"),
@@ -94,22 +87,32 @@ fn mrad(rad: f64) -> String {
     }
 }
 
-/// A row without a ratio counts as not reached.
-fn push_totals(text: &mut String, rows: &[Row]) {
-    let count = |value: fn(&Row) -> Option<f64>, limit: f64| {
-        rows.iter()
-            .filter(|row| value(row).is_some_and(|ratio| ratio <= limit))
-            .count()
-    };
-    let _ = writeln!(
-        text,
+impl Summary {
+    /// The answer in a sentence.
+    pub fn headline(&self) -> String {
+        format!(
+            "closing the loop is as good as the best of the others on {} of {} rigs",
+            reached(&self.rows, |row| row.ratio, 1.0),
+            self.rows.len()
+        )
+    }
+}
+
+/// In how many rows a ratio is at most this; a row without one counts as not reached.
+fn reached(rows: &[Row], ratio: fn(&Row) -> Option<f64>, most: f64) -> usize {
+    let reaches = |row: &&Row| ratio(row).is_some_and(|ratio| ratio <= most);
+    rows.iter().filter(reaches).count()
+}
+
+fn totals(rows: &[Row]) -> String {
+    format!(
         "\nOf {} rows: error after at most that of the best of the others (plain structure, published sets, mujoco.sysid) in {}, at \
-         most {CLEARLY} of it in {}; error with the network at most {NETWORK} of the error after in {}.",
+         most {CLEARLY} of it in {}; error with the network at most {NETWORK} of the error after in {}.\n",
         rows.len(),
-        count(|row| row.ratio, 1.0),
-        count(|row| row.ratio, CLEARLY),
-        count(|row| row.hybrid_ratio, NETWORK)
-    );
+        reached(rows, |row| row.ratio, 1.0),
+        reached(rows, |row| row.ratio, CLEARLY),
+        reached(rows, |row| row.hybrid_ratio, NETWORK)
+    )
 }
 
 /// `coulomb_friction@1 (4), viscous_friction@1 (2)`, the most frequent first.

@@ -7,6 +7,7 @@ mod fold;
 mod markdown;
 mod method;
 mod mujoco;
+mod picture;
 mod table;
 
 pub use config::{Declared, Published, Rig, RigsError, Test, read};
@@ -15,4 +16,5 @@ pub use fold::{Fold, Measured, Place};
 pub use markdown::markdown;
 pub use method::{Found, Method, Said, Scored, Tools};
 pub use mujoco::Task;
+pub use picture::picture;
 pub use table::{Entry, Horizon, Line, Row, Summary, summarise};

@@ -106,6 +106,16 @@ pub fn summarise(rigs: &[Measured], lines: &[Line], not_run: BTreeMap<Method, St
     }
 }
 
+impl Row {
+    /// The rig, and the group of its test logs.
+    pub fn name(&self) -> String {
+        match &self.group {
+            Some(group) => format!("{}, {group}", self.rig),
+            None => self.rig.clone(),
+        }
+    }
+}
+
 /// The results of one rig.
 #[derive(Clone, Copy)]
 struct Lines<'a> {

@@ -11,18 +11,21 @@ use indicatif::ProgressBar;
 
 use super::{Answer, Common, interrupt, program_id, progress, told, unless_panic, voice};
 use crate::bench::rigs::{
-    Fold, Found, Line, Measured, Method, Rig, Tools, markdown, read, summarise,
+    Fold, Found, Line, Measured, Method, Rig, Tools, markdown, picture, read, summarise,
 };
+use crate::cli::call::{Begun, files};
 use crate::closeloop::Progress;
 use crate::formats::ClientError;
 use crate::model::Library;
+use crate::report::ResultsPage;
 use crate::runs::RunFolder;
 use crate::train::ResidualTrainer;
 
 /// Compare closing the loop with a plain structure, published parameters and mujoco.sysid on measured rigs
 ///
 /// Each log in turn is left out of the fit and scored. Results are stored one by one in DIR/RIG/LOG; an interrupted run
-/// is resumed, and a later run repeats only what has changed since. DIR/rigs.md and DIR/rigs.json compare the errors.
+/// is resumed, and a later run repeats only what has changed since. DIR/report.html, DIR/rigs.md and DIR/rigs.json compare the
+/// errors.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  residyn bench rigs --data measured-logs --only C.1 --out bench-rigs"
@@ -75,6 +78,7 @@ impl Rigs {
 
 /// "No" where something failed.
 pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
+    let begun = Begun::now();
     let library = Library::built_in();
     let rigs = open(arguments, &library)?;
     let learner = ResidualTrainer {
@@ -95,6 +99,19 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
     let text = markdown(&summary);
     store.folder.write("rigs.json", &summary)?;
     store.folder.write_text("rigs.md", &text)?;
+    let configuration: Vec<&Rig> = rigs.iter().map(|measured| &measured.rig).collect();
+    let figure = picture(&summary)?;
+    let page = ResultsPage {
+        what: "bench rigs",
+        headline: &summary.headline(),
+        text: &text,
+        shares: Vec::new(),
+        figure: figure.as_deref(),
+        seed: Some(arguments.common.seed),
+        configuration: &serde_json::to_value(configuration)?,
+        call: &begun.call(&files("rigs", std::slice::from_ref(&arguments.rigs))?),
+    };
+    page.write(&store.folder)?;
     let json = || Ok::<_, anyhow::Error>(serde_json::to_string_pretty(&summary)? + "\n");
     voice::print(&if arguments.common.json { json()? } else { text })?;
     Ok(if summary.failures.is_empty() {

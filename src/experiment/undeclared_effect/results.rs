@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{Case, Closed, Experiment, PlanningModel, Trial};
 use crate::data::statistics::{bootstrap, mean, sample_deviation};
+use crate::report::Share;
 use crate::runs::{Purpose, stream};
 
 /// The share of the lost return that is to be recovered after the first number of episodes.
@@ -82,20 +83,39 @@ impl Results {
         }
     }
 
-    /// The results as a table for the terminal.
+    /// The answer in a sentence.
+    pub fn headline(&self) -> String {
+        let verdict = if self.reached { "reached" } else { "missed" };
+        format!(
+            "target: {:.0} % of the lost return won back after {} episode(s) in every case: {verdict}",
+            100.0 * TARGET,
+            self.config.episodes[0]
+        )
+    }
+
+    /// What each model that learns wins back of the lost return.
+    pub fn shares(&self) -> Vec<Share> {
+        let share = |case: &CaseResults, model: &Compared| {
+            let Recovered { share, ci95 } = model.won_back?;
+            Some(Share {
+                what: format!("{}: won back by {}", case.case.name, model.name()),
+                share,
+                interval: ci95,
+            })
+        };
+        let cases = self.cases.iter();
+        cases
+            .flat_map(|case| case.models.iter().filter_map(|model| share(case, model)))
+            .collect()
+    }
+
+    /// The results as tables in Markdown.
     pub fn text(&self) -> String {
         let mut out = String::new();
         for case in &self.cases {
             case.write(&mut out);
         }
-        let verdict = if self.reached { "reached" } else { "missed" };
-        let _ = writeln!(
-            out,
-            "target: {:.0} % of the lost return won back after {} episode(s) in every case: {verdict}",
-            100.0 * TARGET,
-            self.config.episodes[0]
-        );
-        out
+        out + &self.headline() + "\n"
     }
 }
 
@@ -154,12 +174,14 @@ impl CaseResults {
         };
         let _ = writeln!(
             out,
-            "{}: the declared model loses {:.1} ({low:.1} to {high:.1}){lost}",
+            "{}: the declared model loses {:.1} ({low:.1} to {high:.1}){lost}\n\n\
+             | model | return | goal held | won back |\n|---|---|---|---|",
             self.case.name, self.loss
         );
         for model in &self.models {
             model.write(out);
         }
+        out.push('\n');
         for (seed, closed) in self.seeds.iter().zip(&self.closed) {
             for found in closed {
                 found.write(out, *seed);
@@ -186,25 +208,29 @@ impl Compared {
         }
     }
 
+    /// The model, with how much it learnt from.
+    fn name(&self) -> String {
+        match self.episodes {
+            0 => self.model.name().to_owned(),
+            episodes => format!("{}, {episodes} episode(s)", self.model.name()),
+        }
+    }
+
     fn write(&self, out: &mut String) {
-        let data = match self.episodes {
-            0 => String::new(),
-            episodes => format!(", {episodes} episode(s)"),
-        };
-        let _ = write!(
+        let won = self.won_back.map(|Recovered { share, ci95 }| {
+            let [share, low, high] = [share, ci95[0], ci95[1]].map(|x| 100.0 * x);
+            format!("{share:.0} % ({low:.0} to {high:.0})")
+        });
+        let _ = writeln!(
             out,
-            "  {:<24}{:>8.1} +- {:<6.1} goal held in {} of {}",
-            format!("{}{data}", self.model.name()),
+            "| {:<24} | {:>8.1} +- {:<6.1} | {} of {} | {} |",
+            self.name(),
             self.mean,
             self.deviation,
             self.successes,
-            self.returns.len()
+            self.returns.len(),
+            won.unwrap_or_default()
         );
-        if let Some(Recovered { share, ci95 }) = self.won_back {
-            let [share, low, high] = [share, ci95[0], ci95[1]].map(|x| 100.0 * x);
-            let _ = write!(out, ", won back {share:.0} % ({low:.0} to {high:.0})");
-        }
-        out.push('\n');
     }
 }
 
@@ -228,7 +254,7 @@ impl Closed {
         };
         let _ = writeln!(
             out,
-            "  seed {seed}, {} episode(s): {named}; {}",
+            "- seed {seed}, {} episode(s): {named}; {}",
             self.episodes,
             values(&self.parameters)
         );

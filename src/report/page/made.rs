@@ -4,29 +4,57 @@ use maud::{Markup, html};
 use serde::Serialize;
 
 use super::Section;
+use super::results::ResultsPage;
 use crate::report::schema::{LogEntry, Report};
 use crate::report::wording::split;
 use crate::runs::Call;
 
 pub(super) fn section(report: &Report) -> Section {
+    of(html! {
+        (program(&report.version, Some(report.seed)))
+        @if let Some(call) = &report.call { (called(call)) }
+        p { "Test logs: " (split(&report.logs.split)) "." }
+        div.table tabindex="0" { table {
+            thead { tr { th { "log" } th { "role" } th { "rows" } th { "from, s" } th { "to, s" } th { "left out, s" } } }
+            tbody {
+                @for log in &report.logs.train { (row(log, "fitted")) }
+                @for log in &report.logs.test { (row(log, "test")) }
+            }
+        } }
+        (folded("Configuration as resolved", &report.configuration))
+        (folded("Every tuning constant", &report.settings))
+    })
+}
+
+/// The same of an experiment or of the bench.
+pub(super) fn of_results(results: &ResultsPage<'_>) -> Section {
+    of(html! {
+        (program(env!("CARGO_PKG_VERSION"), results.seed))
+        (called(results.call))
+        (folded("Configuration as resolved", results.configuration))
+    })
+}
+
+fn of(answer: Markup) -> Section {
     Section {
         id: "made",
         question: "How was it made?",
-        answer: html! {
-            p { "residyn " (report.version) ", seed " (report.seed) ". The same seed gives the same result on the same machine." }
-            @if let Some(call) = &report.call { (called(call)) }
-            p { "Test logs: " (split(&report.logs.split)) "." }
-            div.table tabindex="0" { table {
-                thead { tr { th { "log" } th { "role" } th { "rows" } th { "from, s" } th { "to, s" } th { "left out, s" } } }
-                tbody {
-                    @for log in &report.logs.train { (row(log, "fitted")) }
-                    @for log in &report.logs.test { (row(log, "test")) }
-                }
-            } }
-            details { summary { "Configuration as resolved" } pre tabindex="0" { (pretty(&report.configuration)) } }
-            details { summary { "Every tuning constant" } pre tabindex="0" { (pretty(&report.settings)) } }
-        },
+        answer,
     }
+}
+
+fn program(version: &str, seed: Option<u64>) -> Markup {
+    html! {
+        p {
+            "residyn " (version)
+            @if let Some(seed) = seed { ", seed " (seed) }
+            ". The same seed gives the same result on the same machine."
+        }
+    }
+}
+
+fn folded(what: &str, value: &impl Serialize) -> Markup {
+    html! { details { summary { (what) } pre tabindex="0" { (pretty(value)) } } }
 }
 
 /// The command, when it ran, and its files with their hashes.

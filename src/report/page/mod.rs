@@ -1,5 +1,5 @@
-//! `report.html`: the report for a browser, made from `report.json` alone. One file that needs no network, in the order of a
-//! reader's questions.
+//! `report.html`: the report for a browser, made from `report.json` alone, and the results of experiments and of the bench. One
+//! file that needs no network, in the order of a reader's questions.
 
 mod better;
 mod calibration;
@@ -9,10 +9,13 @@ mod maths;
 mod missing;
 mod motion;
 mod next;
+mod results;
 mod show;
 mod trust;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+pub use results::{ResultsPage, Share};
 
 use super::schema::Report;
 use super::wording::capitalised;
@@ -34,6 +37,17 @@ pub fn page(report: &Report) -> String {
         next::section(report),
         made::section(report),
     ];
+    let title = format!("{}: {}", report.system, report.headline);
+    let end = html! {
+        (data(report))
+        script { (PreEscaped(include_str!("uplot/uPlot.iife.min.js"))) }
+        script { (PreEscaped(include_str!("script.js"))) }
+    };
+    framed(&title, &head(report), &sections, &end)
+}
+
+/// A page: what stands at its head, its sections, and what the browser reads at its end.
+fn framed(title: &str, head: &Markup, sections: &[Section], end: &Markup) -> String {
     let whole = html! {
         (DOCTYPE)
         html lang="en" {
@@ -41,42 +55,40 @@ pub fn page(report: &Report) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { (report.system) ": " (report.headline) }
+                title { (title) }
                 style { (PreEscaped(include_str!("uplot/uPlot.min.css"))) (PreEscaped(include_str!("style.css"))) }
             }
             body {
-                (header(report, &sections))
+                header {
+                    (head)
+                    nav aria-label="Sections" {
+                        @for section in sections {
+                            a href={ "#" (section.id) } { (section.question) }
+                        }
+                    }
+                }
                 main {
-                    @for section in &sections {
+                    @for section in sections {
                         section id=(section.id) {
                             h2 { (section.question) }
                             (section.answer)
                         }
                     }
                 }
-                (data(report))
-                script { (PreEscaped(include_str!("uplot/uPlot.iife.min.js"))) }
-                script { (PreEscaped(include_str!("script.js"))) }
+                (end)
             }
         }
     };
     whole.into_string()
 }
 
-fn header(report: &Report, sections: &[Section]) -> Markup {
+fn head(report: &Report) -> Markup {
     html! {
-        header {
-            p.system { (report.system) }
-            h1 { (report.headline) }
-            p { (capitalised(&report.reason)) "." }
-            @for (log, finding) in report.serious() {
-                p.serious { strong { (log) } ": " (finding.to_string()) }
-            }
-            nav aria-label="Sections" {
-                @for section in sections {
-                    a href={ "#" (section.id) } { (section.question) }
-                }
-            }
+        p.system { (report.system) }
+        h1 { (report.headline) }
+        p { (capitalised(&report.reason)) "." }
+        @for (log, finding) in report.serious() {
+            p.serious { strong { (log) } ": " (finding.to_string()) }
         }
     }
 }

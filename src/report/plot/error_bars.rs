@@ -10,7 +10,6 @@ use super::legend::{Entry, Sample, begin};
 use super::scale::{Range, three_digits};
 use super::style::{MARGIN, Role, Stroke, TEXT_SIZE, WIDTH};
 use super::{JointKind, PlotError};
-use crate::data::Joint;
 
 const BAR_PX: f64 = 15.0;
 const BAR_PITCH_PX: f64 = 18.0;
@@ -24,13 +23,12 @@ const NUMBER_PX: f64 = 104.0;
 const MIDDLE_PX: f64 = BAR_PX / 2.0 + TO_BASELINE;
 const QUANTITY: &str = "position error, RMS";
 
-/// Position errors of one joint at one horizon.
+/// Position errors of one joint, or of a rig, at one horizon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorRow {
-    pub joint: Joint,
-    /// The joint for people, as in `2 (elbow)`.
-    pub label: String,
-    /// How the joint moves.
+    /// What is predicted, for people: `Joint 2 (elbow)`, or the name of a rig.
+    pub of: String,
+    /// How it moves.
     pub kind: JointKind,
     /// How far ahead the models predict.
     pub horizon_s: f64,
@@ -47,21 +45,14 @@ pub struct Bar {
     pub error: f64,
 }
 
-/// Draws one panel a joint, in the order of the rows: for each horizon a bar a model, with its number at the end.
+/// Draws one panel a joint or rig, in the order of the rows: for each horizon a bar a model, with its number at the end.
 ///
-/// Joints have an axis each: what compares is the models, and the error of one joint can be many times another's.
+/// Each has an axis of its own: what compares is the models, and the error of one joint can be many times another's.
 /// An error that is not finite is written out as diverged.
 pub fn error_bars(rows: &[ErrorRow], title: &str) -> Result<String, PlotError> {
     let (mut canvas, mut top) = begin(title, rows, entries)?;
-    let mut joints: Vec<Joint> = Vec::new();
-    for row in rows {
-        if !joints.contains(&row.joint) {
-            joints.push(row.joint);
-        }
-    }
-    for joint in joints {
-        let rows: Vec<&ErrorRow> = rows.iter().filter(|row| row.joint == joint).collect();
-        top = draw_panel(&mut canvas, &rows, top + HEAD) + FOOT;
+    for panel in rows.chunk_by(|a, b| a.of == b.of) {
+        top = draw_panel(&mut canvas, panel, top + HEAD) + FOOT;
     }
     Ok(canvas.finish(top + 6.0))
 }
@@ -72,9 +63,9 @@ fn entries(rows: &[ErrorRow]) -> Vec<Entry> {
         .collect()
 }
 
-/// Draws the rows of one joint from `top` on, and says where their frame ends.
-fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
-    let Some(ErrorRow { label, kind, .. }) = rows.first() else {
+/// Draws the rows of one panel from `top` on, and says where their frame ends.
+fn draw_panel(canvas: &mut Canvas, rows: &[ErrorRow], top: f64) -> f64 {
+    let Some(ErrorRow { of, kind, .. }) = rows.first() else {
         return top;
     };
     let bars: usize = rows.iter().map(|row| row.bars.len()).sum();
@@ -105,7 +96,7 @@ fn draw_panel(canvas: &mut Canvas, rows: &[&ErrorRow], top: f64) -> f64 {
     let frame = Frame { area, x: &x, y: &y };
     canvas.add(frame.grid());
     canvas.add(frame.x_labels());
-    canvas.add(heading(area, &format!("Joint {label}")));
+    canvas.add(heading(area, of));
     let mut next = top + GROUP_GAP_PX;
     for row in rows {
         next = draw_group(canvas, &frame, row, factor, next) + GROUP_GAP_PX;
@@ -196,7 +187,6 @@ fn readable(error: f64, unit: &str) -> (f64, String) {
 #[cfg(test)]
 mod tests {
     use super::{Bar, ErrorRow, error_bars};
-    use crate::data::Joint;
     use crate::report::plot::{JointKind, PlotError, Role};
 
     fn row(before: f64, after: Option<f64>) -> ErrorRow {
@@ -207,8 +197,7 @@ mod tests {
         };
         let before = bar(Role::Before, "before", before);
         ErrorRow {
-            joint: Joint::at(0),
-            label: "1".into(),
+            of: "Joint 1".into(),
             kind: JointKind::Revolute,
             horizon_s: 0.5,
             bars: std::iter::once(before)
