@@ -55,6 +55,7 @@ pub mod files;
 pub mod formats;
 pub mod identify;
 pub mod lanes;
+pub mod limits;
 #[cfg(feature = "train")]
 pub mod mbrl;
 pub mod model;

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use super::grid::{Cell, GridError, Group, Source, id};
 use super::hidden::Hidden;
-use crate::files::beside_or_named;
+use crate::files::{beside_or_named, read_text};
 
 /// The contents of `cell.json`: what is known of the logs beside it.
 #[derive(Debug, Deserialize)]
@@ -48,7 +48,7 @@ pub fn recorded(folder: &Path, grid: &Path) -> Result<Vec<Cell>, GridError> {
 
 fn cell(folder: &Path, number: u64, grid: &Path) -> Result<Cell, GridError> {
     let path = folder.join("cell.json");
-    let text = std::fs::read_to_string(&path).map_err(|source| GridError::Open {
+    let text = read_text(&path).map_err(|source| GridError::Open {
         path: path.clone(),
         source,
     })?;

@@ -12,7 +12,7 @@ use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
-use crate::files::beside_or_named;
+use crate::files::{beside_or_named, from_toml, read_text};
 
 /// Why a grid cannot be run.
 #[derive(Debug, Error)]
@@ -170,7 +170,7 @@ pub enum Source {
 /// # Errors
 /// A file that cannot be read or refers to something unknown.
 pub fn read(path: &Path) -> Result<Vec<Cell>, GridError> {
-    let text = std::fs::read_to_string(path).map_err(|source| GridError::Open {
+    let text = read_text(path).map_err(|source| GridError::Open {
         path: path.to_owned(),
         source,
     })?;
@@ -186,7 +186,7 @@ pub fn cells(path: &Path, text: &str) -> Result<Vec<Cell>, GridError> {
         path: path.to_owned(),
         message,
     };
-    let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+    let file: File = from_toml(text).map_err(|error| wrong(error.to_string()))?;
     file.check().map_err(wrong)?;
     let mut all = Vec::new();
     for (number, series) in file.series.iter().enumerate() {

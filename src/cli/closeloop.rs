@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     leave_out: Vec<LeaveOut>,
     /// Afterwards repeat the search on this many simulations of the accepted model: how often does it name an effect
     /// where there is none, and how small an effect would it name? Takes about as long as so many runs
-    #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS")]
+    #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS", value_parser = inputs::count)]
     calibrate: Option<NonZeroUsize>,
     /// Time after which the search for effects stops where it stands, and the report says so: 90s, 10min, 2h
     #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]

@@ -34,7 +34,7 @@ pub(super) struct Arguments {
     /// Task file, or the name of a built-in task; by default a built-in one of the plant's system
     #[arg(long, value_name = "FILE")]
     task: Option<PathBuf>,
-    #[arg(long, default_value = "1")]
+    #[arg(long, default_value = "1", value_parser = inputs::count)]
     episodes: NonZeroUsize,
     /// Steps of a plan that are executed before the next, instead of the task's
     #[arg(long, value_name = "STEPS")]

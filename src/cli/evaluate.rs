@@ -76,7 +76,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         inputs::logs(&arguments.test, &declared)
     })?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
+    inputs::print_mass_fault(&declared);
     inputs::print_notes_and_faults(&logs, &declared.columns);
+    let steps = logs.iter().map(Log::median_step);
+    let step_s = steps.fold(f64::INFINITY, f64::min);
+    if let Some(short) = arguments.horizon.iter().find(|horizon| **horizon < step_s) {
+        bail!(
+            "--horizon {short:?}: the logs have a row every {step_s:.2e} s; give a longer horizon"
+        );
+    }
     let offsets = arguments
         .calibrate
         .map(|share| calibrate(&dynamics, &mut logs, share))

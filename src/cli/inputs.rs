@@ -1,5 +1,6 @@
 //! Inputs that several commands share: libraries, models, logs.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -7,6 +8,7 @@ use clap::Args;
 
 use super::voice;
 use crate::data::{Columns, LeaveOut, Log, audit_together, leave_out};
+use crate::limits::RUNS;
 use crate::model::{Library, Model, effect_files};
 
 /// The effects that model files may name: the built-in ones and the user's own.
@@ -43,6 +45,15 @@ pub(super) struct ModelArguments {
     /// Model file, or the name of a built-in system
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+}
+
+/// How many logs, models, episodes or simulations a flag asks for.
+pub(super) fn count(text: &str) -> Result<NonZeroUsize, String> {
+    match text.parse() {
+        Ok(count) if count <= RUNS => NonZeroUsize::new(count),
+        _ => None,
+    }
+    .ok_or_else(|| format!("write a whole number from 1 to {RUNS}"))
 }
 
 /// The source of a model.

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs, voice};
 use crate::data::Joint;
+use crate::files::check_room;
 use crate::model::Library;
 use crate::plant::Plant;
 
@@ -51,9 +52,10 @@ impl FromStr for EffectSetting {
     fn from_str(text: &str) -> Result<Self, String> {
         let usage = "write NAME=VALUE, NAME@JOINT=VALUE or NAME.PARAMETER=VALUE";
         let (target, value) = text.split_once('=').ok_or(usage)?;
-        let value = value
-            .parse()
-            .map_err(|_| format!("{value:?} is not a number; {usage}"))?;
+        let value = match value.parse::<f64>() {
+            Ok(number) if number.is_finite() => number,
+            _ => return Err(format!("{value:?} is not a number; {usage}")),
+        };
         let (target, parameter) = match target.split_once('.') {
             Some((target, parameter)) => (target, Some(parameter.to_owned())),
             None => (target, None),
@@ -79,14 +81,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut plant = Plant::read(&arguments.plant, &library)?;
     add_effects(&mut plant, &library, &arguments.effect)?;
     if let Some(duration) = arguments.duration {
-        if !(duration * plant.sensor.rate_hz >= 2.0 && duration.is_finite()) {
-            bail!(
-                "--duration {duration}: too short for two rows at {} Hz",
-                plant.sensor.rate_hz
-            );
-        }
-        plant.recording.duration_s = duration;
+        let lasting = plant.lasting(duration);
+        plant = lasting.with_context(|| format!("--duration {duration:?}"))?;
     }
+    check_room(&arguments.out)?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.common.seed);
     let log = voice::stage("simulating", || plant.record(&mut rng))?;
     log.write(&arguments.out)

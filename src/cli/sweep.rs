@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// Number of models; their initial weights have the seeds --seed, --seed + 1, ...
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", value_parser = inputs::count)]
     seeds: NonZeroUsize,
     /// Weights of the penalty, one per model, from LOW to HIGH in equal ratios
     #[arg(long, value_name = "LOW-HIGH")]

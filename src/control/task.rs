@@ -5,7 +5,8 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::files::text_or_embedded;
+use crate::files::{from_toml, text_or_embedded};
+use crate::limits::LOG_ROWS;
 use crate::model::Dynamics;
 use crate::plan::{Objective, Settings};
 use crate::plant::{Noise, Plant, Rig};
@@ -119,7 +120,7 @@ impl Task {
             path: path.to_owned(),
             message,
         };
-        let mut task: Self = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        let mut task: Self = from_toml(text).map_err(|error| wrong(error.to_string()))?;
         path.clone_into(&mut task.path);
         task.check().map_err(wrong)?;
         Ok(task)
@@ -258,8 +259,8 @@ impl Task {
                 self.step_s
             ));
         }
-        if self.steps == 0 {
-            return Err("`steps` must be at least 1".into());
+        if !(1..=LOG_ROWS).contains(&self.steps) {
+            return Err(format!("`steps` is from 1 to {LOG_ROWS}"));
         }
         self.planner.check()?;
         if !(1..=self.planner.horizon).contains(&self.replan) {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::column::{Column, Quantity};
 use super::error::{LogError, Place};
+use crate::expr::listed;
 
 /// Columns in which a log file holds time, angles, velocities and torques, and their units.
 ///
@@ -310,7 +311,7 @@ impl Header<'_> {
             return format!(
                 "the log has the joints {}: give those of the model their names, joint_names = [\"{}\", ..] under [system] in \
                  the model file, or name the columns under [columns]: q = [\"q_{}\", ..]",
-                joints.join(", "),
+                listed(joints.iter().copied()),
                 joints[0],
                 joints[0]
             );
@@ -341,7 +342,10 @@ impl Header<'_> {
         };
         let known = match nearest {
             Some(name) => format!("did you mean {name:?}?"),
-            None => format!("the header has {}.", self.names.join(", ")),
+            None => {
+                let names = listed(self.names.iter().map(String::as_str));
+                format!("the header has {names}.")
+            }
         };
         format!("{known} Rename it, or name it under [columns] in the model file: {entry}")
     }

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::files::OutputError;
+use crate::limits::READING;
 
 /// Where in a file something is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -180,6 +181,11 @@ pub enum CellFault {
     /// NaN, infinity, or a number too large to hold.
     #[error("{0:?} is not a finite number; delete the row, or cut the log there")]
     NotFinite(String),
+    /// More than any sensor reads.
+    #[error(
+        "{0:e} is beyond {READING:e}, which no sensor reads; delete the row, or cut the log there"
+    )]
+    TooLarge(f64),
     /// A time that is not later than the one before.
     #[error(
         "time {time} s does not come after {previous} s of {previous_place}; sort the rows, \

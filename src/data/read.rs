@@ -10,6 +10,8 @@ use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
 use super::table::{Table, open};
+use crate::expr::listed;
+use crate::limits::READING;
 
 impl Log {
     /// Reads one trajectory of a rig with `joints` joints from a file, or a folder, of any format that is read.
@@ -76,7 +78,10 @@ pub(super) fn log(
         let number = |row: usize| {
             let found = table.number(row, cell.index);
             let found = found.map_err(|why| fault(row, cell.index, why))?;
-            Ok(cell.scale * found)
+            match cell.scale * found {
+                reading if reading.abs() <= READING => Ok(reading),
+                _ => Err(fault(row, cell.index, CellFault::TooLarge(found))),
+            }
         };
         (0..rows).map(number).collect()
     };
@@ -134,7 +139,8 @@ fn notes(layout: &Layout) -> Vec<String> {
             .iter()
             .map(|name| format!("{name:?}"))
             .collect();
-        notes.push(format!("columns ignored: {}", names.join(", ")));
+        let names = listed(names.iter().map(String::as_str));
+        notes.push(format!("columns ignored: {names}"));
     }
     if layout.qd.is_none() {
         notes.push(

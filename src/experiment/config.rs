@@ -4,6 +4,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::ExperimentError;
+use crate::files::{from_toml, read_text};
+use crate::limits::RUNS;
 use crate::model::MlpSettings;
 use crate::train::FitSettings;
 use crate::train::recipe::RecipeError;
@@ -68,18 +70,17 @@ impl Config {
     }
 
     fn check(&self) -> Result<(), String> {
-        let counts = [
-            ("seeds", self.seeds == 0),
-            ("random", self.random == 0),
-            ("gather", self.gather == 0),
-            ("[[method]]", self.method.is_empty()),
-            (
-                "rounds",
-                self.method.iter().any(|method| method.rounds == 0),
-            ),
-        ];
-        if let Some((name, _)) = counts.iter().find(|(_, none)| *none) {
-            return Err(format!("`{name}` must be at least 1"));
+        let rounds = self.method.iter().map(|method| ("rounds", method.rounds));
+        let mut counts = [
+            ("seeds", usize::try_from(self.seeds).unwrap_or(usize::MAX)),
+            ("random", self.random),
+            ("gather", self.gather),
+            ("[[method]]", self.method.len()),
+        ]
+        .into_iter()
+        .chain(rounds);
+        if let Some((name, found)) = counts.find(|(_, count)| !(1..=RUNS).contains(count)) {
+            return Err(format!("`{name}` is from 1 to {RUNS}, found {found}"));
         }
         for (k, method) in self.method.iter().enumerate() {
             let name = &method.name;
@@ -108,9 +109,9 @@ impl Config {
 
 /// Reads a configuration in TOML.
 pub(super) fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(|source| RecipeError::Open {
+    let text = read_text(path).map_err(|source| RecipeError::Open {
         path: path.to_owned(),
         source,
     })?;
-    toml::from_str(&text).map_err(|error| ExperimentError::file(path, error.to_string()))
+    from_toml(&text).map_err(|error| ExperimentError::file(path, error.to_string()))
 }

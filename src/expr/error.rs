@@ -1,12 +1,13 @@
+use std::borrow::Cow;
 use std::fmt;
 use std::ops::Range;
 
 /// An error in a formula, and its place. [`Display`](fmt::Display) shows the formula with carets below that place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FormulaError {
-    /// The whole formula as written.
+    /// The formula as written; of a long one, what is around the place.
     pub formula: String,
-    /// Byte range of the offending place within `formula`.
+    /// Byte range of the offending place within `formula`, or of its beginning.
     pub span: Range<usize>,
     /// The error and, where one is similar, the name that was probably meant.
     pub message: String,
@@ -14,9 +15,11 @@ pub struct FormulaError {
 
 impl FormulaError {
     pub(super) fn new(formula: &str, span: Range<usize>, message: impl Into<String>) -> Self {
+        let shown = around(formula, span.start);
+        let within = |at: usize| at.clamp(shown.start, shown.end) - shown.start;
         Self {
-            formula: formula.to_owned(),
-            span,
+            span: within(span.start)..within(span.end),
+            formula: formula[shown].to_owned(),
             message: message.into(),
         }
     }
@@ -34,11 +37,49 @@ impl fmt::Display for FormulaError {
     }
 }
 
+/// Bytes of a formula that are shown before a place, and behind it.
+const SHOWN: [usize; 2] = [60, 120];
+
+/// The part of a text that is shown for a place in it.
+fn around(text: &str, at: usize) -> Range<usize> {
+    let [before, behind] = SHOWN;
+    let start = text.floor_char_boundary(at.saturating_sub(before));
+    start..text.floor_char_boundary(at + behind)
+}
+
+/// A text that a message quotes, without the end of a long one.
+pub fn shortened(text: &str) -> Cow<'_, str> {
+    let end = text.floor_char_boundary(SHOWN[0]);
+    match end == text.len() {
+        true => text.into(),
+        false => format!("{} ..", &text[..end]).into(),
+    }
+}
+
+/// Names that are listed before a message says that there are more.
+const LISTED: usize = 40;
+
+/// `a, b, c`, of many names the first.
+pub fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.into_iter().collect();
+    let (first, rest) = names.split_at(names.len().min(LISTED));
+    let first: Vec<_> = first.iter().map(|name| shortened(name)).collect();
+    let more = match rest.len() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    first.join(", ") + &more
+}
+
+/// Names that are longer are compared with no other.
+const LONGEST_NAME: usize = 100;
+
 /// The candidate most similar to `name`, if the difference may be a typing error.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name = name.to_lowercase();
     candidates
         .into_iter()
+        .filter(|c| c.len().max(name.len()) <= LONGEST_NAME)
         .map(|c| (distance(&name, &c.to_lowercase()), c))
         .filter(|(distance, c)| *distance <= 1 + c.len().max(name.len()) / 4)
         // Ties are broken by the common prefix.

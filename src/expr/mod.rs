@@ -22,6 +22,7 @@ mod steps;
 mod unit;
 mod units;
 
+pub(crate) use error::listed;
 pub use error::{FormulaError, suggestion};
 pub use eval::Tape;
 pub use graph::Graph;

@@ -2,12 +2,14 @@ use std::ops::Range;
 
 use super::FormulaError;
 use super::op::{Binary, FUNCTIONS, Function};
+use crate::limits::{FORMULA_CHAIN, FORMULA_NESTING};
 
 /// A parsed formula: names are not resolved yet, so that one formula can serve many joints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Formula {
     pub(super) text: String,
     pub(super) root: Term,
+    terms: usize,
 }
 
 /// A part of a formula and the bytes that it was written in.
@@ -15,6 +17,8 @@ pub struct Formula {
 pub(super) struct Term {
     pub(super) kind: Kind,
     pub(super) span: Range<usize>,
+    /// Terms that stand below each other, this one included: what walks the tree calls itself as often.
+    height: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +44,11 @@ impl Formula {
         &self.text
     }
 
+    /// Number of its numbers, names and operations.
+    pub fn terms(&self) -> usize {
+        self.terms
+    }
+
     /// Whether the formula is this name and nothing else.
     pub fn is_name(&self, name: &str) -> bool {
         matches!(&self.root.kind, Kind::Name(own) if own == name)
@@ -54,6 +63,18 @@ impl Formula {
             }
         });
         names
+    }
+}
+
+impl Kind {
+    /// Of the highest operand; 0 without one.
+    fn height(&self) -> usize {
+        match self {
+            Self::Number(_) | Self::Name(_) => 0,
+            Self::Negate(a) => a.height,
+            Self::Infix(_, a, b) => a.height.max(b.height),
+            Self::Call(_, arguments) => arguments.iter().map(|a| a.height).max().unwrap_or(0),
+        }
     }
 }
 
@@ -77,9 +98,14 @@ impl Term {
 /// Operators by rising precedence: `< > <= >=`, `+ -`, `* /`, unary `-`, `^` (to the right).
 ///
 /// # Errors
-/// A [`FormulaError`] that points at the first place that cannot be parsed.
+/// A [`FormulaError`] that points at the first place that cannot be parsed, or that lies too deep ([`crate::limits`]).
 pub fn parse(text: &str) -> Result<Formula, FormulaError> {
-    let mut parser = Parser { text, at: 0 };
+    let mut parser = Parser {
+        text,
+        at: 0,
+        depth: 0,
+        terms: 0,
+    };
     let root = parser.infix(0)?;
     parser.skip_space();
     if parser.at < text.len() {
@@ -89,12 +115,16 @@ pub fn parse(text: &str) -> Result<Formula, FormulaError> {
     Ok(Formula {
         text: text.to_owned(),
         root,
+        terms: parser.terms,
     })
 }
 
 struct Parser<'a> {
     text: &'a str,
     at: usize,
+    /// Operands within each other here.
+    depth: usize,
+    terms: usize,
 }
 
 /// Infix operators, longest spelling first: (spelling, operator, binding power to the left, to the right).
@@ -111,9 +141,25 @@ const INFIX: &[(&str, Infix, u8, u8)] = &[
 ];
 const PREFIX_POWER: u8 = 7;
 
+/// What to do about a formula that is too deep.
+const REMEDY: &str = "give parts of it names of their own under [dynamics.let]";
+
 impl<'a> Parser<'a> {
-    /// Precedence climbing: reads everything that binds at least as strongly as `power`.
+    /// Reads everything that binds at least as strongly as `power`.
     fn infix(&mut self, power: u8) -> Result<Term, FormulaError> {
+        if self.depth == FORMULA_NESTING {
+            return Err(self.error_here(format!(
+                "lies within more than {FORMULA_NESTING} parentheses, calls, signs or powers; {REMEDY}"
+            )));
+        }
+        self.depth += 1;
+        let term = self.climb(power);
+        self.depth -= 1;
+        term
+    }
+
+    /// Precedence climbing.
+    fn climb(&mut self, power: u8) -> Result<Term, FormulaError> {
         let mut left = self.prefix()?;
         while let Some(&(spelling, infix, to_left, to_right)) = self.peek_infix() {
             if to_left < power {
@@ -125,10 +171,7 @@ impl<'a> Parser<'a> {
             self.at += spelling.len();
             let right = self.infix(to_right)?;
             let span = left.span.start..right.span.end;
-            left = Term {
-                kind: Kind::Infix(infix, Box::new(left), Box::new(right)),
-                span,
-            };
+            left = self.term(Kind::Infix(infix, Box::new(left), Box::new(right)), span)?;
         }
         Ok(left)
     }
@@ -139,10 +182,7 @@ impl<'a> Parser<'a> {
         if self.eat('-') {
             let inner = self.infix(PREFIX_POWER)?;
             let span = start..inner.span.end;
-            return Ok(Term {
-                kind: Kind::Negate(Box::new(inner)),
-                span,
-            });
+            return self.term(Kind::Negate(Box::new(inner)), span);
         }
         if self.eat('+') {
             return self.infix(PREFIX_POWER);
@@ -195,11 +235,8 @@ impl<'a> Parser<'a> {
         let span = start..self.at;
         let written = &self.text[span.clone()];
         match written.parse() {
-            Ok(value) => Ok(Term {
-                kind: Kind::Number(value),
-                span,
-            }),
-            Err(_) => Err(self.error_at(span, format!("`{written}` is not a number"))),
+            Ok(value) if f64::is_finite(value) => self.term(Kind::Number(value), span),
+            _ => Err(self.error_at(span, format!("`{written}` is not a number"))),
         }
     }
 
@@ -215,10 +252,8 @@ impl<'a> Parser<'a> {
         if self.rest().starts_with('(') {
             return self.call(name, start);
         }
-        Ok(Term {
-            kind: Kind::Name(name.to_owned()),
-            span: start..start + name.len(),
-        })
+        let span = start..start + name.len();
+        self.term(Kind::Name(name.to_owned()), span)
     }
 
     fn call(&mut self, name: &str, start: usize) -> Result<Term, FormulaError> {
@@ -240,10 +275,7 @@ impl<'a> Parser<'a> {
                 ),
             ));
         }
-        Ok(Term {
-            kind: Kind::Call(function, arguments),
-            span: start..self.at,
-        })
+        self.term(Kind::Call(function, arguments), start..self.at)
     }
 
     fn arguments(&mut self) -> Result<Vec<Term>, FormulaError> {
@@ -260,6 +292,17 @@ impl<'a> Parser<'a> {
             }
             arguments.push(self.infix(0)?);
         }
+    }
+
+    /// A term that was read.
+    fn term(&mut self, kind: Kind, span: Range<usize>) -> Result<Term, FormulaError> {
+        self.terms += 1;
+        let height = kind.height() + 1;
+        if height > FORMULA_CHAIN {
+            let message = format!("more than {FORMULA_CHAIN} operations in a row; {REMEDY}");
+            return Err(self.error_at(span, message));
+        }
+        Ok(Term { kind, span, height })
     }
 
     fn peek_infix(&mut self) -> Option<&'static (&'static str, Infix, u8, u8)> {
@@ -343,5 +386,26 @@ mod tests {
         assert!(message("a b").starts_with("expected an operator, found `b`"));
         assert!(message("a ** 2").starts_with("powers are written `^`"));
         assert!(message("1.2.3 + a").starts_with("expected an operator, found `.`"));
+        assert!(message("1e999 * a").starts_with("`1e999` is not a number"));
+    }
+
+    #[test]
+    fn formulas_are_as_deep_as_their_readers_can_go() {
+        let of = |open: &str, close: &str, times| {
+            format!("{}a{}", open.repeat(times), close.repeat(times))
+        };
+        for (open, close) in [("(", ")"), ("-", ""), ("+", ""), ("sin(", ")"), ("a^", "")] {
+            assert!(parse(&of(open, close, 199)).is_ok(), "{open}");
+            for times in [200, 300_000] {
+                let told = message(&of(open, close, times));
+                assert!(told.contains("more than 200 parentheses"), "{told}");
+                assert!(told.len() < 400, "{told}");
+            }
+        }
+        for operation in ["a+", "a*", "a<"] {
+            assert_eq!(parse(&of(operation, "", 999)).unwrap().terms(), 1999);
+            let told = message(&of(operation, "", 300_000));
+            assert!(told.contains("more than 1000 operations"), "{told}");
+        }
     }
 }

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use super::error::suggestion;
+use super::error::{listed, shortened, suggestion};
 use super::graph::Graph;
 use super::op::{Binary, Function, Node, Unary};
 use super::parse::{Formula, Infix, Kind, Term};
@@ -96,10 +96,11 @@ impl Scope {
                 known.sort_unstable();
                 let near = suggestion(name, known.iter().copied());
                 let list = if near.is_empty() {
-                    format!("; known are {}", known.join(", "))
+                    format!("; known are {}", listed(known))
                 } else {
                     near
                 };
+                let name = shortened(name);
                 (term.span.clone(), format!("unknown name `{name}`{list}"))
             }),
             Kind::Negate(inner) => {

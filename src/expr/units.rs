@@ -1,6 +1,7 @@
 //! The units of a formula, from those of its names.
 
 use super::FormulaError;
+use super::error::shortened;
 use super::op::{Binary, Function, Unary};
 use super::parse::{Formula, Infix, Kind, Term};
 use super::unit::Unit;
@@ -112,7 +113,7 @@ impl Reader<'_> {
             let told = format!(
                 "{} in `{}` has to be a pure number or an angle",
                 self.with_unit(term, unit),
-                &self.text[of.span.clone()]
+                shortened(&self.text[of.span.clone()])
             );
             self.tell(term, told);
         }
@@ -136,7 +137,7 @@ impl Reader<'_> {
 
     /// `m*g [N]`, in quotes.
     fn with_unit(&self, term: &Term, unit: Unit) -> String {
-        format!("`{}` [{unit}]", &self.text[term.span.clone()])
+        format!("`{}` [{unit}]", shortened(&self.text[term.span.clone()]))
     }
 
     fn tell(&mut self, at: &Term, message: String) {

@@ -1,4 +1,9 @@
+use std::io;
+use std::path::Path;
+
 use sha2::{Digest, Sha256};
+
+use super::open;
 
 /// A 64-bit hash of contents (FNV-1a), the same on every machine and in every version. It tells changed contents from
 /// unchanged ones; it does not protect against forgery.
@@ -16,6 +21,16 @@ pub fn content_id(bytes: &[u8]) -> String {
 /// The SHA-256 of contents in hexadecimal digits, as `sha256sum` prints it: by it others find the file that was read.
 pub fn sha256(bytes: &[u8]) -> String {
     format!("{:x}", Sha256::digest(bytes))
+}
+
+/// [`sha256`] of a file, however large it is.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn sha256_of(path: &Path) -> io::Result<String> {
+    let mut hash = Sha256::new();
+    io::copy(&mut open(path)?, &mut hash)?;
+    Ok(format!("{:x}", hash.finalize()))
 }
 
 #[cfg(test)]

@@ -2,6 +2,8 @@ use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::read_text;
+
 /// `file` as the file at `path` names it: relative to the folder that `path` is in.
 pub fn beside(path: &Path, file: &Path) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(file)
@@ -32,7 +34,7 @@ pub fn text_or_embedded(
     {
         return Ok(Cow::Borrowed(text));
     }
-    std::fs::read_to_string(path).map(Cow::Owned)
+    read_text(path).map(Cow::Owned)
 }
 
 #[cfg(test)]

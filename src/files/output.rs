@@ -2,6 +2,8 @@ use std::fs;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use super::input::kind;
+
 /// As many as Linux follows.
 const MOST_LINKS: usize = 40;
 
@@ -19,6 +21,20 @@ impl OutputError {
         let path = path.to_owned();
         move |source| Self { path, source }
     }
+}
+
+/// What a run may write, as far as that is known before it \[bytes\].
+const ROOM: usize = 4 << 20;
+
+/// Look whether results can be written to `path`, a file or a folder that need not exist, before they are computed.
+///
+/// # Errors
+/// A folder that cannot be written, or that has no room.
+pub fn check_room(path: &Path) -> Result<(), OutputError> {
+    let folder = path.ancestors().find(|folder| folder.is_dir());
+    let folder = folder.unwrap_or(Path::new("."));
+    let room = || tempfile::tempfile_in(folder)?.write_all(&vec![0; ROOM]);
+    room().map_err(OutputError::of(path))
 }
 
 /// Write a file whole or not at all: under a temporary name in the same folder, which is then renamed. Symbolic links
@@ -126,12 +142,7 @@ fn target_of(path: &Path) -> io::Result<PathBuf> {
     match fs::metadata(path) {
         Ok(found) if found.is_file() => fs::canonicalize(path),
         Ok(found) => {
-            let kind = if found.is_dir() {
-                "a folder"
-            } else {
-                "a device or a pipe"
-            };
-            let message = format!("it is {kind}, not a regular file");
+            let message = format!("it is {}, not a regular file", kind(&found));
             Err(io::Error::new(ErrorKind::InvalidInput, message))
         }
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(end_of_links(path)),

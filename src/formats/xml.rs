@@ -4,9 +4,11 @@ use std::cell::RefCell;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Error, Node};
 
 use super::robot::element::Element;
+use crate::files::read_text;
+use crate::limits::XML_DEPTH;
 use crate::model::FileError;
 
 /// An XML file, and notes about it.
@@ -18,7 +20,7 @@ pub(in crate::formats) struct Source<'x> {
 
 /// The text of a file.
 pub(in crate::formats) fn text(path: &Path) -> Result<String, FileError> {
-    std::fs::read_to_string(path).map_err(|error| FileError {
+    read_text(path).map_err(|error| FileError {
         path: path.to_owned(),
         place: None,
         message: format!("cannot be read: {error}; give an XML file"),
@@ -29,13 +31,27 @@ impl<'x> Source<'x> {
     pub fn new(path: &Path, text: &'x str) -> Result<Self, FileError> {
         let document = Document::parse(text).map_err(|error| FileError {
             path: path.to_owned(),
-            place: Some((error.pos().row as usize, error.pos().col as usize)),
+            place: Some(place(&error, text)),
             message: format!("this is not valid XML: {error}"),
         })?;
-        Ok(Self {
+        let source = Self {
             path: path.to_owned(),
             document,
             notes: RefCell::default(),
+        };
+        source.check_depth()?;
+        Ok(source)
+    }
+
+    /// Readers of elements call themselves for those within.
+    fn check_depth(&self) -> Result<(), FileError> {
+        let mut level = vec![self.document_root()];
+        for _ in 0..XML_DEPTH {
+            level = level.into_iter().flat_map(elements).collect();
+        }
+        level.first().map_or(Ok(()), |node| {
+            let message = format!("lies within more than {XML_DEPTH} elements; flatten the file");
+            Err(self.error(*node, message))
         })
     }
 
@@ -121,6 +137,15 @@ impl<'x> Source<'x> {
         let at = attribute.map_or(node.range().start, |a| a.range_value().start);
         self.error_at(at, message)
     }
+}
+
+/// Line and column: what is never closed is missed at the end.
+fn place(error: &Error, text: &str) -> (usize, usize) {
+    if matches!(error, Error::UnclosedRootNode) {
+        let last = text.lines().last().unwrap_or_default();
+        return (text.lines().count(), last.chars().count() + 1);
+    }
+    (error.pos().row as usize, error.pos().col as usize)
 }
 
 /// The child elements.

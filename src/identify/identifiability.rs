@@ -93,6 +93,9 @@ pub fn open(
     covariance: &DMatrix<f64>,
 ) -> Option<Open> {
     let size = fit.columns.len();
+    if size == 0 {
+        return None;
+    }
     let magnitude = |i: usize| magnitude(dynamics, found, fit, i);
     let relative = DMatrix::from_fn(size, size, |i, j| {
         covariance[(i, j)] / (magnitude(i) * magnitude(j))

@@ -185,7 +185,12 @@ impl Uncertainty {
     /// Two-sided p-value of the hypothesis that the i-th column is `null`, given `value`.
     pub fn p_value(&self, i: usize, value: f64, null: f64) -> f64 {
         let deviation = self.covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
-        2.0 * (1.0 - self.student(i).cdf(((value - null) / deviation).abs()))
+        let distance = ((value - null) / deviation).abs();
+        // A value that is no number says nothing.
+        if distance.is_nan() {
+            return 1.0;
+        }
+        2.0 * (1.0 - self.student(i).cdf(distance))
     }
 
     fn student(&self, i: usize) -> StudentsT {

@@ -1,5 +1,6 @@
 //! A model file, read whole and checked.
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use super::reader::{Document, FileError, Located, Section};
 use super::system::{Equations, Model, Motion};
 use super::{chain_in_file, effects_in_file, sections};
 use crate::data::{Joint, Quantity};
-use crate::expr::{Formula, Graph, Scope};
+use crate::expr::{Formula, Graph, Scope, parse};
 
 impl Model {
     /// Read a model file. `library` is where its `[[effect]]` entries are looked up.
@@ -96,13 +97,16 @@ impl Model {
             .iter()
             .map(|(name, _)| ("dynamics", name));
         for (section, name) in parameters.chain(lets) {
-            if taken.contains(name) {
-                let section = top.required_section(section)?;
-                return Err(
-                    section.error_at(name, format!("the name `{name}` is taken; choose another"))
-                );
-            }
-            taken.push(name.clone());
+            let fault = if !parse(name).is_ok_and(|formula| formula.is_name(name)) {
+                "is none that formulas can use; take letters, digits and _"
+            } else if taken.contains(name) {
+                "is taken; choose another"
+            } else {
+                taken.push(name.clone());
+                continue;
+            };
+            let section = top.required_section(section)?;
+            return Err(section.error_at(name, format!("the name `{name}` {fault}")));
         }
         Ok(())
     }
@@ -125,8 +129,14 @@ impl Model {
         for (k, (name, formula)) in lets.iter().enumerate() {
             let mut later = lets[k..].iter().map(|(later, _)| later.as_str());
             if let Some(later) = later.find(|later| formula.value.names().contains(later)) {
-                let told =
-                    format!("`{name}` uses `{later}`, which is defined after it; move it up");
+                let told = match circle(lets, name, later) {
+                    Some(circle) => format!(
+                        "`{name}` is defined by itself: {circle}; write one of these without the next"
+                    ),
+                    None => {
+                        format!("`{name}` uses `{later}`, which is defined after it; move it up")
+                    }
+                };
                 return Err(document.error(formula.at, told));
             }
             let node = lower(&scope, formula)?;
@@ -148,6 +158,28 @@ impl Model {
         }
         Ok(())
     }
+}
+
+/// `a -> b -> a`: how the intermediate `name` uses itself by way of `next`, if it does.
+fn circle(lets: &[(String, Located<Formula>)], name: &str, next: &str) -> Option<String> {
+    let mut users = HashMap::from([(next, name)]);
+    let mut open = vec![next];
+    while let Some(at) = open.pop() {
+        if at == name {
+            let back = std::iter::successors(Some(users[name]), |at| Some(users[at]));
+            let mut between: Vec<&str> = back.take_while(|at| *at != name).collect();
+            between.reverse();
+            return Some([&[name], between.as_slice(), &[name]].concat().join(" -> "));
+        }
+        let formula = lets.iter().find(|(own, _)| own == at);
+        for used in formula.map_or_else(Vec::new, |(_, formula)| formula.value.names()) {
+            users.entry(used).or_insert_with(|| {
+                open.push(used);
+                at
+            });
+        }
+    }
+    None
 }
 
 /// Equations of motion by formulas, or those of a chain of bodies.

@@ -43,5 +43,4 @@ pub use ready_drive::ReadyDrive;
 pub(crate) use residual::nothing_but;
 pub use residual::with_residual;
 pub use saved::{ModelShape, ModelWeights, Origin, SavedModelError, SavedNetwork, SavedParameter};
-pub use sections::MOST_JOINTS;
 pub use system::Model;

@@ -1,5 +1,8 @@
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::limits::{LAYER_WIDTH, NETWORK_NUMBERS};
 
 /// How the joint positions enter a network. Applies to every joint, so a model with a sliding joint
 /// takes [`Angles::Raw`].
@@ -38,11 +41,40 @@ pub enum LastLayer {
 #[serde(deny_unknown_fields)]
 pub struct MlpSettings {
     /// Neurons of each hidden layer; ReLU follows each of them.
+    #[serde(deserialize_with = "hidden")]
     pub hidden: Vec<usize>,
     #[serde(default)]
     pub angles: Angles,
     #[serde(default)]
     pub on: ResidualOn,
+}
+
+/// Check the widths of hidden layers.
+///
+/// # Errors
+/// A width or a number of weights that no network here has, and what it may be.
+pub(super) fn check_hidden(hidden: &[usize]) -> Result<(), String> {
+    if hidden
+        .iter()
+        .any(|width| !(1..=LAYER_WIDTH).contains(width))
+    {
+        return Err(format!(
+            "`hidden` lists layer widths: whole numbers from 1 to {LAYER_WIDTH}"
+        ));
+    }
+    let numbers: usize = hidden.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    match numbers <= NETWORK_NUMBERS {
+        true => Ok(()),
+        false => Err(format!(
+            "`hidden` makes {numbers} weights, and a network has at most {NETWORK_NUMBERS}"
+        )),
+    }
+}
+
+fn hidden<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<usize>, D::Error> {
+    let hidden = Vec::deserialize(from)?;
+    check_hidden(&hidden).map_err(D::Error::custom)?;
+    Ok(hidden)
 }
 
 impl MlpSettings {

@@ -1,5 +1,6 @@
 //! Reads hand-written TOML. Errors name file, line and column; for an unknown key they suggest a similar known one.
 
+use std::cell::Cell;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::expr::{Formula, FormulaError, parse, suggestion};
+use crate::files::read_text;
+use crate::limits::{MODEL_NAMES, MODEL_TERMS};
 
 /// An error in a model or effect file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -39,6 +42,8 @@ pub(super) enum NameOrTable<'a> {
 pub(super) struct Document {
     pub path: PathBuf,
     pub text: String,
+    /// In the formulas that were read.
+    terms: Cell<usize>,
 }
 
 /// A value and its position in the text, in bytes.
@@ -53,11 +58,12 @@ impl Document {
         Self {
             path: path.to_owned(),
             text: text.to_owned(),
+            terms: Cell::new(0),
         }
     }
 
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|error| FileError {
+        let text = read_text(path).map_err(|error| FileError {
             path: path.to_owned(),
             place: None,
             message: format!("cannot be read: {error}"),
@@ -94,12 +100,21 @@ impl Document {
     }
 
     pub fn formula(&self, text: &Located<String>) -> Result<Located<Formula>, FileError> {
-        match parse(&text.value) {
-            Ok(value) => Ok(Located { value, at: text.at }),
-            Err(error) => Err(self.formula_error(text.at, &error)),
+        let value = parse(&text.value).map_err(|error| self.formula_error(text.at, &error))?;
+        self.terms.update(|terms| terms + value.terms());
+        if self.terms.get() > MODEL_TERMS {
+            let message = format!(
+                "the formulas up to here have more than {MODEL_TERMS} numbers, names and operations; describe a large \
+                 mechanism under [chain]"
+            );
+            return Err(self.error(text.at, message));
         }
+        Ok(Located { value, at: text.at })
     }
 }
+
+/// Above it numbers have gaps, 2^53.
+const MOST_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 type Value<'a> = Spanned<DeValue<'a>>;
 
@@ -175,7 +190,7 @@ impl<'a> Section<'a> {
         let Some(number) = self.number(key)? else {
             return Ok(None);
         };
-        if number.fract() != 0.0 || !(0.0..1e9).contains(&number) {
+        if number.fract() != 0.0 || !(0.0..MOST_WHOLE).contains(&number) {
             return Err(self.error_at(
                 key,
                 format!("`{key}` must be a whole number, found {number}"),
@@ -199,6 +214,11 @@ impl<'a> Section<'a> {
         self.list(key, "a list of numbers", Self::number_of)
     }
 
+    /// Numbers that may be infinite.
+    pub fn limits(&self, key: &str) -> Result<Option<Vec<f64>>, FileError> {
+        self.list(key, "a list of numbers", Self::limit_of)
+    }
+
     /// The admissible range that `positive` and `bounds` declare.
     pub fn bounds(&self) -> Result<[f64; 2], FileError> {
         let lowest = if self.flag("positive")? {
@@ -206,7 +226,7 @@ impl<'a> Section<'a> {
         } else {
             f64::NEG_INFINITY
         };
-        match self.numbers("bounds")?.as_deref() {
+        match self.limits("bounds")?.as_deref() {
             None => Ok([lowest, f64::INFINITY]),
             Some(&[low, high]) if low < high => Ok([low.max(lowest), high]),
             Some(_) => Err(self.error_at(
@@ -333,6 +353,7 @@ impl<'a> Section<'a> {
         of: impl Fn(&Self, &str, &Value<'a>) -> Result<T, FileError>,
     ) -> Result<Vec<(String, T)>, FileError> {
         let entries = self.table.iter();
+        self.check_count(self.at, entries.len())?;
         entries
             .map(|(key, value)| Ok((key.get_ref().to_string(), of(self, key.get_ref(), value)?)))
             .collect()
@@ -359,7 +380,16 @@ impl<'a> Section<'a> {
     ) -> Result<Vec<T>, FileError> {
         let items = value.get_ref().as_array();
         let items = items.ok_or_else(|| self.wrong(value, key, wanted))?;
+        self.check_count(value.span().start, items.len())?;
         items.iter().map(|item| of(self, key, item)).collect()
+    }
+
+    fn check_count(&self, at: usize, entries: usize) -> Result<(), FileError> {
+        if entries <= MODEL_NAMES {
+            return Ok(());
+        }
+        let message = format!("{entries} entries; at most {MODEL_NAMES} are read");
+        Err(self.document.error(at, message))
     }
 
     fn table_of(&self, key: &str, value: &Value<'a>) -> Result<Section<'a>, FileError> {
@@ -398,15 +428,31 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// A finite number.
     fn number_of(&self, key: &str, value: &Value<'a>) -> Result<f64, FileError> {
-        let written = match value.get_ref() {
-            DeValue::Float(number) => number.as_str(),
-            DeValue::Integer(number) => number.as_str(),
+        let number = self.float_of(key, value)?;
+        if number.is_finite() {
+            return Ok(number);
+        }
+        let message = format!("`{key}` is no finite number; write one, such as 0.25");
+        Err(self.document.error(value.span().start, message))
+    }
+
+    /// A number, infinite where it limits nothing.
+    fn limit_of(&self, key: &str, value: &Value<'a>) -> Result<f64, FileError> {
+        match self.float_of(key, value)? {
+            number if number.is_nan() => Err(self.wrong(value, key, "a decimal number")),
+            number => Ok(number),
+        }
+    }
+
+    fn float_of(&self, key: &str, value: &Value<'a>) -> Result<f64, FileError> {
+        let number = match value.get_ref() {
+            DeValue::Float(number) => number.as_str().parse().ok(),
+            // Whoever reads the file as plain TOML takes them for these.
+            DeValue::Integer(number) => number.as_str().parse::<i64>().ok().map(|n| n as f64),
             _ => return Err(self.wrong(value, key, "a number")),
         };
-        match written.parse::<f64>() {
-            Ok(number) if !number.is_nan() => Ok(number),
-            _ => Err(self.wrong(value, key, "a decimal number")),
-        }
+        number.ok_or_else(|| self.wrong(value, key, "a decimal number"))
     }
 }

@@ -2,10 +2,12 @@
 
 use std::collections::HashSet;
 
+use super::network::check_hidden;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Motion};
 use super::{MlpSettings, Parameter};
 use crate::expr::Formula;
+use crate::limits::JOINTS;
 
 pub(super) const SYSTEM_KEYS: &[&str] = &[
     "name",
@@ -18,14 +20,12 @@ pub(super) const SYSTEM_KEYS: &[&str] = &[
 const PARAMETER_KEYS: &[&str] = &[
     "value", "unit", "about", "positive", "bounds", "fixed", "ci95",
 ];
-/// Enough for every serial arm; a limit catches slips such as `joints = 100`.
-pub const MOST_JOINTS: usize = 12;
 
 pub(super) fn joints(section: &Section<'_>) -> Result<usize, FileError> {
     match section.whole("joints")? {
-        Some(joints @ 1..=MOST_JOINTS) => Ok(joints),
+        Some(joints @ 1..=JOINTS) => Ok(joints),
         Some(joints) => {
-            let message = format!("`joints` is from 1 to {MOST_JOINTS}, found {joints}");
+            let message = format!("`joints` is from 1 to {JOINTS}, found {joints}");
             Err(section.error_at("joints", message))
         }
         None => Err(section.error("`joints` is missing in [system]; give their number")),
@@ -110,7 +110,7 @@ fn parameter(name: String, section: &Section<'_>) -> Result<Parameter, FileError
 
 /// A list of two numbers, where it is given.
 pub(super) fn interval(section: &Section<'_>, key: &str) -> Result<Option<[f64; 2]>, FileError> {
-    match section.numbers(key)? {
+    match section.limits(key)? {
         None => Ok(None),
         Some(numbers) => match numbers[..] {
             [low, high] => Ok(Some([low, high])),
@@ -129,15 +129,18 @@ pub(super) fn hidden(section: Option<Section<'_>>, joints: usize) -> Result<Vec<
     let Some(numbers) = section.numbers("hidden")? else {
         return Ok(default);
     };
-    let wide = |width: &f64| width.fract() == 0.0 && (1.0..=4096.0).contains(width);
-    if !numbers.iter().all(wide) {
-        return Err(section.error_at(
-            "hidden",
-            "`hidden` lists layer widths: whole numbers from 1 to 4096",
-        ));
-    }
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // just checked
-    Ok(numbers.into_iter().map(|width| width as usize).collect())
+    // What is no whole number becomes 0, which is no width.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let width = |number: f64| {
+        if number.fract() == 0.0 {
+            number as usize
+        } else {
+            0
+        }
+    };
+    let hidden: Vec<usize> = numbers.into_iter().map(width).collect();
+    check_hidden(&hidden).map_err(|message| section.error_at("hidden", message))?;
+    Ok(hidden)
 }
 
 pub(super) fn lets(

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::whole;
 use super::method::Search;
 use super::{Cem, Icem, Mppi};
+use crate::limits::{CANDIDATES, HORIZON, ITERATIONS};
 
 /// How a planner searches. In a file all of it is one table:
 ///
@@ -33,20 +34,15 @@ pub enum Method {
     Mppi(Mppi),
 }
 
-// Limits that keep the memory of a search below a few GB.
-const MOST_CANDIDATES: usize = 100_000;
-const MOST_STEPS: usize = 2_000;
-const MOST_ITERATIONS: usize = 10_000;
-
 impl Settings {
     /// Refuse what no search can run with.
     ///
     /// # Errors
     /// One sentence that names the key, its value and what it may be.
     pub fn check(&self) -> Result<(), String> {
-        whole("population", self.population, MOST_CANDIDATES)?;
-        whole("iterations", self.iterations, MOST_ITERATIONS)?;
-        whole("horizon", self.horizon, MOST_STEPS)?;
+        whole("population", self.population, CANDIDATES)?;
+        whole("iterations", self.iterations, ITERATIONS)?;
+        whole("horizon", self.horizon, HORIZON)?;
         self.method.search().check(self.population)
     }
 }

@@ -8,7 +8,8 @@ use thiserror::Error;
 use super::Excitation;
 use crate::data::Joint;
 use crate::expr::suggestion;
-use crate::files::{beside_or_named, text_or_embedded};
+use crate::files::{beside_or_named, from_toml, text_or_embedded};
+use crate::limits::{LOG_ROWS, RUNS, TONES};
 use crate::model::{FileError, FittedEffect, Library, Model};
 
 /// Why a plant cannot be simulated.
@@ -26,6 +27,10 @@ pub enum PlantError {
         "the simulated rig diverges at {time_s:.3} s; give it less torque, or parameters of a real rig"
     )]
     Diverged { time_s: f64 },
+    #[error(
+        "the simulated rig diverges at {time_s:.3} s: {fault}; `residyn check` shows where to mend it"
+    )]
+    Mass { time_s: f64, fault: String },
 }
 
 /// A rig to simulate: its model, true parameters, hidden effects, excitation and sensors.
@@ -148,7 +153,7 @@ impl Plant {
             path: path.to_owned(),
             message,
         };
-        let file: File = toml::from_str(text).map_err(|error| wrong(error.to_string()))?;
+        let file: File = from_toml(text).map_err(|error| wrong(error.to_string()))?;
         let model = beside_or_named(path, &file.model);
         let mut plant = Self::of_system(library.model(&model)?);
         plant.set_parameters(&file.parameters).map_err(wrong)?;
@@ -195,12 +200,34 @@ impl Plant {
         if !(low > 0.0 && high > low) {
             return Err("`excitation.band_hz` is two rising frequencies above zero".into());
         }
-        if !(self.sensor.rate_hz > 0.0 && self.recording.duration_s * self.sensor.rate_hz >= 2.0) {
-            return Err(
-                "`sensor.rate_hz` times `recording.duration_s` must give at least two rows".into(),
-            );
+        if !(self.sensor.position_noise >= 0.0 && self.sensor.position_step >= 0.0) {
+            return Err("noise and resolution of the sensors are not negative".into());
+        }
+        let counts = [
+            ("excitation.tones", self.excitation.tones, TONES),
+            ("recording.logs", self.recording.logs, RUNS),
+        ];
+        if let Some((what, found, most)) = counts.iter().find(|(_, found, most)| found > most) {
+            return Err(format!("`{what}` is at most {most}, found {found}"));
+        }
+        let [rate, duration] = [self.sensor.rate_hz, self.recording.duration_s];
+        if !(rate > 0.0 && (2.0..LOG_ROWS as f64).contains(&(rate * duration))) {
+            return Err(format!(
+                "`sensor.rate_hz` times `recording.duration_s` must give from two to {LOG_ROWS} rows, {rate:?} Hz for \
+                 {duration:?} s do not"
+            ));
         }
         Ok(())
+    }
+
+    /// The same plant, recorded for so long \[s\].
+    ///
+    /// # Errors
+    /// A time that has less than two rows, or more than any log.
+    pub fn lasting(mut self, duration_s: f64) -> Result<Self, PlantError> {
+        self.recording.duration_s = duration_s;
+        self.check().map_err(PlantError::Sampling)?;
+        Ok(self)
     }
 
     /// Give declared parameters their true values.

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::file::{Plant, PlantError};
 use crate::data::Trajectory;
+use crate::limits::SAMPLED_STEPS;
 use crate::sim::{Environment, Integrator};
 
 /// Random trajectories of a plant with its exact states: starts uniform in the ranges, a new torque
@@ -69,7 +70,10 @@ impl Plant {
         let draws = sampling.draws(rng);
         draws
             .into_iter()
-            .map(|draw| sampling.run(draw, &mut environment))
+            .map(|draw| {
+                let run = sampling.run(draw, &mut environment);
+                run.map_err(|time_s| self.diverged(time_s))
+            })
             .collect()
     }
 }
@@ -104,6 +108,12 @@ impl Sampling {
         if self.trajectories == 0 || self.length == 0 {
             return Err("`trajectories` and `length` must be at least 1".to_owned());
         }
+        let steps = self.trajectories.saturating_mul(self.length);
+        if steps > SAMPLED_STEPS {
+            return Err(format!(
+                "`trajectories` of `length` have {steps} steps in all; at most {SAMPLED_STEPS} are sampled"
+            ));
+        }
         Ok(())
     }
 
@@ -125,7 +135,8 @@ impl Sampling {
         draws
     }
 
-    fn run(&self, draw: Draw, environment: &mut Environment) -> Result<Trajectory, PlantError> {
+    /// The time at which it is no longer finite as an error \[s\].
+    fn run(&self, draw: Draw, environment: &mut Environment) -> Result<Trajectory, f64> {
         let joints = draw.position.len();
         let mut state = [draw.position, draw.velocity].concat();
         let mut trajectory = Trajectory {
@@ -138,7 +149,7 @@ impl Sampling {
             environment.step(&mut state, tau, from);
             let time = f64::from(step) * self.step_s;
             if !state.iter().all(|value| value.is_finite()) {
-                return Err(PlantError::Diverged { time_s: time });
+                return Err(time);
             }
             trajectory.time.push(time);
             trajectory.states.extend(&state);

@@ -55,10 +55,18 @@ impl Plant {
             let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();
             simulator.advance(&Hold::lasting(commands, &held, Row([time]), dt, substeps));
             if simulator.state.iter().any(|value| !value[0].is_finite()) {
-                return Err(PlantError::Diverged { time_s: time });
+                return Err(self.diverged(time));
             }
         }
         Ok(log)
+    }
+
+    /// Why the rig left the finite numbers at a time \[s\].
+    pub(super) fn diverged(&self, time_s: f64) -> PlantError {
+        match self.model().mass_fault() {
+            Some(fault) => PlantError::Mass { time_s, fault },
+            None => PlantError::Diverged { time_s },
+        }
     }
 
     /// A true state as the sensors read it: the state of the equations.

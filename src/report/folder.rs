@@ -8,7 +8,7 @@ use super::plot::PlotError;
 use super::schema::Report;
 use super::{model_file, page, picture, text};
 use crate::closeloop::{LearnError, Outcome, Stage};
-use crate::files::{OutputError, folder_of, move_contents, write_whole};
+use crate::files::{OutputError, folder_of, move_contents, read_saved, write_whole};
 use crate::model::Origin;
 
 /// Why results could not be written.
@@ -20,6 +20,21 @@ pub enum WriteError {
     Plot(#[from] PlotError),
     #[error(transparent)]
     Checkpoint(#[from] LearnError),
+}
+
+impl WriteError {
+    /// The same of a file that was to be moved to another folder, since its temporary name is gone.
+    fn of(self, staging: &Path, folder: &Path) -> Self {
+        match self {
+            Self::File(OutputError { path, source }) => Self::File(OutputError {
+                path: path
+                    .strip_prefix(staging)
+                    .map_or_else(|_| path.clone(), |name| folder.join(name)),
+                source,
+            }),
+            other => other,
+        }
+    }
 }
 
 /// Why the report of a folder could not be read.
@@ -47,11 +62,11 @@ impl Report {
     /// A folder without report.json, or one of another form.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = folder.as_ref().join(REPORT);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
+        let json = match read_saved(&path) {
+            Ok(json) => json,
             Err(error) => return Err(ReadError::File { path, error }),
         };
-        serde_json::from_str(&text).map_err(|error| ReadError::Shape { path, error })
+        serde_json::from_slice(&json).map_err(|error| ReadError::Shape { path, error })
     }
 
     /// Write report.html and report.md into a folder, and return their paths.
@@ -82,7 +97,8 @@ pub fn write(
     std::fs::create_dir_all(parent).map_err(OutputError::of(parent))?;
     let staging = tempfile::TempDir::new_in(parent).map_err(OutputError::of(folder))?;
     let report = Report::new(outcome, origin);
-    put_all(staging.path(), &report, outcome, origin)?;
+    put_all(staging.path(), &report, outcome, origin)
+        .map_err(|error| error.of(staging.path(), folder))?;
     move_contents(staging.path(), folder)?;
     Ok(report)
 }

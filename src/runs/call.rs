@@ -5,7 +5,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::files::sha256;
+use crate::files::sha256_of;
 
 /// how the program was called, when, and what it read
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -40,7 +40,7 @@ impl InputFile {
         Ok(Self {
             role: role.to_owned(),
             path: path.display().to_string(),
-            sha256: sha256(&std::fs::read(path)?),
+            sha256: sha256_of(path)?,
         })
     }
 }

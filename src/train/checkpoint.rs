@@ -6,7 +6,7 @@ use burn::tensor::Device;
 use super::manifest::{FORMAT, Manifest};
 use super::optimizer::Moments;
 use super::{Backend, Best, CheckpointError, HybridModel, Training, moments};
-use crate::files::{content_id, end_of_links, folder_of, write_whole};
+use crate::files::{content_id, end_of_links, folder_of, read_saved, write_whole};
 use crate::model::{Dynamics, Library, Model, ModelWeights, Origin, SavedModelError, weights};
 
 const MANIFEST: &str = "checkpoint.json";
@@ -60,7 +60,8 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     let fresh = fresh_beside(dir, parent).map_err(io("create a directory in", parent))?;
     for (name, bytes) in files {
         let path = fresh.path().join(name);
-        write_whole(&path, bytes).map_err(|error| io("write", &path)(error.source))?;
+        // Where it is to be, since the temporary name is gone.
+        write_whole(&path, bytes).map_err(|error| io("write", &dir.join(name))(error.source))?;
     }
     replace(dir, fresh)
 }
@@ -277,7 +278,7 @@ fn listed<'n>(names: impl Iterator<Item = &'n String>) -> String {
 
 fn read(dir: &Path, file: &str) -> Result<Vec<u8>, CheckpointError> {
     let path = dir.join(file);
-    match fs::read(&path) {
+    match read_saved(&path) {
         Ok(bytes) => Ok(bytes),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             Err(CheckpointError::Missing {

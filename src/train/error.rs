@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use super::hybrid::HybridError;
+use crate::limits::EPOCHS;
 use crate::model::{FileError, SavedModelError};
 
 /// Why a trajectory cannot be cut into segments.
@@ -59,6 +60,8 @@ pub enum TrainError {
     Setting { name: &'static str, value: f64 },
     #[error("setting `anneal` is {0}; it is a share of the learning rates, above 0 and at most 1")]
     Anneal(f64),
+    #[error("setting `epochs` is {0}; at most {EPOCHS} are trained")]
+    Epochs(usize),
     #[error(
         "the loss became {loss} in epoch {epoch}, with {parameters}; look for outliers or wrong units \
          in the data, lower the learning rates, or take shorter segments or a finer integrator"

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::penalty::not_negative;
 use super::{Penalty, TrainError};
+use crate::limits::EPOCHS;
 use crate::sim::Integrator;
 
 /// The settings of a fit. Defaults are the published ones.
@@ -91,6 +92,9 @@ impl FitSettings {
         ])?;
         if !(self.anneal > 0.0 && self.anneal <= 1.0) {
             return Err(TrainError::Anneal(self.anneal));
+        }
+        if self.epochs > EPOCHS {
+            return Err(TrainError::Epochs(self.epochs));
         }
         self.penalty.check()
     }

@@ -8,7 +8,7 @@ use thiserror::Error;
 use toml::Spanned;
 
 use crate::data::{LeaveOut, LeaveOutError, LogError};
-use crate::files::beside_or_named;
+use crate::files::{beside_or_named, from_toml, read_text};
 use crate::model::FileError;
 
 /// Why measured rigs cannot be run.
@@ -119,7 +119,7 @@ struct PublishedEntry {
 /// # Errors
 /// A file that cannot be read or describes no rigs.
 pub fn read(path: &Path) -> Result<Vec<Rig>, RigsError> {
-    let text = std::fs::read_to_string(path).map_err(|source| RigsError::Open {
+    let text = read_text(path).map_err(|source| RigsError::Open {
         path: path.to_owned(),
         source,
     })?;
@@ -135,7 +135,7 @@ fn rigs(path: &Path, text: &str) -> Result<Vec<Rig>, RigsError> {
     };
     let start = |error: &toml::de::Error| error.span().map_or(0, |span| span.start);
     let file: File =
-        toml::from_str(text).map_err(|error| wrong(start(&error), error.message().to_owned()))?;
+        from_toml(text).map_err(|error| wrong(start(&error), error.message().to_owned()))?;
     let mut rigs: Vec<Rig> = Vec::new();
     for entry in file.rig {
         let at = entry.span().start;

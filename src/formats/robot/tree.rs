@@ -4,10 +4,11 @@ use nalgebra::Vector3;
 
 use crate::expr::suggestion;
 use crate::formats::xml::Source;
+use crate::limits::JOINTS;
+use crate::model::FileError;
 use crate::model::chain::{
     Drivetrain, Follows, Inertia, Joint, Pose, fault, with_z_along, without_inertia,
 };
-use crate::model::{FileError, MOST_JOINTS};
 
 /// A joint in the frame of the body that it moves.
 #[derive(Debug, Clone, PartialEq)]
@@ -178,9 +179,9 @@ impl<'t> Growth<'t, '_, '_> {
     fn grow(&mut self, body: &'t Body, parent: &Pose) -> Result<(), FileError> {
         let mut frame = parent.then(&body.pose);
         for hinge in &body.joints {
-            if self.joints.len() == MOST_JOINTS {
+            if self.joints.len() == JOINTS {
                 let message = format!(
-                    "joint `{}` is one too many: at most {MOST_JOINTS} are read; end the chain before it with --tip, or fix the joints that the rig does not use",
+                    "joint `{}` is one too many: at most {JOINTS} are read; end the chain before it with --tip, or fix the joints that the rig does not use",
                     hinge.name
                 );
                 return Err(self.source.error_at(hinge.at, message));

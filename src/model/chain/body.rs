@@ -125,7 +125,7 @@ impl Joint {
     }
 }
 
-/// A serial mechanism: from 1 to [`MOST_JOINTS`](crate::model::MOST_JOINTS) joints, each carrying the next.
+/// A serial mechanism: from 1 to [`JOINTS`](crate::limits::JOINTS) joints, each carrying the next.
 #[derive(Debug, Clone)]
 pub struct Chain {
     pub name: String,

@@ -92,6 +92,12 @@ impl Model {
         }
     }
 
+    /// Why its mass matrix is none of rigid bodies, if so: then accelerations are not finite, or no physics.
+    pub fn mass_fault(&self) -> Option<String> {
+        let found = mass::find(self, &Places::of(self), &mut crate::rng(0));
+        found.into_iter().next().map(|finding| finding.text)
+    }
+
     /// Every name that these formulas mention, themselves or through intermediates.
     fn reached<'m>(&'m self, names: impl IntoIterator<Item = &'m str>) -> HashSet<&'m str> {
         let mut reached: HashSet<&str> = names.into_iter().collect();

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::RecipeError;
 use super::data::{Data, Logged};
 use crate::expr::suggestion;
+use crate::files::{from_toml, read_text};
 use crate::model::{Dynamics, LastLayer, MlpSettings};
 use crate::sim::Integrator;
 use crate::train::{FitSettings, LearningRates};
@@ -74,7 +75,7 @@ impl Recipe {
     /// # Errors
     /// An unreadable file, an unknown key, contradictory values: with line and remedy.
     pub fn read(path: &Path) -> Result<Self, RecipeError> {
-        let text = std::fs::read_to_string(path).map_err(|source| RecipeError::Open {
+        let text = read_text(path).map_err(|source| RecipeError::Open {
             path: path.to_owned(),
             source,
         })?;
@@ -90,7 +91,7 @@ impl Recipe {
             path: path.to_owned(),
             message,
         };
-        let mut recipe: Self = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
+        let mut recipe: Self = from_toml(text).map_err(|e| wrong(e.to_string()))?;
         recipe.path = path.to_owned();
         recipe.check().map_err(|message| recipe.wrong(message))?;
         Ok(recipe)

@@ -1,0 +1,55 @@
+//! What is taken at most of what a user gives: depths, sizes and counts. An error about one of them names its number.
+
+/// Parentheses, calls, signs and powers of a formula within each other.
+pub const FORMULA_NESTING: usize = 200;
+/// Operations of a formula in a row, each on the result of the one before, such as the terms of a sum.
+pub const FORMULA_CHAIN: usize = 1000;
+/// Numbers, names and operations in all formulas of a model.
+pub const MODEL_TERMS: usize = 20_000;
+/// Parameters of a model, its intermediates, or its effects.
+pub const MODEL_NAMES: usize = 1000;
+/// Joints of a model: enough for every serial arm, and a limit that catches slips such as `joints = 100`.
+pub const JOINTS: usize = 12;
+/// Elements of a robot description within each other.
+pub const XML_DEPTH: usize = 200;
+
+/// A text that people write: a model, an effect, a recipe, a robot description \[bytes\].
+pub const TEXT_BYTES: u64 = 4 << 20;
+/// A file that the program wrote itself: weights, a description of a model, a report \[bytes\].
+pub const SAVED_BYTES: u64 = 1 << 30;
+/// A message of a recording, or a part of one that is packed as a whole \[bytes\].
+pub const RECORD_BYTES: usize = 1 << 28;
+/// What a packed file may hold, however small it is \[bytes\].
+pub const UNPACKED_BYTES: u64 = 16 << 20;
+/// What it may hold beyond that, for each of its own bytes.
+pub const UNPACKED_RATIO: u64 = 20;
+
+/// The largest reading of a log, in its unit: its fourth power is far from the largest number there is.
+pub const READING: f64 = 1e30;
+/// Columns of a log.
+pub const LOG_COLUMNS: usize = 4096;
+/// Rows of a log that is simulated or, unlike text, may take less than a byte a row.
+pub const LOG_ROWS: usize = 10_000_000;
+/// Steps of all trajectories that are sampled for a training.
+pub const SAMPLED_STEPS: usize = 10_000_000;
+/// Neurons of a layer.
+pub const LAYER_WIDTH: usize = 4096;
+/// Weights and biases of a network.
+pub const NETWORK_NUMBERS: usize = 20_000_000;
+/// Sines that excite a plant.
+pub const TONES: usize = 1000;
+/// Candidates of a planner.
+pub const CANDIDATES: usize = 100_000;
+/// Steps that a planner looks ahead.
+pub const HORIZON: usize = 2000;
+/// Iterations of a planner.
+pub const ITERATIONS: usize = 10_000;
+/// Epochs of a training.
+pub const EPOCHS: usize = 100_000_000;
+/// Logs, models, episodes or simulations that one command makes.
+pub const RUNS: usize = 100_000;
+
+/// What a file of so many bytes may hold when it is unpacked \[bytes\].
+pub fn unpacked_bytes(packed: u64) -> u64 {
+    UNPACKED_BYTES.saturating_add(UNPACKED_RATIO.saturating_mul(packed))
+}
