@@ -67,6 +67,7 @@ pub mod sim;
 #[cfg(feature = "train")]
 pub mod train;
 
+mod guarded;
 mod layout;
 
 pub use closeloop::{Finding, Outcome, Reference, Request, Settings, Verdict, close_loop};

@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::{Answer, Common, inputs, voice};
 use crate::formats::Imported;
+use crate::runs::RunFolder;
 use crate::train::save_imported;
 
 /// Make a checkpoint from a model that was exported as JSON and safetensors
@@ -32,6 +33,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         imported.system.name.clone(),
         imported.written_by().to_owned(),
     );
+    let _folder = RunFolder::open(&arguments.out)?;
     save_imported(&arguments.out, imported, seed, device)?;
     let out = arguments.out.display();
     voice::print(&match arguments.common.json {

@@ -11,6 +11,7 @@ use serde_json::Value;
 use super::arrays::Arrays;
 use super::parquet::{columns, lists};
 use crate::data::error::LogError;
+use crate::files::read_saved;
 
 /// One episode of a data set, as a path names it.
 pub(super) struct Episode {
@@ -135,7 +136,7 @@ impl Episode {
     }
 
     fn info(&self) -> Result<Info, LogError> {
-        let text = fs::read(self.set.join(INFO)).map_err(|why| self.unreadable(why))?;
+        let text = read_saved(&self.set.join(INFO)).map_err(|why| self.unreadable(why))?;
         serde_json::from_slice(&text).map_err(|why| {
             self.fault(format!(
                 "{INFO} is damaged: {why}; write the data set again"

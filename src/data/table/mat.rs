@@ -1,13 +1,13 @@
 //! MATLAB's files of versions 5 to 7: data elements of type, size and bytes, packed with zlib or not. Read here, since of the
 //! crates that do it one prints what it does not know and passes over what is damaged, and the other is a serializer.
 
-use std::io::Read;
 use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 
 use super::arrays::Arrays;
 use super::npy::Array;
+use super::unpack::Unpacking;
 use crate::data::error::LogError;
 
 /// How these files begin; those of version 7.3 are HDF5.
@@ -33,13 +33,13 @@ fn table(bytes: &[u8]) -> Result<Arrays, String> {
         return Err("its numbers are not in little-endian order".to_owned());
     }
     let mut table = Arrays::default();
+    let mut unpacking = Unpacking::of(bytes.len());
     while !rest.is_empty() {
         let (element, behind) = element(rest).ok_or_else(cut_off)?;
         match element.kind {
             PACKED => {
-                let mut unpacked = Vec::new();
-                let read = ZlibDecoder::new(element.bytes).read_to_end(&mut unpacked);
-                read.map_err(|why| format!("is damaged: {why}"))?;
+                let unpacked = unpacking.read(ZlibDecoder::new(element.bytes));
+                let unpacked = unpacked.map_err(|why| format!("is damaged: {why}"))?;
                 let (element, _) = self::element(&unpacked).ok_or_else(cut_off)?;
                 add(&mut table, &element)?;
             }

@@ -10,17 +10,22 @@ mod npz;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod recording;
+mod unpack;
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
 pub(super) use self::arrays::Arrays;
 pub(super) use self::csv::Csv;
+use self::unpack::Unpacking;
 use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
+use crate::files;
+use crate::guarded::guarded;
+use crate::limits::LOG_COLUMNS;
 
 /// Named columns of numbers.
 pub(super) trait Table {
@@ -88,8 +93,25 @@ const FOREIGN: [(&[u8], &str); 6] = [
 /// several tables, the one that has the columns.
 ///
 /// # Errors
-/// A file that cannot be read, or that is of none of the formats.
+/// A file that cannot be read, that is of none of the formats, or that has too many columns.
 pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
+    let damaged = || LogError::Form {
+        path: path.to_owned(),
+        fault: "is damaged: its offsets and lengths contradict each other; write it again"
+            .to_owned(),
+    };
+    let table = guarded(|| read(path, columns)).ok_or_else(damaged)??;
+    let found = table.names().len();
+    if found > LOG_COLUMNS {
+        return Err(LogError::Form {
+            path: path.to_owned(),
+            fault: format!("has {found} columns; at most {LOG_COLUMNS} are read"),
+        });
+    }
+    Ok(table)
+}
+
+fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
     #[cfg(feature = "parquet")]
     if let Some(episode) = lerobot::Episode::of(path) {
         return Ok(Box::new(episode.read()?));
@@ -101,8 +123,7 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
         path: path.to_owned(),
         why,
     };
-    // Opened once: what comes through a pipe cannot be read again.
-    let mut file = File::open(path).map_err(unreadable)?;
+    let mut file = files::open(path).map_err(unreadable)?;
     let begin = begin(&mut file).map_err(unreadable)?;
     // Recordings may be larger than the memory: they are not read at once.
     if begin.starts_with(recording::SQLITE) {
@@ -115,7 +136,7 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
     if begin.starts_with(PARQUET) {
         return Ok(Box::new(parquet::read(path)?));
     }
-    let bytes = unpacked(begin, file).map_err(unreadable)?;
+    let bytes = unpacked(path, contents(file).map_err(unreadable)?)?;
     if let Some((_, remedy)) = FOREIGN.iter().find(|(begin, _)| bytes.starts_with(begin)) {
         return Err(LogError::Form {
             path: path.to_owned(),
@@ -135,17 +156,24 @@ pub(super) fn open(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, Log
 fn begin(file: &mut File) -> io::Result<Vec<u8>> {
     let mut begin = Vec::new();
     file.take(16).read_to_end(&mut begin)?;
+    file.rewind()?;
     Ok(begin)
 }
 
-/// The bytes of a file from its beginning, unpacked where it is packed with gzip.
-fn unpacked(begin: Vec<u8>, mut rest: File) -> io::Result<Vec<u8>> {
-    let mut bytes = begin;
-    rest.read_to_end(&mut bytes)?;
+fn contents(mut file: File) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The bytes of a file, unpacked where they are packed with gzip.
+fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, LogError> {
     if !bytes.starts_with(GZIP) {
         return Ok(bytes);
     }
-    let mut unpacked = Vec::new();
-    MultiGzDecoder::new(bytes.as_slice()).read_to_end(&mut unpacked)?;
-    Ok(unpacked)
+    let unpacked = Unpacking::of(bytes.len()).read(MultiGzDecoder::new(bytes.as_slice()));
+    unpacked.map_err(|why| LogError::Form {
+        path: path.to_owned(),
+        fault: format!("cannot be unpacked: {why}"),
+    })
 }

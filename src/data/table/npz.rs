@@ -1,12 +1,13 @@
 //! NumPy's `.npz`: arrays of numbers by name, a column each; of `q`, `qd` and the like with a row a sample, a column a joint.
 
-use std::io::{Cursor, Read};
+use std::io::Cursor;
 use std::path::Path;
 
 use zip::ZipArchive;
 
 use super::arrays::Arrays;
 use super::npy::Array;
+use super::unpack::Unpacking;
 use crate::data::error::LogError;
 
 /// # Errors
@@ -20,13 +21,14 @@ pub(super) fn read(path: &Path, bytes: Vec<u8>) -> Result<Arrays, LogError> {
 
 fn table(bytes: Vec<u8>) -> Result<Arrays, String> {
     let mut table = Arrays::default();
+    let mut unpacking = Unpacking::of(bytes.len());
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|why| broken(&why))?;
     for index in 0..archive.len() {
         let mut file = archive.by_index(index).map_err(|why| broken(&why))?;
         let name = file.name().map_err(|why| broken(&why))?.into_owned();
         if let Some(name) = name.strip_suffix(".npy") {
-            let mut array = Vec::new();
-            file.read_to_end(&mut array).map_err(|why| broken(&why))?;
+            let array = unpacking.read(&mut file);
+            let array = array.map_err(|why| format!("array {name:?}: {why}"))?;
             let array = Array::of(&array).ok_or_else(|| {
                 format!("array {name:?} is no NumPy array; write it again with numpy.savez")
             })?;

@@ -1,7 +1,5 @@
 //! Parquet: a column of numbers is a column; one of lists of numbers is as many as a list is long, `name1`, `name2` ..
 
-use std::fs::File;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -12,7 +10,10 @@ use parquet::record::reader::RowIter;
 use parquet::schema::types::Type;
 
 use super::arrays::Arrays;
+use super::unpack::too_large;
 use crate::data::error::LogError;
+use crate::files;
+use crate::limits::unpacked_bytes;
 
 /// # Errors
 /// A file that is damaged, or whose lists are of different lengths.
@@ -74,18 +75,21 @@ pub(super) fn lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec
         path: path.to_owned(),
         fault: format!("is no whole Parquet file: {why}; write it again"),
     };
-    // The crate takes offsets and lengths of a damaged file for granted, and panics.
-    match catch_unwind(AssertUnwindSafe(|| read_lists(path, is_wanted))) {
-        Ok(lists) => lists.map_err(|why| damaged(why.to_string())),
-        Err(_) => Err(damaged(
-            "its offsets and lengths contradict each other".to_owned(),
-        )),
-    }
+    read_lists(path, is_wanted).map_err(|why| damaged(why.to_string()))
 }
 
 fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, ParquetError> {
-    let reader = SerializedFileReader::new(File::open(path)?)?;
-    let schema = reader.metadata().file_metadata().schema().clone();
+    let file = files::open(path)?;
+    let most = unpacked_bytes(file.metadata()?.len());
+    let reader = SerializedFileReader::new(file)?;
+    let described = reader.metadata().file_metadata();
+    let schema = described.schema().clone();
+    let cells = described
+        .num_rows()
+        .saturating_mul(schema.get_fields().len() as i64);
+    if cells.saturating_mul(8).cast_unsigned() > most {
+        return Err(too_large().into());
+    }
     let fields = schema.get_fields().iter();
     let wanted: Vec<Arc<Type>> = fields
         .filter(|field| is_wanted(field.name()))

@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::description::SavedFilter;
 use crate::expr::{Graph, Node, Program};
+use crate::files::read_saved;
 use crate::formats::verify::ReferenceModel;
 use crate::formats::{ClientError, Predictions, Samples};
 use crate::model::weights::from_bytes;
@@ -37,11 +38,11 @@ struct Equations {
 pub(super) fn predict(path: &Path, samples: &Samples) -> Result<Predictions, ClientError> {
     let failed =
         |error: &dyn std::fmt::Display| ClientError::Failed(format!("{}: {error}", path.display()));
-    let bytes = std::fs::read(path).map_err(|error| failed(&error))?;
+    let bytes = read_saved(path).map_err(|error| failed(&error))?;
     let model: SavedModel = serde_json::from_slice(&bytes).map_err(|error| failed(&error))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let weights = folder.join(&model.weights);
-    let bytes = std::fs::read(&weights).map_err(|error| failed(&error))?;
+    let bytes = read_saved(&weights).map_err(|error| failed(&error))?;
     let file = model.weights.to_string_lossy();
     let numbers =
         from_bytes(&model.shape, &bytes, &file, folder).map_err(|error| failed(&error))?;

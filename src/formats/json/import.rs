@@ -6,10 +6,9 @@ use serde_json::Value;
 use thiserror::Error;
 
 use super::description::{Description, VERSION};
+use crate::files::read_saved;
 use crate::model::weights::from_bytes;
-use crate::model::{
-    Effect, FileError, Model, ModelShape, ModelWeights, Parameter, SavedModelError,
-};
+use crate::model::{Dynamics, Effect, FileError, Model, ModelShape, ModelWeights, SavedModelError};
 
 /// A model read back from its two files.
 #[derive(Debug)]
@@ -47,6 +46,14 @@ pub enum ImportError {
         file: String,
         weights: String,
     },
+    #[error("{path}: `joints` is {found}, its model file has {expected}; take another copy", path = .path.display())]
+    Joints {
+        path: PathBuf,
+        found: usize,
+        expected: usize,
+    },
+    #[error("{path}: its weights are in {weights}, which is no file beside it but a link or in another folder; put the weights beside the description", path = .path.display(), weights = .weights.display())]
+    Elsewhere { path: PathBuf, weights: PathBuf },
     #[error(transparent)]
     Model(#[from] FileError),
     #[error(transparent)]
@@ -66,8 +73,8 @@ impl Imported {
     pub fn read(path: &Path, effects: &[Effect]) -> Result<Self, ImportError> {
         let description = description(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let weights = folder.join(&description.weights);
-        let bytes = std::fs::read(&weights).map_err(|source| ImportError::Unreadable {
+        let weights = weights_of(path, &description.weights)?;
+        let bytes = read_saved(&weights).map_err(|source| ImportError::Unreadable {
             path: weights.clone(),
             source,
         })?;
@@ -76,7 +83,7 @@ impl Imported {
         let numbers = from_bytes(shape, &bytes, &file, folder)?;
         let system = Model::from_text(path, &description.model_toml, effects)?;
         let dynamics = system.dynamics();
-        check(path, shape, &dynamics.parameters)?;
+        check(path, shape, &dynamics)?;
         Ok(Self {
             description,
             system,
@@ -88,7 +95,7 @@ impl Imported {
 /// The description in `path`. Its version is checked first, since another one may describe anything else differently.
 fn description(path: &Path) -> Result<Description, ImportError> {
     let path = path.to_owned();
-    let json = std::fs::read(&path).map_err(|source| ImportError::Unreadable {
+    let json = read_saved(&path).map_err(|source| ImportError::Unreadable {
         path: path.clone(),
         source,
     })?;
@@ -107,9 +114,31 @@ fn description(path: &Path) -> Result<Description, ImportError> {
     }
 }
 
-/// Refuse weights of other parameters. A network as prior needs no equations, so those of its model file may be any.
-fn check(path: &Path, shape: &ModelShape, declared: &[Parameter]) -> Result<(), ImportError> {
-    let file: Vec<&str> = declared.iter().map(|p| p.name.as_str()).collect();
+/// The file of weights beside a description: one that came from elsewhere must not name any other file.
+fn weights_of(path: &Path, named: &Path) -> Result<PathBuf, ImportError> {
+    let weights = path.with_file_name(named);
+    let is_name = named.file_name() == Some(named.as_os_str());
+    if !is_name || weights.is_symlink() {
+        return Err(ImportError::Elsewhere {
+            path: path.to_owned(),
+            weights: named.to_owned(),
+        });
+    }
+    Ok(weights)
+}
+
+/// Refuse weights of other joints or parameters. A network as prior needs no equations, so those of its model file may be
+/// any.
+fn check(path: &Path, shape: &ModelShape, declared: &Dynamics) -> Result<(), ImportError> {
+    if shape.joints != declared.joints {
+        return Err(ImportError::Joints {
+            path: path.to_owned(),
+            found: shape.joints,
+            expected: declared.joints,
+        });
+    }
+    let parameters = declared.parameters.iter();
+    let file: Vec<&str> = parameters.map(|p| p.name.as_str()).collect();
     let weights: Vec<&str> = shape.parameters.iter().map(|p| p.name.as_str()).collect();
     if shape.prior.is_some() || file == weights {
         return Ok(());

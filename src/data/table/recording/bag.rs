@@ -1,9 +1,11 @@
 //! rosbag2 in SQLite: the tables `topics` and `messages`. The names of the topics' columns are those since its first version.
 
+use std::io;
 use std::path::Path;
 
 use rusqlite::{Connection, OpenFlags};
 
+use super::super::unpack::Unpacking;
 use super::Recording;
 use crate::data::error::LogError;
 
@@ -48,13 +50,13 @@ fn add_messages(
     while let Some(row) = messages.next()? {
         let data = row.get_ref(1)?.as_blob()?;
         match data.starts_with(ZSTD) {
-            true => recording.add(
-                topic,
-                row.get(0)?,
-                &zstd::decode_all(data).unwrap_or_default(),
-            ),
+            true => recording.add(topic, row.get(0)?, &unpacked(data).unwrap_or_default()),
             false => recording.add(topic, row.get(0)?, data),
         }
     }
     Ok(())
+}
+
+fn unpacked(message: &[u8]) -> io::Result<Vec<u8>> {
+    Unpacking::of(message.len()).read(zstd::Decoder::new(message)?)
 }

@@ -1,7 +1,6 @@
 //! MCAP, read from its beginning to the end of its data: with or without an index, in chunks or not.
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -12,9 +11,8 @@ use ::mcap::{McapError, McapResult};
 
 use super::Recording;
 use crate::data::error::LogError;
-
-/// Larger than any message \[bytes\]: a damaged length must not take all memory.
-const LARGEST_RECORD: usize = 1 << 28;
+use crate::files;
+use crate::limits::{RECORD_BYTES, unpacked_bytes};
 
 pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogError> {
     match add(path, recording) {
@@ -40,11 +38,14 @@ pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogErro
 }
 
 fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
-    let mut file = File::open(path)?;
+    let mut file = files::open(path)?;
+    // A damaged length, or a part that holds more than it seems to, must not take all memory.
+    let fits = usize::try_from(unpacked_bytes(file.metadata()?.len()));
+    let largest = fits.map_or(RECORD_BYTES, |bytes| bytes.min(RECORD_BYTES));
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LARGEST_RECORD),
+            .with_record_length_limit(largest),
     );
     let mut channels = ChannelAccumulator::default();
     while let Some(event) = reader.next_event() {
