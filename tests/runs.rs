@@ -29,7 +29,11 @@ fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {
     }
     for again in [&command[..], &["closeloop", "--out", "./c"]] {
         let message = refused(dir, again);
-        assert!(message.contains("c: another run is working there; wait until"));
+        let told = format!(
+            "c: another run, process {}, is working there; wait until",
+            first.id()
+        );
+        assert!(message.contains(&told), "{message}");
         assert!(message.contains("--out"), "{message}");
     }
     let ended = first.wait_with_output().unwrap();

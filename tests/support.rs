@@ -37,6 +37,14 @@ pub fn refuses(arguments: &[&str]) -> String {
     errors
 }
 
+/// Each part must stand in the message.
+#[track_caller]
+pub fn says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "{part:?} is missing in:\n{message}");
+    }
+}
+
 /// The error 0.5 s ahead of the first joint on a log, as `residyn evaluate` gives it for `--model FILE` or `--checkpoint DIR`.
 pub fn evaluated(model: &[&str], log: &str) -> f64 {
     let all = [&["evaluate", "--json", "--test", log], model].concat();

@@ -24,6 +24,7 @@ mod front_door;
 mod functions;
 mod gradients;
 mod guide;
+mod hard;
 mod identify;
 mod interrupts;
 mod log_formats;

@@ -76,7 +76,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         inputs::logs(&arguments.test, &declared)
     })?;
     inputs::leave_out(&mut Vec::new(), &mut logs, &arguments.leave_out)?;
-    inputs::print_mass_fault(&declared);
+    if let Source::File(file) = arguments.model.source() {
+        inputs::print_findings(file, &declared, arguments.common.seed);
+    }
     inputs::print_notes_and_faults(&logs, &declared.columns);
     let steps = logs.iter().map(Log::median_step);
     let step_s = steps.fold(f64::INFINITY, f64::min);

@@ -11,7 +11,7 @@ use clap::Args;
 
 use super::{Answer, Common, interrupt, progress, voice};
 use crate::runs::RunFolder;
-use crate::train::recipe::{Job, Saves};
+use crate::train::recipe::{Change, Job, Saves};
 use crate::train::{Progress, Training, save};
 
 /// Where and how often to save.
@@ -57,6 +57,13 @@ pub(super) fn carry_out(job: &Job, dir: &Path, saving: &Saving, common: &Common)
     } else {
         let headline = format!("checkpoint: {}", dir.display());
         voice::answer(headline, &results.text())?;
+    }
+    if results.is_worse() {
+        let Change { before, after } = results.error;
+        voice::tell(format!(
+            "warning: the training made the prediction error larger, from {before:.3e} to {after:.3e}; lower the learning rates"
+        ));
+        return Ok(Answer::No);
     }
     Ok(Answer::Yes)
 }

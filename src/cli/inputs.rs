@@ -9,6 +9,7 @@ use clap::Args;
 use super::voice;
 use crate::data::{Columns, LeaveOut, Log, audit_together, leave_out};
 use crate::limits::RUNS;
+use crate::model::check::Severity;
 use crate::model::{Library, Model, effect_files};
 
 /// The effects that model files may name: the built-in ones and the user's own.
@@ -94,7 +95,11 @@ pub(super) fn leave_out(
 /// Print on standard error what in a model cannot be meant, before anything is computed with it.
 pub(super) fn print_findings(path: &Path, model: &Model, seed: u64) {
     for finding in model.check(&mut crate::rng(seed)).findings {
-        voice::say(format!("check: {}: {finding}", path.display()));
+        let label = match finding.severity {
+            Severity::Error => "serious",
+            Severity::Warning => "warning",
+        };
+        voice::say(format!("{label}: {}: {finding}", path.display()));
     }
 }
 

@@ -6,6 +6,7 @@ mod call;
 mod check;
 mod closeloop;
 mod control;
+mod defect;
 mod evaluate;
 mod experiment;
 mod export;
@@ -21,6 +22,7 @@ mod remedy;
 mod report;
 mod shell;
 mod simulate;
+mod status;
 mod sweep;
 mod train;
 mod tune;
@@ -100,6 +102,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = ARGUMENTS.get_or_init(|| arguments.into_iter().collect());
     let Cli { voice, command } = Cli::parse_from(arguments);
     voice.begin();
+    defect::tell_of_panics();
     let result = match command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
@@ -126,7 +129,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Answer::No) => 1,
         Err(error) => {
             voice::tell(format!("error: {}", told(&error)));
-            2
+            status::status(&error)
         }
     }
 }

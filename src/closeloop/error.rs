@@ -29,9 +29,9 @@ pub enum StudyError {
          --errors motion"
     )]
     NotOfMotion,
-    #[error(transparent)]
+    #[error("{0}")]
     Fit(#[from] FitError),
-    #[error(transparent)]
+    #[error("{0}")]
     Learn(#[from] LearnError),
 }
 

@@ -65,8 +65,8 @@ pub trait LearnedResidual: Send {
 
 /// Why a residual network could not be trained or saved.
 #[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-pub struct LearnError(Box<dyn Error + Send + Sync>);
+#[error("{0}")]
+pub struct LearnError(#[source] Box<dyn Error + Send + Sync>);
 
 impl LearnError {
     pub fn new(error: impl Error + Send + Sync + 'static) -> Self {

@@ -8,10 +8,10 @@ use crate::train::{CheckpointError, TrainError};
 /// Why a run of the loop cannot begin or be resumed.
 #[derive(Debug, Error)]
 pub enum RunError {
-    #[error(transparent)]
+    #[error("{0}")]
     Plant(#[from] PlantError),
-    #[error(transparent)]
-    Train(TrainError),
+    #[error("{0}")]
+    Train(#[source] TrainError),
     #[error("{0}")]
     Log(#[from] LogError),
     #[error(transparent)]

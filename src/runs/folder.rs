@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Identity;
-use super::lock::Lock;
-use crate::files::{OutputError, end_of_links, folder_of, write_whole};
+use super::lock::{Lock, owner};
+use crate::files::{OutputError, check_room, end_of_links, folder_of, write_whole};
 
 /// What a folder belongs to: the identity of its run and the version that began it.
 const RECORD: &str = "run.json";
@@ -27,8 +27,8 @@ pub struct RunFolder {
 /// Why a run cannot have its folder.
 #[derive(Debug, Error)]
 pub enum RunFolderError {
-    #[error("{path}: another run is working there", path = .path.display())]
-    Busy { path: PathBuf },
+    #[error("{path}: {process} is working there", path = .path.display(), process = named(*.process))]
+    Busy { path: PathBuf, process: Option<u32> },
     #[error("{path} holds another run: {difference}", path = .path.display())]
     OtherRun { path: PathBuf, difference: String },
     #[error("{path} is a file", path = .path.display())]
@@ -58,8 +58,14 @@ impl RunFolder {
     /// Lock the folder `path`. It need not exist yet; the folder that it is in is made.
     ///
     /// # Errors
-    /// Another run works there, `path` is a file, or the folder that it is in cannot be written.
+    /// Another run works there, `path` is a file, or there is no room or no permission to write in it.
     pub fn open(path: &Path) -> Result<Self, RunFolderError> {
+        let folder = Self::lock(path)?;
+        check_room(path)?;
+        Ok(folder)
+    }
+
+    fn lock(path: &Path) -> Result<Self, RunFolderError> {
         let owned = || path.to_owned();
         if path.exists() && !path.is_dir() {
             return Err(RunFolderError::NotAFolder { path: owned() });
@@ -72,7 +78,10 @@ impl RunFolder {
                 path: owned(),
                 lock: Arc::new(lock),
             }),
-            Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy { path: owned() }),
+            Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy {
+                path: owned(),
+                process: owner(&lock),
+            }),
             Err(TryLockError::Error(source)) => Err(failed("locked", path)(source)),
         }
     }
@@ -184,6 +193,14 @@ impl RunFolder {
     }
 }
 
+/// A process that runs.
+fn named(process: Option<u32>) -> String {
+    process.map_or_else(
+        || "another run".to_owned(),
+        |process| format!("another run, process {process},"),
+    )
+}
+
 /// The file that locks a folder: the same for every name that leads to the folder.
 fn lock_of(path: &Path) -> io::Result<PathBuf> {
     let path = end_of_links(path);
@@ -243,7 +260,7 @@ mod tests {
         let owners = std::sync::atomic::AtomicUsize::new(0);
         let work = || {
             for _ in 0..500 {
-                if let Ok(folder) = RunFolder::open(&path) {
+                if let Ok(folder) = RunFolder::lock(&path) {
                     use std::sync::atomic::Ordering::SeqCst;
                     assert_eq!(owners.fetch_add(1, SeqCst), 0);
                     owners.fetch_sub(1, SeqCst);

@@ -1,5 +1,5 @@
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// An advisory lock, held until it is dropped or the process ends. Its file is removed when it is dropped.
@@ -22,6 +22,9 @@ impl Lock {
             let file = opened.map_err(TryLockError::Error)?;
             file.try_lock()?;
             if is_at(&file, path).map_err(TryLockError::Error)? {
+                // For people alone: without it the lock is as good.
+                let _ = file.set_len(0);
+                let _ = write!(&file, "{}", std::process::id());
                 return Ok(Self {
                     path: path.to_owned(),
                     _file: file,
@@ -30,6 +33,11 @@ impl Lock {
             // Its last owner removed the file between the opening and the locking; the next one of that name counts.
         }
     }
+}
+
+/// The process that has the lock whose file is `path`, as far as it says.
+pub(super) fn owner(path: &Path) -> Option<u32> {
+    fs::read_to_string(path).ok()?.parse().ok()
 }
 
 impl Lock {

@@ -41,6 +41,6 @@ pub enum RecipeError {
     Hybrid(#[from] HybridError),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    #[error(transparent)]
+    #[error("{0}")]
     Train(#[from] TrainError),
 }

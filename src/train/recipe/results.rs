@@ -6,6 +6,9 @@ use serde::Serialize;
 use super::{Job, Kind};
 use crate::train::{HybridModel, Objective, Segments, TrainError, Training};
 
+/// A prediction error that grew by this factor is no matter of rounding, or of a penalty.
+const WORSE: f64 = 2.0;
+
 /// The results of a training.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrainingResults {
@@ -137,6 +140,11 @@ impl TrainingResults {
         self.parameter_lines(&mut out);
         let _ = writeln!(out, "checkpoint: {}", self.checkpoint.display());
         out
+    }
+
+    /// Whether the training made the prediction error several times as large: then there is nothing to use.
+    pub fn is_worse(&self) -> bool {
+        self.error.after > WORSE * self.error.before
     }
 
     fn parameter_lines(&self, out: &mut String) {
