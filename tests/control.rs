@@ -9,6 +9,7 @@ use std::time::Duration;
 use residyn::data::{Columns, Log};
 use residyn::experiment::{Config, Session};
 use residyn::model::Library;
+use residyn::runs::Shard;
 use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
@@ -249,7 +250,7 @@ fn every_experiment_is_sound() {
             assert!(
                 Session::open(config, &library, Backend::NdArray, 0)
                     .unwrap()
-                    .rounds()
+                    .rounds(Shard::WHOLE)
                     > 0
             );
             count += 1;

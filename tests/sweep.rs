@@ -41,7 +41,7 @@ fn a_model_depends_on_its_seed_and_not_on_the_batch() {
     let gravity = found["parameters"]["C_g"]["median"].as_f64().unwrap();
     assert!((14.0..15.5).contains(&gravity), "{gravity}");
     let left = std::fs::read_dir(dir.path().join("s")).unwrap().count();
-    assert_eq!(left, 1, "only sweep.json is left");
+    assert_eq!(left, 2, "only sweep.json and models.jsonl are left");
 }
 
 #[test]

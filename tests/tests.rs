@@ -46,6 +46,7 @@ mod recipes;
 mod recordings;
 mod rigs;
 mod runs;
+mod shards;
 mod shell;
 mod shift;
 mod simulators;

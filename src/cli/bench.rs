@@ -1,8 +1,7 @@
 mod rigs;
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
@@ -10,12 +9,13 @@ use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::call::{Begun, files};
+use super::shard::{self, Sharding, program_id};
 use super::{Answer, Common, interrupt, progress, told, voice};
 use crate::bench::{Cell, Line, Source, markdown, read, recorded, summarise};
 use crate::files::content_id;
 use crate::model::Library;
 use crate::report::ResultsPage;
-use crate::runs::RunFolder;
+use crate::runs::{Identity, Lines, RunFolder};
 
 /// Measure the program on simulated and on measured rigs
 #[derive(Debug, Args)]
@@ -56,6 +56,8 @@ struct Effects {
     #[arg(long, num_args = 1.., value_name = "TEXT")]
     only: Vec<String>,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     common: Common,
 }
 
@@ -69,14 +71,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 fn effects(arguments: &Effects) -> Result<Answer> {
     let begun = Begun::now();
     let cells = wanted(arguments)?;
-    fs::create_dir_all(&arguments.out).with_context(|| {
-        format!(
-            "{} cannot be made; give another --out",
-            arguments.out.display()
-        )
-    })?;
     let folder = RunFolder::open(&arguments.out)?;
-    let store = Store::open(&arguments.out)?;
+    folder.make()?;
+    let store = Store::open(&folder)?;
+    if let Some(part) = arguments.sharding.part(&folder, identity(&cells)?)? {
+        let cells: Vec<Cell> = part.shard().share(cells).collect();
+        store.run(&cells, &folder)?;
+        return shard::finish(part, &arguments.common);
+    }
     let lines = store.run(&cells, &folder)?;
     let summary = summarise(&lines);
     let text = markdown(&summary);
@@ -116,27 +118,32 @@ fn wanted(arguments: &Effects) -> Result<Vec<Cell>> {
     Ok(all)
 }
 
+/// What decides the results of all cells.
+fn identity(cells: &[Cell]) -> Result<Identity> {
+    let named = |cell: &Cell| Ok((format!("cell {}", cell.id), configuration(cell)?));
+    Ok(Identity {
+        command: "bench effects".to_owned(),
+        seed: 0,
+        config: json!({}),
+        inputs: cells.iter().map(named).collect::<Result<_>>()?,
+    })
+}
+
 /// Stored results.
 struct Store {
-    path: PathBuf,
+    file: Lines,
     /// Hash of this build of the program: another build may give other results.
     program: String,
     known: Vec<Line>,
 }
 
 impl Store {
-    fn open(folder: &Path) -> Result<Self> {
-        let path = folder.join("cells.jsonl");
-        let mut known = Vec::new();
-        if path.is_file() {
-            let lines = BufReader::new(File::open(&path)?).lines();
-            // A truncated line, or one of another version, is not a result.
-            known.extend(lines.filter_map(|line| serde_json::from_str(&line.ok()?).ok()));
-        }
+    fn open(folder: &RunFolder) -> Result<Self> {
+        let file = Lines::new(folder, "cells.jsonl");
         Ok(Self {
-            path,
+            known: file.read()?,
+            file,
             program: program_id()?,
-            known,
         })
     }
 
@@ -182,21 +189,9 @@ impl Store {
             cell: settled,
             findings,
         };
-        let mut file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&self.path)
-            .with_context(|| format!("{} cannot be written", self.path.display()))?;
-        // Begin with a line break too: the line before may be truncated.
-        file.write_all(format!("\n{}\n", serde_json::to_string(&line)?).as_bytes())?;
+        self.file.add(&line)?;
         Ok(line)
     }
-}
-
-/// Hash of this build of the program.
-fn program_id() -> Result<String> {
-    let program = fs::read(std::env::current_exe()?).context("the program cannot read itself")?;
-    Ok(content_id(&program))
 }
 
 /// The result of some work, or that it panicked: a panic is a result of the bench, and the run continues.

@@ -6,12 +6,13 @@ use clap::{Args, ValueEnum};
 use serde_json::Value;
 
 use super::call::{Begun, files};
+use super::shard::{self, Sharding};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
 use crate::experiment::undeclared_effect::{self, Trial};
 use crate::experiment::{Config, Experiment, FinishedRound, Session, picture};
 use crate::model::Library;
 use crate::report::{ResultsPage, Share};
-use crate::runs::RunFolder;
+use crate::runs::{Part, RunFolder, Shard};
 
 /// Experiments: return against real transitions, against the receding horizon, and with undeclared effects
 ///
@@ -33,6 +34,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     common: Common,
 }
 
@@ -44,8 +47,14 @@ enum Name {
     UndeclaredEffect,
 }
 
-/// The file with the time so far, s.
-const WALL: &str = "wall_s";
+/// The file with the time so far, s: no result, and therefore not put together from parts.
+const WALL: &str = ".wall_s";
+
+/// What was done.
+enum Done {
+    Part(Part),
+    Whole(Finished),
+}
 
 /// Its files.
 const RESULTS: &str = "results.json";
@@ -72,13 +81,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let clock = Clock::open(&folder)?;
     let library = arguments.effects.library()?;
     let published = |experiment| published(arguments, experiment, &library, &clock);
-    let finished = match arguments.name {
+    let done = match arguments.name {
         Name::PhysicsPrior => published(Experiment::PhysicsPrior),
         Name::OfflinePrior => published(Experiment::OfflinePrior),
         Name::RecedingHorizon => published(Experiment::RecedingHorizon),
         Name::UndeclaredEffect => undeclared_effect(arguments, library, &clock),
     }?;
     clock.save();
+    let finished = match done {
+        Done::Part(part) => return shard::finish(part, &arguments.common),
+        Done::Whole(finished) => finished,
+    };
     let page = ResultsPage {
         what: &finished.what,
         headline: &finished.headline,
@@ -115,24 +128,31 @@ fn published(
     experiment: Experiment,
     library: &Library,
     clock: &Clock<'_>,
-) -> Result<Finished> {
+) -> Result<Done> {
     let Common { device, seed, .. } = arguments.common;
     let config = Config::read(&arguments.config)?;
     let session = Session::open(config, library, device, seed)?;
+    let run = session.run_of_experiment(experiment);
+    let part = arguments.sharding.part(clock.folder, run)?;
     let begun = Instant::now();
-    let bar = progress::bar(session.rounds());
+    let bar = progress::bar(session.rounds(shard_of(&part)));
     let _orderly = interrupt::counted(clock.folder, &bar, "rounds");
-    let results = session.carry_out(experiment, clock.folder, &|step: &FinishedRound<'_>| {
+    let observer = |step: &FinishedRound<'_>| {
         bar.inc(1);
         bar.set_message(message(step));
         if !step.found {
             clock.save();
         }
-    });
+    };
+    if let Some(part) = part {
+        session.carry_out_shard(experiment, part.shard(), clock.folder, &observer)?;
+        return Ok(Done::Part(part));
+    }
+    let results = session.carry_out(experiment, clock.folder, &observer);
     bar.finish_and_clear();
     voice::took("learning and judging", begun);
     let results = results?.finished(command_line(), clock.wall_s());
-    Ok(Finished {
+    Ok(Done::Whole(Finished {
         what: format!("{}, {}", results.experiment, results.task),
         headline: results.headline(),
         text: results.text(),
@@ -141,26 +161,34 @@ fn published(
         json: serde_json::to_string_pretty(&results)? + "\n",
         config: results.config,
         answer: Answer::Yes,
-    })
+    }))
 }
 
-fn undeclared_effect(
-    arguments: &Arguments,
-    library: Library,
-    clock: &Clock<'_>,
-) -> Result<Finished> {
+/// What of a run is to be done.
+fn shard_of(part: &Option<Part>) -> Shard {
+    part.as_ref().map_or(Shard::WHOLE, Part::shard)
+}
+
+fn undeclared_effect(arguments: &Arguments, library: Library, clock: &Clock<'_>) -> Result<Done> {
     let Common { device, seed, .. } = arguments.common;
     let experiment = undeclared_effect::Experiment::read(&arguments.config)?;
     let session = undeclared_effect::Session::new(experiment, library, device, seed)?;
+    let part = arguments
+        .sharding
+        .part(clock.folder, session.run_of_all())?;
     let begun = Instant::now();
-    let trials = session.experiment.seeds * session.plants.len() as u64;
-    let bar = progress::bar(usize::try_from(trials)?);
+    let bar = progress::bar(shard_of(&part).share(session.trials()).count());
     let _orderly = interrupt::counted(clock.folder, &bar, "trials");
-    let outcome = session.run(clock.folder, &|trial: &Trial| {
+    let observer = |trial: &Trial| {
         bar.inc(1);
         bar.set_message(format!("episodes; {} seed {}", trial.case, trial.seed));
         clock.save();
-    });
+    };
+    if let Some(part) = part {
+        session.run_shard(part.shard(), clock.folder, &observer)?;
+        return Ok(Done::Part(part));
+    }
+    let outcome = session.run(clock.folder, &observer);
     bar.finish_and_clear();
     voice::took("trials", begun);
     let outcome = outcome?;
@@ -168,7 +196,7 @@ fn undeclared_effect(
     value["experiment"] = "undeclared-effect".into();
     value["command"] = command_line().into();
     value["wall_s"] = clock.wall_s().into();
-    Ok(Finished {
+    Ok(Done::Whole(Finished {
         what: format!("undeclared-effect, {}", session.task.name()),
         headline: outcome.headline(),
         text: outcome.text(),
@@ -181,7 +209,7 @@ fn undeclared_effect(
         } else {
             Answer::No
         },
-    })
+    }))
 }
 
 /// The text of the progress bar.

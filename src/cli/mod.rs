@@ -16,10 +16,12 @@ mod inputs;
 mod interrupt;
 mod list;
 mod mbrl;
+mod merge;
 mod new;
 mod progress;
 mod remedy;
 mod report;
+mod shard;
 mod shell;
 mod simulate;
 mod status;
@@ -69,6 +71,7 @@ enum Command {
     New(new::Arguments),
     List(list::Arguments),
     Bench(bench::Arguments),
+    Merge(merge::Arguments),
     Completions(shell::Completions),
     Man(shell::Man),
 }
@@ -121,6 +124,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::New(arguments) => new::run(&arguments),
         Command::List(arguments) => list::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Merge(arguments) => merge::run(&arguments),
         Command::Completions(arguments) => shell::completions(&arguments),
         Command::Man(arguments) => shell::man(&arguments),
     };

@@ -6,13 +6,14 @@ use crate::bench::rigs::RigsError;
 use crate::control::NoTask;
 use crate::experiment::ExperimentError;
 use crate::files::OutputError;
-use crate::runs::RunFolderError;
+use crate::runs::{MergeError, RunFolderError};
 use crate::train::recipe::RecipeError;
 
 /// What to do about an error, in terms of the command line, of which the library knows nothing.
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
     None.or_else(|| error.downcast_ref().and_then(of_output))
         .or_else(|| error.downcast_ref().and_then(of_folder))
+        .or_else(|| error.downcast_ref().and_then(of_merge))
         .or_else(|| error.downcast_ref().and_then(of_task))
         .or_else(|| error.downcast_ref().and_then(of_recipe))
         .or_else(|| error.downcast_ref().and_then(of_experiment))
@@ -41,6 +42,17 @@ fn of_folder(error: &RunFolderError) -> Option<&'static str> {
             Some("give a folder that can be written with --out")
         }
         RunFolderError::Output(_) => None,
+    }
+}
+
+fn of_merge(error: &MergeError) -> Option<&'static str> {
+    match error {
+        MergeError::NoPart { .. } => Some("give folders that a command with --shard wrote"),
+        MergeError::OtherRun { .. } => {
+            Some("leave it out, or run it again with the settings and the program of the others")
+        }
+        MergeError::TwoResults { .. } => Some("leave the wrong one's folder out"),
+        _ => None,
     }
 }
 

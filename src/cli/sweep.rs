@@ -1,3 +1,5 @@
+mod store;
+
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -5,16 +7,20 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::Args;
+use serde::Serialize;
+use serde_json::json;
 
-use super::{Answer, Common, command_line, inputs, progress, voice};
-use crate::runs::RunFolder;
+use self::store::{Store, Stored};
+use super::shard::{self, Sharding};
+use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
+use crate::runs::{Identity, RunFolder};
 use crate::train::recipe::{Job, Member, Recipe, SweepResults};
-use crate::train::{SweepProgress, Trained};
+use crate::train::{Backend, SweepProgress};
 
 /// Train many models by one recipe at once, with different initial weights or different weights of the penalty
 ///
 /// All models are trained on the data of --seed: on the processor one after the other, on a graphics card (--device cuda)
-/// as one batch, which keeps it busy.
+/// as one batch, which keeps it busy. Each model is a line of DIR/models.jsonl, and an interrupted sweep is resumed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         residyn sweep --config configs/train-pendulum.toml --seeds 100\n  \
@@ -35,17 +41,19 @@ pub(super) struct Arguments {
     /// Number of models that a graphics card trains at once; fewer need less memory
     #[arg(long, default_value = "1000", value_name = "COUNT")]
     together: NonZeroUsize,
-    /// Folder of the result, sweep.json
+    /// Folder of the results: models.jsonl and sweep.json
     #[arg(long, default_value = "sweep", value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     effects: inputs::Effects,
     #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
     common: Common,
 }
 
 /// A range of weights, both above zero and finite.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 struct Alphas {
     low: f64,
     high: f64,
@@ -96,11 +104,27 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let job = Job::train(Recipe::read(config)?, &library, common.device, common.seed)?
         .begun_by(command_line());
     let folder = RunFolder::open(out)?;
+    for note in &job.data.notes {
+        voice::say(format!("note: {note}"));
+    }
     let members = arguments.members();
-    let begun = Instant::now();
-    let trained = train(&job, &members, arguments)?;
-    voice::took("training", begun);
-    let swept = SweepResults::new(&job, &members, trained, begun.elapsed().as_secs_f64());
+    let mut store = Store::open(&folder, &job)?;
+    if let Some(part) = arguments.sharding.part(&folder, arguments.identity(&job))? {
+        let members: Vec<Member> = part.shard().share(members).collect();
+        train(&job, &members, &mut store, arguments)?;
+        return shard::finish(part, common);
+    }
+    train(&job, &members, &mut store, arguments)?;
+    let models: Vec<&Stored> = members
+        .iter()
+        .filter_map(|member| store.find(member))
+        .collect();
+    let wall_s = models.iter().map(|model| model.seconds).sum();
+    let trained = models
+        .into_iter()
+        .map(|model| model.trained.clone())
+        .collect();
+    let swept = SweepResults::new(&job, &members, trained, wall_s);
     let json = serde_json::to_string_pretty(&swept)? + "\n";
     folder.write_text("sweep.json", &json)?;
     voice::print(&if common.json { json } else { swept.text() })?;
@@ -113,6 +137,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
 }
 
 impl Arguments {
+    /// What decides the numbers of the whole sweep.
+    fn identity(&self, job: &Job) -> Identity {
+        let run = job.identity();
+        let Self {
+            seeds,
+            alpha,
+            one_seed,
+            ..
+        } = self;
+        Identity {
+            command: "sweep".to_owned(),
+            config: json!({"train": run.config, "seeds": seeds, "alpha": alpha, "one_seed": one_seed}),
+            ..run
+        }
+    }
+
     fn members(&self) -> Vec<Member> {
         let count = self.seeds.get();
         let each = (0..count).zip(self.common.seed..);
@@ -128,27 +168,42 @@ impl Arguments {
     }
 }
 
-fn train(job: &Job, members: &[Member], arguments: &Arguments) -> Result<Vec<Trained>> {
-    for note in &job.data.notes {
-        voice::say(format!("note: {note}"));
-    }
-    let parts = members.chunks(arguments.together.get());
-    let bar = progress::bar(0);
+/// Train the models that are not stored yet, and store them.
+fn train(job: &Job, members: &[Member], store: &mut Store, arguments: &Arguments) -> Result<()> {
+    // On the processor one is trained after the other anyway.
+    let together = match arguments.common.device == Backend::NdArray {
+        true => 1,
+        false => arguments.together.get(),
+    };
+    let is_new = |member: &&Member| store.find(member).is_none();
+    let new: Vec<Member> = members.iter().filter(is_new).copied().collect();
+    let batches = new.chunks(together);
+    let bar = progress::bar(batches.len() * job.recipe.fit.epochs);
+    let out = arguments.out.display().to_string();
+    let _orderly = interrupt::orderly(store.folder(), move || {
+        format!(
+            "{out} keeps the models that are done; {}",
+            interrupt::go_on()
+        )
+    });
+    let begun = Instant::now();
     let mut diverged = 0;
-    let mut train_part = |part: &[Member]| {
+    for batch in batches {
+        let since = Instant::now();
         let mut observer = |at: SweepProgress| {
             bar.inc(1);
             bar.set_message(format!("epochs, {} diverged", diverged + at.diverged));
         };
-        let sweep = job.sweep(part)?;
-        bar.inc_length(sweep.rounds() as u64);
-        let trained = sweep.run(&job.data.training, &mut observer)?;
+        let trained = job.sweep(batch)?.run(&job.data.training, &mut observer)?;
         diverged += trained.iter().filter(|model| model.diverged).count();
-        Ok::<_, anyhow::Error>(trained)
-    };
-    let trained: Result<Vec<_>> = parts.map(&mut train_part).collect();
+        let each_s = since.elapsed().as_secs_f64() / batch.len() as f64;
+        for (member, trained) in batch.iter().zip(trained) {
+            store.add(member, trained, each_s)?;
+        }
+    }
     bar.finish_and_clear();
-    Ok(trained?.concat())
+    voice::took("training", begun);
+    Ok(())
 }
 
 #[cfg(test)]

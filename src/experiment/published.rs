@@ -1,7 +1,7 @@
 use super::learning::TrainedMethod;
 use super::results::{Course, Results};
 use super::{ExperimentError, Observer, Session, offline_prior, physics_prior, receding_horizon};
-use crate::runs::RunFolder;
+use crate::runs::{Identity, RunFolder, Shard};
 
 /// The published experiments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,11 +42,7 @@ impl Session {
         folder: &RunFolder,
         observer: Observer<'_>,
     ) -> Result<Results, ExperimentError> {
-        experiment
-            .check(self)
-            .map_err(|message| self.config.wrong(message))?;
-        let run = self.identity(experiment.name(), self.resolved());
-        folder.claim(&run)?;
+        let run = self.claim(experiment, folder)?;
         let learnt = self.learn(folder, observer)?;
         let (name, task) = (experiment.name(), self.task.name());
         let mut results = Results::new(name, &task, self.seeds(), run.config);
@@ -57,6 +53,41 @@ impl Session {
             Experiment::RecedingHorizon => receding_horizon::compare(self, &learnt, &mut results)?,
         }
         Ok(results)
+    }
+
+    /// Carries out a shard of the runs of an experiment in its folder, or the rest of them. What is evaluated without
+    /// learning is left to [`Session::carry_out`].
+    ///
+    /// # Errors
+    /// As [`Session::carry_out`].
+    pub fn carry_out_shard(
+        &self,
+        experiment: Experiment,
+        shard: Shard,
+        folder: &RunFolder,
+        observer: Observer<'_>,
+    ) -> Result<(), ExperimentError> {
+        self.claim(experiment, folder)?;
+        self.learn_shard(shard, folder, observer).map(drop)
+    }
+
+    /// What decides the numbers of an experiment.
+    pub fn run_of_experiment(&self, experiment: Experiment) -> Identity {
+        self.identity(experiment.name(), self.resolved())
+    }
+
+    /// Take a folder for an experiment.
+    fn claim(
+        &self,
+        experiment: Experiment,
+        folder: &RunFolder,
+    ) -> Result<Identity, ExperimentError> {
+        experiment
+            .check(self)
+            .map_err(|message| self.config.wrong(message))?;
+        let run = self.run_of_experiment(experiment);
+        folder.claim(&run)?;
+        Ok(run)
     }
 
     /// Evaluates the return of every method against the number of real transitions.

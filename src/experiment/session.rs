@@ -11,7 +11,7 @@ use crate::files::beside_or_named;
 use crate::mbrl::{EpisodeScore, Evaluator, Prior, Run, Schedule};
 use crate::model::{FittedEffect, Library};
 use crate::plant::Plant;
-use crate::runs::{Identity, RunFolder};
+use crate::runs::{Identity, RunFolder, Shard};
 use crate::train::Backend;
 
 /// A configuration with everything it refers to read.
@@ -66,10 +66,10 @@ impl Session {
         })
     }
 
-    /// Number of trainings of all methods and seeds.
-    pub fn rounds(&self) -> usize {
-        let each = self.methods.iter().map(|method| method.config.rounds);
-        self.seeds().len() * each.sum::<usize>()
+    /// Number of trainings in a shard of the runs of all methods and seeds.
+    pub fn rounds(&self, shard: Shard) -> usize {
+        let runs = shard.share(self.runs());
+        runs.map(|(method, _)| method.config.rounds).sum()
     }
 
     /// Number of trainings of one run of a method; 0 for an unknown method.
@@ -144,31 +144,40 @@ impl Session {
         })
     }
 
+    /// The runs of the loop: every method with every seed.
+    fn runs(&self) -> impl Iterator<Item = (&Method, u64)> {
+        let seeds = self.seeds().into_iter();
+        seeds.flat_map(|seed| self.methods.iter().map(move |method| (method, seed)))
+    }
+
     /// Trains every method with every seed: `[method][seed]`.
     pub(super) fn learn(
         &self,
         folder: &RunFolder,
         observer: Observer<'_>,
     ) -> Result<Vec<Vec<TrainedMethod>>, ExperimentError> {
-        let seeds = self.seeds().into_iter();
-        let units: Vec<(&Method, u64)> = seeds
-            .flat_map(|seed| self.methods.iter().map(move |method| (method, seed)))
-            .collect();
+        let learnt = self.learn_shard(Shard::WHOLE, folder, observer)?;
+        let mut by_method: Vec<Vec<TrainedMethod>> =
+            self.methods.iter().map(|_| Vec::new()).collect();
+        for (number, run) in learnt.into_iter().enumerate() {
+            by_method[number % self.methods.len()].push(run);
+        }
+        Ok(by_method)
+    }
+
+    /// Carries out a shard of the runs.
+    pub(super) fn learn_shard(
+        &self,
+        shard: Shard,
+        folder: &RunFolder,
+        observer: Observer<'_>,
+    ) -> Result<Vec<TrainedMethod>, ExperimentError> {
         let learn = |(method, seed): (&Method, u64)| {
             let own = folder.within(format!("runs/{}-{seed:02}", method.config.name));
             self.learn_one(method, seed, own, observer)
         };
-        let learnt: Vec<TrainedMethod> = units
-            .into_par_iter()
-            .with_max_len(1)
-            .map(learn)
-            .collect::<Result<_, _>>()?;
-        let mut by_method: Vec<Vec<TrainedMethod>> =
-            self.methods.iter().map(|_| Vec::new()).collect();
-        for (unit, run) in learnt.into_iter().enumerate() {
-            by_method[unit % self.methods.len()].push(run);
-        }
-        Ok(by_method)
+        let runs: Vec<(&Method, u64)> = shard.share(self.runs()).collect();
+        runs.into_par_iter().with_max_len(1).map(learn).collect()
     }
 
     fn learn_one(

@@ -30,10 +30,13 @@ impl Folder {
                 .map_err(|error| folder.damaged(ROUNDS, format!("line {}: {error}", number + 1)))
         };
         let rounds = text.lines().enumerate().map(read);
-        Ok(Self {
+        let found = Self {
             rounds: rounds.collect::<Result<_, _>>()?,
             folder,
-        })
+        };
+        // A run that was killed may have left one.
+        found.remove_earlier_checkpoints()?;
+        Ok(found)
     }
 
     /// The rounds done so far.

@@ -135,7 +135,12 @@ impl RunFolder {
     /// # Errors
     /// They differ.
     pub fn expect(&self, saved: &Identity, run: &Identity) -> Result<(), RunFolderError> {
-        run.difference(saved).map_or(Ok(()), |difference| {
+        self.refuse(run.difference(saved))
+    }
+
+    /// Refuse what differs in this from what is here.
+    pub(super) fn refuse(&self, difference: Option<String>) -> Result<(), RunFolderError> {
+        difference.map_or(Ok(()), |difference| {
             Err(RunFolderError::OtherRun {
                 path: self.path.clone(),
                 difference,
@@ -148,9 +153,25 @@ impl RunFolder {
     /// # Errors
     /// A file that cannot be read.
     pub fn text(&self, name: &str) -> Result<Option<String>, RunFolderError> {
+        self.reading(name, |path| fs::read_to_string(path))
+    }
+
+    /// The bytes of a file here; none where there is no such file.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn bytes(&self, name: &str) -> Result<Option<Vec<u8>>, RunFolderError> {
+        self.reading(name, |path| fs::read(path))
+    }
+
+    fn reading<T>(
+        &self,
+        name: &str,
+        read: impl FnOnce(&Path) -> io::Result<T>,
+    ) -> Result<Option<T>, RunFolderError> {
         let path = self.path.join(name);
-        match fs::read_to_string(&path) {
-            Ok(text) => Ok(Some(text)),
+        match read(&path) {
+            Ok(contents) => Ok(Some(contents)),
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             Err(error) => Err(failed("read", &path)(error)),
         }

@@ -1,6 +1,7 @@
 //! What goes into a sweep, and what comes out of it, for each model.
 
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 
 use super::Training;
 use crate::model::MlpWeights;
@@ -17,7 +18,8 @@ pub struct Variant {
 }
 
 /// A model of a sweep after its training.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Stored")]
 pub struct Trained {
     /// Prediction error on the training segments.
     pub error: f64,
@@ -27,6 +29,27 @@ pub struct Trained {
     pub parameters: Vec<f64>,
     /// The loss became infinite or no number. All else here is then of the last step before or not finite.
     pub diverged: bool,
+}
+
+/// A model as JSON has it, where numbers that are not finite are null.
+#[derive(Deserialize)]
+struct Stored {
+    error: Option<f64>,
+    residual_norm: Option<f64>,
+    parameters: Vec<Option<f64>>,
+    diverged: bool,
+}
+
+impl From<Stored> for Trained {
+    fn from(stored: Stored) -> Self {
+        let number = |stored: Option<f64>| stored.unwrap_or(f64::NAN);
+        Self {
+            error: number(stored.error),
+            residual_norm: number(stored.residual_norm),
+            parameters: stored.parameters.into_iter().map(number).collect(),
+            diverged: stored.diverged,
+        }
+    }
 }
 
 /// The progress of a sweep.

@@ -8,8 +8,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::ProgressBar;
+use serde_json::json;
 
-use super::{Answer, Common, interrupt, program_id, progress, told, unless_panic, voice};
+use super::shard::{self, Sharding, program_id};
+use super::{Answer, Common, interrupt, progress, told, unless_panic, voice};
 use crate::bench::rigs::{
     Fold, Found, Line, Measured, Method, Rig, Tools, markdown, picture, read, summarise,
 };
@@ -18,7 +20,7 @@ use crate::closeloop::Progress;
 use crate::formats::ClientError;
 use crate::model::Library;
 use crate::report::ResultsPage;
-use crate::runs::RunFolder;
+use crate::runs::{Identity, RunFolder};
 use crate::train::ResidualTrainer;
 
 /// Compare closing the loop with a plain structure, published parameters and mujoco.sysid on measured rigs
@@ -43,6 +45,8 @@ pub(super) struct Rigs {
     /// Only rigs whose name contains one of these; RIG/TEXT: of these only results whose name, LOG/METHOD, contains TEXT
     #[arg(long, num_args = 1.., value_name = "RIG")]
     only: Vec<Selection>,
+    #[command(flatten)]
+    sharding: Sharding,
     #[command(flatten)]
     common: Common,
 }
@@ -94,6 +98,17 @@ pub(super) fn run(arguments: &Rigs) -> Result<Answer> {
         },
     };
     let work = work(arguments, &rigs)?;
+    if let Some(part) = arguments
+        .sharding
+        .part(&store.folder, store.identity(&work))?
+    {
+        let work: Vec<Work<'_>> = part.shard().share(work).collect();
+        let (_, not_run) = store.run(&work)?;
+        for (method, reason) in not_run {
+            voice::say(format!("note: {} was not run: {reason}", method.name()));
+        }
+        return shard::finish(part, &arguments.common);
+    }
     let (lines, not_run) = store.run(&work)?;
     let summary = summarise(&rigs, &lines, not_run);
     let text = markdown(&summary);
@@ -170,6 +185,25 @@ struct Store<'a> {
 }
 
 impl Store<'_> {
+    /// What decides the results of all work.
+    fn identity(&self, all: &[Work<'_>]) -> Identity {
+        let named = |work: &Work<'_>| {
+            let name = format!("{}/{}", work.rig.rig.name, work.name());
+            (name, self.fingerprint(work))
+        };
+        Identity {
+            command: "bench rigs".to_owned(),
+            seed: self.tools.seed,
+            config: json!({}),
+            inputs: all.iter().map(named).collect(),
+        }
+    }
+
+    fn fingerprint(&self, work: &Work<'_>) -> String {
+        let Work { rig, fold, method } = *work;
+        method.fingerprint(rig, fold, self.tools.seed, &self.program)
+    }
+
     /// The results, and which methods cannot be run here; stored results are not computed again.
     fn run(&self, all: &[Work<'_>]) -> Result<(Vec<Line>, BTreeMap<Method, String>)> {
         let bar = progress::bar(all.len());
@@ -192,7 +226,7 @@ impl Store<'_> {
         let folder = [&rig.rig.name, &fold.name].map(|name| name.replace(['/', '\\'], "-"));
         let folder = self.folder.within(folder.iter().collect::<PathBuf>());
         let file = format!("{}.json", method.name());
-        let fingerprint = method.fingerprint(rig, fold, self.tools.seed, &self.program);
+        let fingerprint = self.fingerprint(work);
         // A result of another version may not be readable.
         let known = folder
             .text(&file)?

@@ -2,9 +2,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Results, Session, Trial};
+use super::{Experiment, Results, Session, Trial};
 use crate::experiment::ExperimentError;
-use crate::runs::{Identity, RunFolder};
+use crate::runs::{Identity, RunFolder, Shard};
 
 /// The contents of `runs/CASE-SEED.json`: a trial and the case that it belongs to.
 #[derive(Serialize, Deserialize)]
@@ -23,22 +23,44 @@ impl Session {
         folder: &RunFolder,
         observer: &(impl Fn(&Trial) + Sync),
     ) -> Result<Results, ExperimentError> {
+        let trials = self.run_shard(Shard::WHOLE, folder, observer)?;
+        Ok(Results::new(&self.experiment, &trials))
+    }
+
+    /// Carries out a shard of the trials, as [`Session::run`] does all.
+    ///
+    /// # Errors
+    /// As [`Session::run`].
+    pub fn run_shard(
+        &self,
+        shard: Shard,
+        folder: &RunFolder,
+        observer: &(impl Fn(&Trial) + Sync),
+    ) -> Result<Vec<Trial>, ExperimentError> {
         folder.claim(&self.identity())?;
         let runs = folder.within("runs");
-        let cases = 0..self.experiment.cases.len();
-        let trials: Vec<(usize, u64)> = cases
-            .flat_map(|case| (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k)))
-            .collect();
+        let trials: Vec<(usize, u64)> = shard.share(self.trials()).collect();
         let trial = |&(case, seed): &(usize, u64)| {
             let trial = self.trial_in(&runs, case, seed)?;
             observer(&trial);
             Ok(trial)
         };
-        let trials: Vec<Trial> = trials
-            .par_iter()
-            .map(trial)
-            .collect::<Result<_, ExperimentError>>()?;
-        Ok(Results::new(&self.experiment, &trials))
+        trials.par_iter().map(trial).collect()
+    }
+
+    /// The case and the seed of each trial.
+    pub fn trials(&self) -> impl Iterator<Item = (usize, u64)> {
+        let cases = 0..self.experiment.cases.len();
+        cases.flat_map(move |case| {
+            (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k))
+        })
+    }
+
+    /// What decides the numbers of all trials together.
+    pub fn run_of_all(&self) -> Identity {
+        let Identity { config, .. } = self.identity();
+        let Experiment { cases, seeds, .. } = &self.experiment;
+        self.identity_of(json!({"of_each": config, "cases": cases, "seeds": seeds}))
     }
 
     /// The settings that all trials share. Cases and seeds are not among them, so that more can be added later.

@@ -83,12 +83,23 @@ impl Job {
             let settings = self.recipe.fit.clone();
             return Ok(Training::new(self.model.clone(), settings, order)?);
         };
-        let (saved, mine) = (&checkpoint.manifest, &self.origin);
+        let saved = &checkpoint.manifest;
         folder.expect(
             &identity(&saved.config, saved.seed, &checkpoint.model_toml),
-            &identity(&mine.config, mine.seed, &mine.model_toml),
+            &self.identity(),
         )?;
         Ok(checkpoint.training(&self.dynamics, &self.model.device())?)
+    }
+
+    /// What decides the numbers of the training.
+    pub fn identity(&self) -> Identity {
+        let Origin {
+            config,
+            seed,
+            model_toml,
+            ..
+        } = &self.origin;
+        identity(config, *seed, model_toml)
     }
 }
 

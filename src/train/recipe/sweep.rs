@@ -1,10 +1,12 @@
+use serde::Serialize;
+
 use super::{Job, Kind, Recipe, RecipeError};
 use crate::model::MlpWeights;
 use crate::runs::{Purpose, stream};
 use crate::train::{Penalty, Sweep, Variant};
 
 /// What sets one model of a sweep apart from the others.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Member {
     /// Seed of its initial weights and of the order of its minibatches.
     pub seed: u64,

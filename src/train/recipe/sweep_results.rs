@@ -36,7 +36,7 @@ pub struct Totals {
     pub diverged: usize,
     /// Epochs of each model.
     pub epochs: usize,
-    /// Duration of the training, s.
+    /// Time that the training of all models took, one after the other or as batches, s.
     pub wall_s: f64,
     pub models_per_s: f64,
 }
@@ -65,7 +65,7 @@ pub struct SweptModel {
 }
 
 impl SweepResults {
-    /// Summarises the `trained` models of a sweep of `job`, one per member, after `wall_s` seconds of training.
+    /// Summarises the `trained` models of a sweep of `job`, one per member, whose training took `wall_s` seconds in all.
     pub fn new(job: &Job, members: &[Member], trained: Vec<Trained>, wall_s: f64) -> Self {
         let declared = job.model.declared();
         let fit = &job.recipe.fit;

@@ -1,0 +1,160 @@
+//! Runs that are done in shards: put together they are those of one machine.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::train::{config, json, refused, residyn, run};
+
+/// Do `command` in shards, one after the other, put them together in `merged`, and do what is left.
+fn in_shards(dir: &Path, command: &[&str], of: usize) {
+    let shards: Vec<String> = (1..=of).map(|k| format!("{k}/{of}")).collect();
+    let parts: Vec<String> = (1..=of).map(|k| format!("part-{k}")).collect();
+    for (shard, part) in shards.iter().zip(&parts) {
+        json(dir, &[command, &["--shard", shard, "--out", part]].concat());
+    }
+    merge(dir, &parts);
+    json(dir, &[command, &["--out", "merged"]].concat());
+}
+
+fn merge(dir: &Path, parts: &[String]) {
+    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+    let told = json(dir, &[&["merge", "--out", "merged"], &parts[..]].concat());
+    assert_eq!(told["missing"], serde_json::json!([]));
+}
+
+/// A JSON file without what tells the time and how the program was called.
+fn read(path: &Path, without: &[&str]) -> Value {
+    let mut value: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    for pointer in without {
+        assert_ne!(value.pointer_mut(pointer).unwrap().take(), Value::Null);
+    }
+    value
+}
+
+/// All files below a folder but those that only the run itself uses.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let name = entry.file_name().into_string().unwrap();
+        if entry.path().is_dir() {
+            let inside = files(&entry.path()).into_iter();
+            found.extend(inside.map(|(path, bytes)| (format!("{name}/{path}"), bytes)));
+        } else if !name.starts_with('.') {
+            found.insert(name, fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+#[test]
+fn a_bench_in_shards_has_the_summary_of_one_machine() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let grid = config("bench/smoke.toml");
+    let command = ["bench", "effects", "--grid", &grid];
+    in_shards(dir, &command, 2);
+    json(dir, &[&command[..], &["--out", "whole"]].concat());
+    let summary = |out: &str| read(&dir.join(out).join("summary.json"), &["/seconds"]);
+    assert_eq!(summary("merged"), summary("whole"));
+    let cells = fs::read_to_string(dir.join("merged/cells.jsonl")).unwrap();
+    assert_eq!(cells.lines().count(), 3, "nothing was done twice");
+}
+
+#[test]
+fn a_sweep_in_shards_has_the_models_of_one_machine() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let recipe = config("smoke/train-pendulum.toml");
+    let command = ["sweep", "--config", &recipe, "--seeds", "5"];
+    in_shards(dir, &command, 3);
+    json(dir, &[&command[..], &["--out", "whole"]].concat());
+    let clock = [
+        "/totals/wall_s",
+        "/totals/models_per_s",
+        "/config/command_line",
+    ];
+    let swept = |out: &str| read(&dir.join(out).join("sweep.json"), &clock);
+    assert_eq!(swept("merged"), swept("whole"));
+    // Another seed is another sweep.
+    let other = ["--seed", "4", "--shard", "3/3", "--out", "other"];
+    json(dir, &[&command[..], &other].concat());
+    let told = refused(dir, &["merge", "part-1", "other", "--out", "mixed"]);
+    assert!(
+        told.contains("its `seed` is 4, here it is 0; leave it out"),
+        "{told}"
+    );
+    assert!(!dir.join("mixed").exists());
+    let none = refused(
+        dir,
+        &[&command[..], &["--shard", "4/3", "--out", "none"]].concat(),
+    );
+    assert!(none.contains("K is 4 and N is 3"), "{none}");
+    let lacking = run(dir, &["merge", "part-1", "part-3", "--out", "lacking"]);
+    let told = String::from_utf8(lacking.stderr).unwrap();
+    assert_eq!(lacking.status.code(), Some(1), "{told}");
+    assert!(told.contains("shard 2/3 is not among the parts"), "{told}");
+}
+
+#[test]
+fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let config = config("smoke/physics-prior-pendulum.toml");
+    let command = ["experiment", "physics-prior", "--config", &config];
+    let shard = |k: usize| {
+        let (shard, part) = (format!("{k}/8"), format!("part-{k}"));
+        let mut child = residyn(dir, &command);
+        child.args(["--shard", &shard, "--out", &part]);
+        child.stdout(Stdio::null()).stderr(Stdio::null());
+        child
+    };
+    // The first two are the hybrid and the network alone of the first seed.
+    for (k, done) in [(1, "hybrid-00"), (2, "data_driven-00")] {
+        let rounds = dir.join(format!("part-{k}/runs/{done}/rounds.jsonl"));
+        let mut child = shard(k).spawn().unwrap();
+        while !rounds.exists() {
+            sleep(Duration::from_millis(2));
+        }
+        child.kill().unwrap();
+        assert_eq!(
+            child.wait().unwrap().code(),
+            None,
+            "it was over before it was killed"
+        );
+    }
+    let cut = run(dir, &["merge", "part-1", "part-2", "--out", "merged"]);
+    let told = String::from_utf8(cut.stderr).unwrap();
+    assert_eq!(cut.status.code(), Some(1), "{told}");
+    assert!(told.contains("part-1: shard 1/8 is not finished"), "{told}");
+    fs::remove_dir_all(dir.join("merged")).unwrap();
+    for k in 1..=8 {
+        assert!(shard(k).status().unwrap().success());
+    }
+    let parts: Vec<String> = (1..=8).map(|k| format!("part-{k}")).collect();
+    merge(dir, &parts);
+    for out in ["merged", "whole"] {
+        json(dir, &[&command[..], &["--out", out]].concat());
+    }
+    let results = |out: &str| {
+        read(
+            &dir.join(out).join("results.json"),
+            &["/wall_s", "/command"],
+        )
+    };
+    assert_eq!(results("merged"), results("whole"));
+    let [mut merged, mut whole] = ["merged", "whole"].map(|out| files(&dir.join(out)));
+    for found in [&mut merged, &mut whole] {
+        found.remove("results.json").unwrap();
+    }
+    let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&merged), names(&whole));
+    for (name, bytes) in &merged {
+        assert!(whole[name] == *bytes, "{name} differs");
+    }
+}
