@@ -2,7 +2,7 @@
 
 use super::fitted::Fitted;
 use super::study::Study;
-use crate::data::{Audit, Log, reversed_driving};
+use crate::data::{Audit, Log, Remedy, reversed_driving};
 use crate::model::Effect;
 
 /// The torques have the opposite sign where the model leaves this share of its loss with all of them reversed: half the error.
@@ -17,7 +17,8 @@ impl Study<'_> {
         usual: Option<&Fitted>,
         audits: &mut [Audit],
     ) {
-        if !self.moves() {
+        let key = self.declared.driven_by().key();
+        if !self.moves() || audits.iter().any(|audit| mends(audit, key)) {
             return;
         }
         let reversed: Vec<Log> = self.logs.iter().map(reversed).collect();
@@ -39,6 +40,15 @@ impl Study<'_> {
             }
         }
     }
+}
+
+/// Whether an audit has something else to mend in what drives the joints.
+fn mends(audit: &Audit, key: &str) -> bool {
+    let mut lines = audit.serious().filter_map(|finding| match &finding.remedy {
+        Some(Remedy::Columns(lines)) => Some(lines),
+        _ => None,
+    });
+    lines.any(|lines| lines.iter().any(|line| line.starts_with(key)))
 }
 
 fn reversed(log: &Log) -> Log {

@@ -19,7 +19,7 @@ use super::split::Split;
 use super::stage::Progress;
 use super::study::Study;
 use super::verdict::{Verdict, verdict};
-use crate::data::{Joint, Log};
+use crate::data::{Audit, Joint, Log};
 use crate::identify::{FitError, Termination};
 use crate::model::{FittedEffect, Library, Model, Status};
 use crate::plant::Plant;
@@ -510,22 +510,29 @@ effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
     let library = Library::built_in();
     let declared = library.model(Path::new("acrobot")).unwrap();
     let settings = Settings::default();
-    let told = |logs: &[Log]| {
-        let study = Study::new(&declared, logs, &settings);
+    let told = |study: &Study<'_>, mut audits: Vec<Audit>| -> Vec<String> {
         let usual = study.with_usual_friction(library.effects());
-        let mut audits = study.audits().to_vec();
         study.tell_reversed(library.effects(), usual.as_ref(), &mut audits);
-        let texts = audits[0].serious().map(|finding| finding.to_string());
+        let texts = audits[0].serious().map(ToString::to_string);
         texts
             .filter(|text| text.contains("with every tau reversed"))
-            .collect::<Vec<_>>()
+            .collect()
+    };
+    let blank = |study: &Study<'_>| {
+        let mut audits = study.audits().to_vec();
+        audits[0].findings.clear();
+        audits
     };
     let mut logs = recorded(rig, 0);
-    assert!(told(&logs).is_empty());
+    let study = Study::new(&declared, &logs, &settings);
+    assert!(told(&study, blank(&study)).is_empty());
     for value in logs[0].tau.iter_mut().flatten() {
         *value = -*value;
     }
-    let told = told(&logs);
-    assert_eq!(told.len(), 1);
-    assert!(told[0].contains("[columns] tau = "), "{}", told[0]);
+    let study = Study::new(&declared, &logs, &settings);
+    let alone = told(&study, blank(&study));
+    assert_eq!(alone.len(), 1);
+    assert!(alone[0].contains("[columns] tau = "), "{}", alone[0]);
+    // Where the audit of the log says so of each joint, there is nothing to add.
+    assert!(told(&study, study.audits().to_vec()).is_empty());
 }

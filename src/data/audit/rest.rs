@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_joint_that_rests_in_one_log_is_serious_where_no_other_moves_it() {
         let (moves, rests) = (log("moves.csv", 0.5), log("rests.csv", 0.0));
-        assert_eq!(told(&[rests.clone()]), [[Severity::Serious]]);
+        assert_eq!(told(std::slice::from_ref(&rests)), [[Severity::Serious]]);
         assert_eq!(
             told(&[rests.clone(), rests.clone()]),
             [[Severity::Serious], [Severity::Serious]]

@@ -10,7 +10,7 @@ use crate::report::wording::{WITH_FRICTION, small};
 /// Rows of the table at most, beside that of all joints.
 const ROWS: usize = 7;
 /// Other models that are listed at most.
-const OTHERS: usize = 3;
+const OTHERS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
     match (report.compared, &report.torque) {
