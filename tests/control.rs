@@ -2,8 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::thread::sleep;
 use std::time::Duration;
 
 use residyn::data::{Columns, Log};
@@ -14,7 +12,7 @@ use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
 
-use super::train::{config, configs, json, refused, residyn};
+use super::train::{config, configs, json, kill_after, refused, residyn};
 
 fn shipped(name: &str) -> String {
     let checkpoints = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints");
@@ -221,24 +219,6 @@ fn the_shipped_acrobot_checkpoint_is_reproduced_and_swings_up() {
     assert!(least_return("acrobot-sim") > 3400.0);
 }
 
-/// Start the command, wait until a file is there, and kill it.
-fn kill_after(dir: &Path, arguments: &[&str], file: &Path) {
-    let mut child = residyn(dir, arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    while !file.exists() {
-        sleep(Duration::from_millis(2));
-    }
-    child.kill().unwrap();
-    assert_eq!(
-        child.wait().unwrap().code(),
-        None,
-        "it was over before it was killed"
-    );
-}
-
 #[test]
 fn every_experiment_is_sound() {
     let library = Library::built_in();
@@ -266,11 +246,8 @@ fn a_killed_experiment_resumes_to_the_same_numbers() {
     let command = experiment("physics-prior", &config, "x");
     let expected = json(whole.path(), &command);
     for file in ["hybrid-00/rounds.jsonl", "data_driven-00/rounds.jsonl"] {
-        kill_after(
-            killed.path(),
-            &command,
-            &killed.path().join("x/runs").join(file),
-        );
+        let file = killed.path().join("x/runs").join(file);
+        kill_after(&mut residyn(killed.path(), &command), &file, Duration::ZERO);
     }
     let found = json(killed.path(), &command);
     assert_eq!(found["methods"], expected["methods"]);

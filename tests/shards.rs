@@ -3,13 +3,11 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::thread::sleep;
 use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::train::{config, json, refused, residyn, run};
+use crate::train::{config, json, kill_after, refused, residyn, run};
 
 /// Do `command` in shards, one after the other, put them together in `merged`, and do what is left.
 fn in_shards(dir: &Path, command: &[&str], of: usize) {
@@ -109,24 +107,14 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
     let command = ["experiment", "physics-prior", "--config", &config];
     let shard = |k: usize| {
         let (shard, part) = (format!("{k}/8"), format!("part-{k}"));
-        let mut child = residyn(dir, &command);
-        child.args(["--shard", &shard, "--out", &part]);
-        child.stdout(Stdio::null()).stderr(Stdio::null());
-        child
+        let mut command = residyn(dir, &command);
+        command.args(["--shard", &shard, "--out", &part]);
+        command
     };
     // The first two are the hybrid and the network alone of the first seed.
     for (k, done) in [(1, "hybrid-00"), (2, "data_driven-00")] {
         let rounds = dir.join(format!("part-{k}/runs/{done}/rounds.jsonl"));
-        let mut child = shard(k).spawn().unwrap();
-        while !rounds.exists() {
-            sleep(Duration::from_millis(2));
-        }
-        child.kill().unwrap();
-        assert_eq!(
-            child.wait().unwrap().code(),
-            None,
-            "it was over before it was killed"
-        );
+        kill_after(&mut shard(k), &rounds, Duration::ZERO);
     }
     let cut = run(dir, &["merge", "part-1", "part-2", "--out", "merged"]);
     let told = String::from_utf8(cut.stderr).unwrap();
@@ -134,7 +122,7 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
     assert!(told.contains("part-1: shard 1/8 is not finished"), "{told}");
     fs::remove_dir_all(dir.join("merged")).unwrap();
     for k in 1..=8 {
-        assert!(shard(k).status().unwrap().success());
+        assert!(shard(k).output().unwrap().status.success());
     }
     let parts: Vec<String> = (1..=8).map(|k| format!("part-{k}")).collect();
     merge(dir, &parts);

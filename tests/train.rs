@@ -71,20 +71,17 @@ fn worst(outcome: &TrainingResults) -> f64 {
     outcome.parameters.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Start the command, wait until its checkpoint is there and a little longer, and kill it.
-fn kill_midway(dir: &Path, arguments: &[&str], checkpoint: &Path) {
-    let mut child = residyn(dir, arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    while !checkpoint.exists() {
-        sleep(Duration::from_millis(5));
+/// Start the command, and kill it so long after a file is there.
+pub fn kill_after(command: &mut Command, file: &Path, later: Duration) {
+    let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = quiet.spawn().unwrap();
+    while !file.exists() {
+        sleep(Duration::from_millis(2));
     }
-    sleep(Duration::from_millis(120));
+    sleep(later);
     child.kill().unwrap();
     let status = child.wait().unwrap();
-    assert_eq!(status.code(), None, "the run was over before it was killed");
+    assert_eq!(status.code(), None, "it was over before it was killed");
 }
 
 #[test]
@@ -104,7 +101,8 @@ fn a_killed_run_resumes_to_the_same_numbers() {
 
     let manifest = killed.path().join("c/checkpoint.json");
     for _ in 0..2 {
-        kill_midway(killed.path(), &command, &manifest);
+        let mut command = residyn(killed.path(), &command);
+        kill_after(&mut command, &manifest, Duration::from_millis(120));
     }
     let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
     let notes = String::from_utf8(output.stderr).unwrap();
