@@ -51,6 +51,7 @@ mod shell;
 mod shift;
 mod simulators;
 mod summary;
+mod supply;
 mod support;
 mod sweep;
 mod together;
