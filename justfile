@@ -31,9 +31,13 @@ instructions *arguments:
 ci:
     .ci/run
 
-# A stripped static binary in target/dist
+# A release in target/dist: static binary, wheel, bills of materials, checksums
 release:
     scripts/release
+
+# Build the committed release again elsewhere, and compare the bytes
+reproduce:
+    scripts/reproduce
 
 # Run the demo and refresh the pictures of the README
 demo:
