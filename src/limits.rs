@@ -26,6 +26,12 @@ pub const UNPACKED_RATIO: u64 = 20;
 
 /// The largest reading of a log, in its unit: its fourth power is far from the largest number there is.
 pub const READING: f64 = 1e30;
+/// The largest time of a log either way \[s\]: 30 000 years, and a clock in milliseconds that counts from 1970 is beyond it.
+pub const LOG_TIME: f64 = 1e12;
+/// Time from the first row of a log to the last, in its median steps: so many,
+pub const LOG_STEPS: f64 = 2e7;
+/// or this many times its rows.
+pub const PAUSED_STEPS: f64 = 10.0;
 /// Columns of a log.
 pub const LOG_COLUMNS: usize = 4096;
 /// Rows of a log that is simulated or, unlike text, may take less than a byte a row.
@@ -36,6 +42,12 @@ pub const SAMPLED_STEPS: usize = 10_000_000;
 pub const LAYER_WIDTH: usize = 4096;
 /// Weights and biases of a network.
 pub const NETWORK_NUMBERS: usize = 20_000_000;
+/// How long a rig is simulated for one log \[s\].
+pub const SIMULATED: f64 = 1e5;
+/// Substeps of an integrator's step.
+pub const SUBSTEPS: u32 = 1000;
+/// Steps over which an exported model remembers commands.
+pub const DELAY_STEPS: usize = 10_000;
 /// Sines that excite a plant.
 pub const TONES: usize = 1000;
 /// Candidates of a planner.
@@ -48,6 +60,25 @@ pub const ITERATIONS: usize = 10_000;
 pub const EPOCHS: usize = 100_000_000;
 /// Logs, models, episodes or simulations that one command makes.
 pub const RUNS: usize = 100_000;
+
+/// Whether a sensor can read this: false for what is no finite number.
+pub fn is_reading(value: f64) -> bool {
+    value.abs() <= READING
+}
+
+/// Refuse numbers, called `name`, of which one is more than a sensor reads.
+///
+/// # Errors
+/// The number, and what is taken at most.
+pub fn check_readings(name: &str, numbers: impl IntoIterator<Item = f64>) -> Result<(), String> {
+    let mut numbers = numbers.into_iter();
+    match numbers.find(|number| !is_reading(*number)) {
+        Some(number) => Err(format!(
+            "`{name}` has {number:e}; numbers up to {READING:e} are taken"
+        )),
+        None => Ok(()),
+    }
+}
 
 /// What a file of so many bytes may hold when it is unpacked \[bytes\].
 pub fn unpacked_bytes(packed: u64) -> u64 {

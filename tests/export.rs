@@ -38,7 +38,7 @@ pub fn predictions(
             let _ = writeln!(std::io::stderr(), "SKIPPED {name}: {reason}; run tests/run");
             None
         }
-        Err(ClientError::Failed(said)) => panic!("{name}: {said}"),
+        Err(ClientError::Failed(said) | ClientError::NotFinite(said)) => panic!("{name}: {said}"),
     }
 }
 

@@ -15,26 +15,26 @@ use crate::train::config;
 const PENDULUM: &str = include_str!("../models/pendulum.toml");
 
 /// A scratch folder.
-struct Scratch(tempfile::TempDir);
+pub struct Scratch(tempfile::TempDir);
 
 impl Scratch {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
     /// A file with these contents.
-    fn file(&self, name: &str, contents: impl AsRef<[u8]>) -> String {
+    pub fn file(&self, name: &str, contents: impl AsRef<[u8]>) -> String {
         let path = self.path(name);
         fs::write(&path, contents).unwrap();
         text(&path).to_owned()
     }
 
     /// A log of 2 s of a pendulum, a row every 10 ms; `row` makes q, qd and tau of the time.
-    fn log(&self, name: &str, row: impl Fn(f64) -> [f64; 3]) -> String {
+    pub fn log(&self, name: &str, row: impl Fn(f64) -> [f64; 3]) -> String {
         let mut log = "time,q1,qd1,tau1\n".to_owned();
         for time in (0..200).map(|row| f64::from(row) * 0.01) {
             let [q, qd, tau] = row(time);
@@ -44,13 +44,13 @@ impl Scratch {
     }
 
     /// The model of the pendulum with one text in place of another.
-    fn model(&self, name: &str, from: &str, to: &str) -> String {
+    pub fn model(&self, name: &str, from: &str, to: &str) -> String {
         assert!(PENDULUM.contains(from), "{from}");
         self.file(name, PENDULUM.replacen(from, to, 1))
     }
 
     /// The pendulum with this acceleration.
-    fn moving_by(&self, name: &str, acceleration: &str) -> String {
+    pub fn moving_by(&self, name: &str, acceleration: &str) -> String {
         self.model(name, "C_g * sin(q1) + C_i * tau1", acceleration)
     }
 
@@ -61,12 +61,12 @@ impl Scratch {
         self.file(name, recipe.replacen(from, to, 1))
     }
 
-    fn out(&self) -> String {
+    pub fn out(&self) -> String {
         text(&self.path("out")).to_owned()
     }
 }
 
-fn swinging(time: f64) -> [f64; 3] {
+pub fn swinging(time: f64) -> [f64; 3] {
     let torque = 0.3 * (3.0 * time).sin();
     [(2.0 * time).sin(), 2.0 * (2.0 * time).cos(), torque]
 }
@@ -90,7 +90,7 @@ fn refuses_in_little_memory(arguments: &[&str]) -> String {
 }
 
 /// What the program says that ran and has no answer.
-fn ends_without(arguments: &[&str]) -> String {
+pub fn ends_without(arguments: &[&str]) -> String {
     let output = residyn(arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{arguments:?}:\n{message}");

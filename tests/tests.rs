@@ -35,6 +35,7 @@ mod memory;
 mod metric;
 mod models;
 mod network;
+mod odd;
 mod oracles;
 mod page;
 mod parity;

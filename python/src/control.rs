@@ -3,8 +3,10 @@ use std::path::PathBuf;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use residyn::Library;
-use residyn::control::{Episode as Played, Predictor, Task, episode, with_controller};
-use residyn::plant::{Plant, PlantError};
+use residyn::control::{
+    Episode as Played, EpisodeError, Predictor, Task, episode, with_controller,
+};
+use residyn::plant::Plant;
 use residyn::runs::{Purpose, stream};
 use residyn::train::{Backend, Checkpoint};
 
@@ -85,7 +87,7 @@ struct Question {
 }
 
 impl Question {
-    fn episode(&self, number: usize) -> Result<Played, PlantError> {
+    fn episode(&self, number: usize) -> Result<Played, EpisodeError> {
         let Self {
             plant,
             task,
@@ -145,7 +147,7 @@ pub fn control(
     };
     let played = interruptible(
         py,
-        move |listener| -> Result<Vec<_>, PlantError> {
+        move |listener| -> Result<Vec<_>, EpisodeError> {
             let each = (0..episodes).map(|number| {
                 listener.tell(());
                 question.episode(number)

@@ -35,6 +35,7 @@ mod _residyn {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        residyn::cli::tell_of_panics();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::sensors::Flaws;
+use crate::limits::{LOG_ROWS, RUNS, check_readings};
 
 /// How a rig is driven; one number a joint in every list.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -67,13 +68,16 @@ impl Condition {
             && self.quantum >= 0.0
             && !self.drive.is_empty()
             && self.logs >= 2
-            && self.seconds * self.rate_hz >= 10.0;
-        let needs = "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, two logs, ten rows";
-        if sound {
-            self.flaws.check()
-        } else {
-            Err(needs.to_owned())
+            && self.logs <= RUNS
+            && (10.0..LOG_ROWS as f64).contains(&(self.seconds * self.rate_hz));
+        if !sound {
+            return Err(format!(
+                "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, from two to {RUNS} logs, and from ten to \
+                 {LOG_ROWS} rows in each"
+            ));
         }
+        check_readings("noise and quantum", [self.noise, self.quantum])?;
+        self.flaws.check()
     }
 }
 

@@ -13,6 +13,7 @@ use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use crate::files::{beside_or_named, from_toml, read_text};
+use crate::limits::check_readings;
 
 /// Why a grid cannot be run.
 #[derive(Debug, Error)]
@@ -223,6 +224,8 @@ impl File {
                     "plants.{name}: every list of `driving` has {joints} numbers, one a joint"
                 ));
             }
+            check_readings("driving", lists.into_iter().flatten().copied())
+                .map_err(|message| format!("plants.{name}: {message}"))?;
             let rises = |[low, high]: [f64; 2]| 0.0 < low && low < high;
             if !(rises(driving.torque_hz) && rises(driving.reference_hz)) {
                 return Err(format!(

@@ -87,6 +87,9 @@ struct Entry {
     ms_per_decision: f64,
     /// Candidates of all plans whose rollout diverged.
     diverged: usize,
+    /// When plans were made of which all candidates diverged, in s.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    lost_s: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     log: Option<PathBuf>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -136,7 +139,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             format!("return {return_mean:.2}; {successes} of {count} episode(s) succeed");
         voice::answer(headline, &table(&printed))?;
     }
-    Ok(Answer::Yes)
+    Ok(match told_of_lost(&printed.episodes) {
+        true => Answer::No,
+        false => Answer::Yes,
+    })
+}
+
+/// Say in which episode a plan first had no candidate of a finite return; whether there is one.
+fn told_of_lost(episodes: &[Entry]) -> bool {
+    let firsts = episodes.iter().enumerate();
+    let mut firsts = firsts.filter_map(|(number, e)| Some((number, e.lost_s.first()?)));
+    let Some((number, first_s)) = firsts.next() else {
+        return false;
+    };
+    let lost: usize = episodes.iter().map(|e| e.lost_s.len()).sum();
+    let plans: usize = episodes.iter().map(|e| e.decisions).sum();
+    voice::tell(format!(
+        "warning: {lost} of {plans} plan(s) are none, the first in episode {number} at {first_s:.3} s: no candidate has a finite \
+         return; mend the model or the objective of the task, or shorten the planner's horizon"
+    ));
+    true
 }
 
 /// The task, with the settings of the command line.
@@ -219,6 +241,7 @@ fn one(
             decisions,
             ms_per_decision: 1e3 * deciding.as_secs_f64() / decisions as f64,
             diverged: controller.diverged(),
+            lost_s: controller.lost().to_vec(),
             log,
             film,
         })

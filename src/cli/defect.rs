@@ -3,11 +3,11 @@
 use std::fmt::Display;
 use std::panic::set_hook;
 
-use super::{command_line, voice};
+use super::{ARGUMENTS, command_line, voice};
 use crate::guarded::is_guarded;
 
-/// From now on a panic says what it is, and what to report.
-pub(super) fn tell_of_panics() {
+/// From now on a panic says what it is, and what to report; one that is caught, below a reader of damaged files, says nothing.
+pub fn tell_of_panics() {
     set_hook(Box::new(|panic| {
         if !is_guarded() {
             voice::tell(told(panic));
@@ -16,11 +16,13 @@ pub(super) fn tell_of_panics() {
 }
 
 fn told(panic: impl Display) -> String {
+    let with = match ARGUMENTS.get() {
+        Some(_) => format!("the files that this command reads:\n  {}", command_line()),
+        None => "the calls of your program and the files that it reads".to_owned(),
+    };
     format!(
-        "error: a defect of residyn {}, not of your input: {panic}\n\
-         please report it, with the files that this command reads:\n  {}",
+        "error: a defect of residyn {}, not of your input: {panic}\nplease report it, with {with}",
         env!("CARGO_PKG_VERSION"),
-        command_line()
     )
 }
 
@@ -32,7 +34,7 @@ mod tests {
     use crate::guarded::guarded;
 
     #[test]
-    fn a_panic_is_told_with_version_place_and_command() {
+    fn a_panic_is_told_with_version_and_place() {
         let (send, told_of) = channel();
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
@@ -43,7 +45,7 @@ mod tests {
         let (expected, told) = told_of.recv().unwrap();
         assert!(expected && !is_guarded());
         let version = env!("CARGO_PKG_VERSION");
-        for part in [version, "defect.rs:", "as it must", "\n  residyn"] {
+        for part in [version, "defect.rs:", "as it must", "your program"] {
             assert!(told.contains(part), "{part}: {told}");
         }
     }

@@ -6,11 +6,12 @@ use clap::Args;
 use serde::Serialize;
 
 use super::inputs::{self, Source};
+use super::status::NotFinite;
 use super::{Answer, Common, voice};
 use crate::data::{Joint, LeaveOut, Log};
 use crate::identify::calibrate;
 use crate::model::{Dynamics, Model};
-use crate::sim::metric::{Summary, TorqueError, assess, summarise, torque_error};
+use crate::sim::metric::{Summary, TorqueError, assess, summarise, torque_error, torques_leave};
 use crate::train::Checkpoint;
 
 /// Open-loop prediction error of a model or a checkpoint on logs
@@ -155,8 +156,20 @@ fn torque(model: &Model, logs: &[Log]) -> Result<TorqueError> {
             model.name
         );
     }
-    torque_error(model, logs)
-        .ok_or_else(|| anyhow!("--torque: no log is longer than a second; give a longer one"))
+    let error = torque_error(model, logs)
+        .ok_or_else(|| anyhow!("--torque: no log is longer than a second; give a longer one"))?;
+    if !error.rms.iter().all(|rms| rms.is_finite()) {
+        let place = torques_leave(model, logs);
+        let place = place.map_or_else(String::new, |(log, time_s)| {
+            format!(", first in {log} at {time_s:.3} s")
+        });
+        bail!(NotFinite(format!(
+            "--torque: the torques that {} needs, or their squares, are no finite numbers{place}; `residyn check` shows \
+             what in the model cannot be meant",
+            model.name
+        )));
+    }
+    Ok(error)
 }
 
 fn torques(error: &TorqueError) -> String {
@@ -164,11 +177,7 @@ fn torques(error: &TorqueError) -> String {
     for (joint, rms) in Joint::all(error.rms.len()).zip(&error.rms) {
         let _ = writeln!(out, "{joint:>5}  {rms:>10.5}");
     }
-    let _ = writeln!(
-        out,
-        "relative to the logged torques: {:.2} %",
-        100.0 * error.relative
-    );
+    let _ = writeln!(out, "relative to the logged torques: {}", error.share());
     out
 }
 

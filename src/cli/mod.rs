@@ -35,6 +35,7 @@ use std::sync::OnceLock;
 
 use clap::{Args, Parser, Subcommand};
 
+pub use self::defect::tell_of_panics;
 use crate::train::Backend;
 
 /// From a rig's log to the physical effect that its model lacks.
@@ -105,7 +106,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments = ARGUMENTS.get_or_init(|| arguments.into_iter().collect());
     let Cli { voice, command } = Cli::parse_from(arguments);
     voice.begin();
-    defect::tell_of_panics();
+    tell_of_panics();
     let result = match command {
         Command::Closeloop(arguments) => closeloop::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),

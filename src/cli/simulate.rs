@@ -113,13 +113,11 @@ fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting])
     type Group<'s> = (&'s str, Joint, Vec<(String, f64)>);
     let mut groups: Vec<Group<'_>> = Vec::new();
     for setting in settings {
-        let first = library
-            .effect(&setting.name)
-            .map_err(anyhow::Error::msg)?
-            .parameters[0]
-            .name
-            .clone();
-        let value = (setting.parameter.clone().unwrap_or(first), setting.value);
+        let effect = library.effect(&setting.name).map_err(anyhow::Error::msg)?;
+        let first = || effect.parameters.first().map(|first| first.name.clone());
+        let parameter = setting.parameter.clone().or_else(first);
+        let parameter = parameter.with_context(|| format!("{} has no parameter", setting.name))?;
+        let value = (parameter, setting.value);
         match groups
             .iter_mut()
             .find(|(name, joint, _)| *name == setting.name && *joint == setting.joint)

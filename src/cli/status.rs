@@ -2,9 +2,15 @@
 
 use std::error::Error;
 
+use crate::control::EpisodeError;
 use crate::identify::FitError;
 use crate::plant::PlantError;
 use crate::train::TrainError;
+
+/// What a command finds beyond the finite numbers.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct NotFinite(pub String);
 
 /// 1 where the program ran until its numbers ceased to be finite, 2 where it could not run.
 pub(super) fn status(error: &anyhow::Error) -> u8 {
@@ -20,6 +26,8 @@ fn is_divergence(error: &(dyn Error + 'static)) -> bool {
         error.downcast_ref(),
         Some(PlantError::Diverged { .. } | PlantError::Mass { .. })
     );
+    let of_episode = matches!(error.downcast_ref(), Some(EpisodeError::Formula { .. }));
     let of_training = matches!(error.downcast_ref(), Some(TrainError::Diverged { .. }));
-    of_fit || of_plant || of_training
+    let of_command = error.is::<NotFinite>();
+    of_command || of_fit || of_plant || of_episode || of_training
 }

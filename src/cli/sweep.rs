@@ -155,16 +155,15 @@ impl Arguments {
 
     fn members(&self) -> Vec<Member> {
         let count = self.seeds.get();
-        let each = (0..count).zip(self.common.seed..);
-        each.map(|(k, seed)| Member {
-            seed: if self.one_seed {
-                self.common.seed
-            } else {
-                seed
-            },
+        let seed = |k: usize| match self.one_seed {
+            true => self.common.seed,
+            false => self.common.seed.wrapping_add(k as u64),
+        };
+        let member = |k: usize| Member {
+            seed: seed(k),
             alpha: self.alpha.map(|alphas| alphas.at(k, count)),
-        })
-        .collect()
+        };
+        (0..count).map(member).collect()
     }
 }
 

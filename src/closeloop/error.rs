@@ -1,6 +1,5 @@
 use thiserror::Error;
 
-use super::learn::LearnError;
 use crate::data::Quantity;
 use crate::identify::FitError;
 use crate::model::Model;
@@ -31,8 +30,6 @@ pub enum StudyError {
     NotOfMotion,
     #[error("{0}")]
     Fit(#[from] FitError),
-    #[error("{0}")]
-    Learn(#[from] LearnError),
 }
 
 impl StudyError {

@@ -92,9 +92,12 @@ fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
             column(&|row| smooth.qd[j][row].signum()),
             column(&|_| 1.0),
         ];
-        let solved = DMatrix::from_columns(&columns)
-            .svd(true, true)
-            .solve(&torque, 1e-9);
+        let columns = DMatrix::from_columns(&columns);
+        // A decomposition of what is not finite would never end, and of nothing there is none.
+        if columns.is_empty() || !columns.iter().all(|value| value.is_finite()) {
+            return None;
+        }
+        let solved = columns.svd(true, true).solve(&torque, 1e-9);
         solved.ok().map(|found| (varies, found[0]))
     };
     let told: Vec<(f64, f64)> = (0..n).filter_map(of_joint).collect();

@@ -76,12 +76,21 @@ impl LearnError {
 
 /// The residual network, and whether it helps on motion that it was not trained on.
 pub struct Learned {
-    pub network: Box<dyn LearnedResidual>,
+    /// Where it is not used, one that is not trained and adds nothing; `None` where the model that it would be added to leaves
+    /// the finite numbers by itself.
+    pub network: Option<Box<dyn LearnedResidual>>,
     pub check: NetworkCheck,
 }
 
+impl Learned {
+    /// The equations with the network.
+    pub fn hybrid(&self) -> Option<&Dynamics> {
+        self.network.as_deref().map(LearnedResidual::hybrid)
+    }
+}
+
 /// Open-loop position errors at the middle horizon on parts of the training logs, by networks that were trained on the
-/// other parts.
+/// other parts; up to the first part without a network, where a training failed.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 pub struct NetworkCheck {
     /// of the model without a network in each part, rad (or m)
@@ -90,10 +99,13 @@ pub struct NetworkCheck {
     pub with: Vec<f64>,
     /// whether the network is used: where it is not, it adds nothing
     pub used: bool,
+    /// why a training could not be finished: where its loss left the finite numbers. No network is used then
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
 }
 
 impl NetworkCheck {
-    fn of(errors: Vec<[f64; 2]>, settings: &LearnSettings) -> Self {
+    fn of(errors: &[[f64; 2]], settings: &LearnSettings) -> Self {
         let ratio = |[without, with]: &[f64; 2]| with / without;
         let total = |k: usize| errors.iter().map(|e| e[k].powi(2)).sum::<f64>().sqrt();
         let harms = errors.iter().any(|e| ratio(e) > settings.harmful);
@@ -102,6 +114,15 @@ impl NetworkCheck {
             with: errors.iter().map(|e| e[1]).collect(),
             // Not a number where a prediction is none: then it is not used.
             used: !harms && total(1) <= settings.helpful * total(0),
+            failure: None,
+        }
+    }
+
+    fn failed(self, failure: &LearnError) -> Self {
+        Self {
+            used: false,
+            failure: Some(failure.to_string()),
+            ..self
         }
     }
 }
@@ -113,40 +134,63 @@ pub(super) fn learn(
     learner: Option<&dyn ResidualLearner>,
     rng: &mut impl Rng,
     progress: &mut Observer<'_>,
-) -> Result<Option<Learned>, LearnError> {
+) -> Option<Learned> {
     // A network is trained on motion.
-    let Some(learner) = learner.filter(|_| refined.study.space == Space::Motion) else {
-        return Ok(None);
-    };
+    let learner = learner.filter(|_| refined.study.space == Space::Motion)?;
     let (study, fitted) = (&refined.study, &refined.after);
     let mut tell = |text: &str| {
         let text = format!("{}, {text}", Stage::Learn.text());
         progress(Progress::within(Stage::Learn, &text));
     };
     let settings = &study.settings.learn;
+    let mut train = |logs: &[Log], epochs: usize| {
+        let settings = LearnSettings {
+            epochs,
+            ..settings.clone()
+        };
+        learner.learn(&task(study, fitted, logs, settings), rng, &mut tell)
+    };
+    let mut check = checked(study, fitted, &mut |logs| train(logs, settings.epochs))?;
+    if check.used {
+        match train(study.logs, settings.epochs) {
+            Ok(network) => {
+                let network = Some(network?);
+                return Some(Learned { network, check });
+            }
+            Err(failure) => check = check.failed(&failure),
+        }
+    }
+    // A network that is not trained adds nothing.
+    let (network, check) = match train(study.logs, 0) {
+        Ok(network) => (Some(network?), check),
+        Err(failure) => (None, check.failed(&failure)),
+    };
+    Some(Learned { network, check })
+}
+
+/// Trains a network on some of the logs.
+type Train<'a> = dyn FnMut(&[Log]) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> + 'a;
+
+/// Whether networks help on parts of the logs that they were not trained on. `None` where the logs are too few to train one.
+fn checked(study: &Study<'_>, fitted: &Fitted, train: &mut Train<'_>) -> Option<NetworkCheck> {
+    let settings = &study.settings.learn;
     let parts = parts(study.logs, settings.parts);
     let horizon_s = [study.settings.score.middle_s()];
     let error = |model: &Dynamics, logs: &[Log]| assess(model, logs, &horizon_s).position_rms();
     let mut errors = Vec::new();
     for (k, left_out) in parts.iter().enumerate() {
-        let others = (0..parts.len()).filter(|other| *other != k);
-        let others: Vec<Log> = others.flat_map(|other| parts[other].clone()).collect();
-        let task = task(study, fitted, &others, settings.clone());
-        let Some(network) = learner.learn(&task, rng, &mut tell)? else {
-            return Ok(None);
-        };
-        let without = error(&fitted.model.absorbed().dynamics(), left_out);
-        errors.push([without, error(network.hybrid(), left_out)]);
+        let others = parts.iter().enumerate().filter(|(other, _)| *other != k);
+        let others: Vec<Log> = others.flat_map(|(_, logs)| logs.clone()).collect();
+        match train(&others) {
+            Ok(network) => {
+                let with = error(network?.hybrid(), left_out);
+                let without = error(&fitted.model.absorbed().dynamics(), left_out);
+                errors.push([without, with]);
+            }
+            Err(failure) => return Some(NetworkCheck::of(&errors, settings).failed(&failure)),
+        }
     }
-    let check = NetworkCheck::of(errors, settings);
-    let mut settings = settings.clone();
-    if !check.used {
-        // A network that is not trained adds nothing.
-        settings.epochs = 0;
-    }
-    let task = task(study, fitted, study.logs, settings);
-    let network = learner.learn(&task, rng, &mut tell)?;
-    Ok(network.map(|network| Learned { network, check }))
+    Some(NetworkCheck::of(&errors, settings))
 }
 
 /// The logs in so many parts: whole logs in turn or, where there are fewer, pieces of each.

@@ -2,7 +2,7 @@ use super::by_log::OfLog;
 use super::calibrate::Calibration;
 use super::discriminate::Alternative;
 use super::fitted::Fitted;
-use super::learn::Learned;
+use super::learn::{Learned, LearnedResidual};
 use super::remainder::{Proposal, ResidualForce, Unexplained};
 use super::score::{Contradicted, Errors, Finding};
 use super::select::Round;
@@ -29,7 +29,7 @@ pub struct Outcome {
     pub effects: Effects,
     pub remainder: Remainder,
     pub errors: Errors,
-    /// The residual network, where the logs suffice to train it.
+    /// The residual network and whether it helps, where the logs suffice to train one.
     pub learned: Option<Learned>,
     /// The chosen model fitted to each training log alone; empty for a single log and for very many.
     pub by_log: Vec<OfLog>,
@@ -107,6 +107,11 @@ pub struct Remainder {
 }
 
 impl Outcome {
+    /// The residual network, where there is one.
+    pub fn network(&self) -> Option<&dyn LearnedResidual> {
+        self.learned.as_ref()?.network.as_deref()
+    }
+
     /// The training logs as they were studied; `declared` is the model they were studied for.
     pub fn study<'a>(&'a self, declared: &'a Model) -> Study<'a> {
         let Given {

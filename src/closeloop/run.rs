@@ -89,14 +89,15 @@ pub fn close_loop(
     }
     let mut audits = [of_train, of_test].concat();
     tell_repeats(split.train.iter().chain(&split.test), &mut audits);
-    let learned = learn(&refined, learner, rng, progress)?;
+    let learned = learn(&refined, learner, rng, progress);
     progress(Stage::Score.into());
     let by_log = study.by_log(&found.chosen.after);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let hybrid = learned.as_ref().map(|learned| learned.network.hybrid());
+    let without = refined.after.model.absorbed().dynamics();
+    let hybrid = (learned.as_ref()).map(|learned| learned.hybrid().unwrap_or(&without));
     let models = Scored {
         space: study.space,
         declared: model,

@@ -24,6 +24,7 @@ pub struct Controller<'p, 'r> {
     memory: usize,
     decisions: usize,
     diverged: usize,
+    lost: Vec<f64>,
 }
 
 impl<'p, 'r> Controller<'p, 'r> {
@@ -38,6 +39,7 @@ impl<'p, 'r> Controller<'p, 'r> {
             memory,
             decisions: 0,
             diverged: 0,
+            lost: Vec::new(),
         }
     }
 
@@ -51,6 +53,11 @@ impl<'p, 'r> Controller<'p, 'r> {
         self.diverged
     }
 
+    /// When plans were made of which no candidate had a finite return \[s\]: the model left the finite numbers in all of them.
+    pub fn lost(&self) -> &[f64] {
+        &self.lost
+    }
+
     fn decide(&mut self, measured: &[f64], time_s: f64) {
         if self.decisions > 0 {
             self.planner.shift(self.replan);
@@ -60,6 +67,9 @@ impl<'p, 'r> Controller<'p, 'r> {
         self.plan = plan.inputs.into_iter().take(self.replan).collect();
         self.decisions += 1;
         self.diverged += plan.diverged;
+        if !plan.best.is_finite() {
+            self.lost.push(time_s);
+        }
     }
 }
 

@@ -1,4 +1,5 @@
 use rand::Rng;
+use thiserror::Error;
 
 use super::{Policy, Task};
 use crate::data::Log;
@@ -22,6 +23,22 @@ pub struct Episode {
     pub rewards: Vec<f64>,
     /// Whether the goal held to the end.
     pub success: bool,
+}
+
+/// Why an episode has no return.
+#[derive(Debug, Error)]
+pub enum EpisodeError {
+    #[error("{0}")]
+    Rig(#[from] PlantError),
+    #[error(
+        "the {what} of the task is {value} in the state at {time_s:.3} s, {state:?}; give a formula that is a finite number there"
+    )]
+    Formula {
+        what: &'static str,
+        value: f64,
+        time_s: f64,
+        state: Vec<f64>,
+    },
 }
 
 /// Drive the rig by `policy` for `steps` steps.
@@ -53,18 +70,18 @@ pub fn drive(
 /// A whole episode of `task` from the rig's current state.
 ///
 /// # Errors
-/// A rig that diverges.
+/// A rig that diverges, and a reward or goal that is no finite number.
 pub fn episode(
     task: &Task,
     rig: &mut Rig<'_>,
     policy: &mut dyn Policy,
     rng: &mut impl Rng,
-) -> Result<Episode, PlantError> {
+) -> Result<Episode, EpisodeError> {
     let stretch = drive(rig, policy, task.steps, rng)?;
-    let rewards = stretch.values(&task.objective());
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
+    let rewards = stretch.values("objective", &task.objective())?;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // saturates
     let held = (task.goal.hold_s / task.step_s).round() as usize;
-    let goal = stretch.values(&task.goal_formula());
+    let goal = stretch.values("goal", &task.goal_formula())?;
     let last = &goal[goal.len().saturating_sub(held)..];
     Ok(Episode {
         success: last.iter().all(|value| *value >= task.goal.at_least),
@@ -91,11 +108,21 @@ impl Stretch {
     }
 
     /// The values of a formula after each step.
-    fn values(&self, formula: &Objective) -> Vec<f64> {
+    fn values(&self, what: &'static str, formula: &Objective) -> Result<Vec<f64>, EpisodeError> {
         let steps = self.states.iter().enumerate().skip(1);
         let after = |(row, state): (usize, &Vec<f64>)| {
             let held: Vec<f64> = self.log.tau.iter().map(|tau| tau[row - 1]).collect();
-            formula.value(state, &held, self.log.time[row])
+            let time_s = self.log.time[row];
+            let value = formula.value(state, &held, time_s);
+            match value.is_finite() {
+                true => Ok(value),
+                false => Err(EpisodeError::Formula {
+                    what,
+                    value,
+                    time_s,
+                    state: state.clone(),
+                }),
+            }
         };
         steps.map(after).collect()
     }

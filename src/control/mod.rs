@@ -7,7 +7,7 @@ mod session;
 mod task;
 
 pub use controller::{Controller, Policy, RandomTorque};
-pub use episode::{Episode, Stretch, drive, episode};
+pub use episode::{Episode, EpisodeError, Stretch, drive, episode};
 pub use predictor::Predictor;
 pub use session::with_controller;
 pub use task::{Goal, NoTask, PlantSettings, Task, TaskError};

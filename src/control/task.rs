@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::files::{from_toml, text_or_embedded};
-use crate::limits::LOG_ROWS;
+use crate::limits::{LOG_ROWS, check_readings};
 use crate::model::Dynamics;
 use crate::plan::{Objective, Settings};
-use crate::plant::{Noise, Plant, Rig};
+use crate::plant::{Noise, Plant, Rig, check_step};
 use crate::sim::Integrator;
 
 /// What a plant is to do, and how to plan for it.
@@ -253,12 +253,10 @@ impl Task {
                 "`torque` has the range [{low}, {high}]; write [lowest, highest]"
             ));
         }
-        if !(self.step_s > 0.0 && self.step_s.is_finite()) {
-            return Err(format!(
-                "`step_s` is {}; it must be above zero",
-                self.step_s
-            ));
-        }
+        check_readings("torque", self.torque.iter().flatten().copied())?;
+        check_readings("start", self.start.iter().copied())?;
+        check_readings("start_spread", self.start_spread.iter().copied())?;
+        check_step(self.step_s)?;
         if !(1..=LOG_ROWS).contains(&self.steps) {
             return Err(format!("`steps` is from 1 to {LOG_ROWS}"));
         }
@@ -272,6 +270,13 @@ impl Task {
         let Noise { position, velocity } = self.plant.noise;
         if !(position >= 0.0 && velocity >= 0.0) {
             return Err("`plant.noise` holds standard deviations, which are not negative".into());
+        }
+        check_readings("plant.noise", [position, velocity])?;
+        if !(self.goal.hold_s >= 0.0) {
+            return Err(format!(
+                "`goal.hold_s` is {}; a time is not negative",
+                self.goal.hold_s
+            ));
         }
         let points = self.figure.iter().flatten().flatten();
         let formulas = [

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::files::OutputError;
-use crate::limits::READING;
+use crate::limits::{LOG_TIME, READING};
 
 /// Where in a file something is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,6 +186,24 @@ pub enum CellFault {
         "{0:e} is beyond {READING:e}, which no sensor reads; delete the row, or cut the log there"
     )]
     TooLarge(f64),
+    /// A time beyond any clock that counts in seconds.
+    #[error(
+        "{0:e} s is beyond {LOG_TIME:e} s; name the unit of the clock in the model file, such as \
+         [columns] time = {{ column = \"time\", unit = \"ns\" }}"
+    )]
+    TooLate(f64),
+    /// A pause of very many steps.
+    #[error(
+        "time jumps by {pause_s:.1e} s from {previous_place}, with a row every {step_s:.1e} s else; cut the file there into one \
+         log per run"
+    )]
+    Pause {
+        pause_s: f64,
+        /// The median step \[s\].
+        step_s: f64,
+        /// Where the row before is.
+        previous_place: Place,
+    },
     /// A time that is not later than the one before.
     #[error(
         "time {time} s does not come after {previous} s of {previous_place}; sort the rows, \
@@ -199,4 +217,14 @@ pub enum CellFault {
         /// Where the previous row is.
         previous_place: Place,
     },
+}
+
+impl CellFault {
+    /// What is wrong with a number that is no reading.
+    pub(super) fn of_number(number: f64) -> Self {
+        match number.is_finite() {
+            true => Self::TooLarge(number),
+            false => Self::NotFinite(number.to_string()),
+        }
+    }
 }

@@ -14,6 +14,7 @@ use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
 use super::statistics::median;
 use crate::files::write_with;
+use crate::limits::is_reading;
 
 /// A span of a log's own time, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -160,11 +161,11 @@ impl Log {
     /// log. Left-out intervals and notes are not part of the file.
     ///
     /// # Errors
-    /// [`LogError::Cell`] for a number that is not finite (no reader would accept it), and
-    /// [`LogError::Write`] if the folder or the file cannot be written.
+    /// [`LogError::Cell`] for a number that no reader would accept, which is beyond
+    /// [`READING`](crate::limits::READING) or not finite, and [`LogError::Write`] if the folder or the file cannot be written.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), LogError> {
         let path = path.as_ref();
-        self.check_finite(path)?;
+        self.check_readings(path)?;
         Ok(write_with(path, |out| self.write_rows(out))?)
     }
 
@@ -176,16 +177,16 @@ impl Log {
             .chain(&self.tau)
     }
 
-    fn check_finite(&self, path: &Path) -> Result<(), LogError> {
+    fn check_readings(&self, path: &Path) -> Result<(), LogError> {
         let names = Columns::standard(self.joints(), self.driven_by);
         for (column, values) in names.in_file_order().zip(self.columns()) {
-            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            if let Some(row) = values.iter().position(|value| !is_reading(*value)) {
                 return Err(LogError::Cell {
                     path: path.to_owned(),
                     // The header is line 1.
                     place: Place::Line(row + 2),
                     column: column.name.clone(),
-                    fault: CellFault::NotFinite(values[row].to_string()),
+                    fault: CellFault::of_number(values[row]),
                 });
             }
         }

@@ -9,9 +9,10 @@ use super::error::{CellFault, LogError};
 use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
+use super::statistics::median;
 use super::table::{Table, open};
 use crate::expr::listed;
-use crate::limits::READING;
+use crate::limits::{LOG_STEPS, LOG_TIME, PAUSED_STEPS, is_reading};
 
 impl Log {
     /// Reads one trajectory of a rig with `joints` joints from a file, or a folder, of any format that is read.
@@ -79,7 +80,7 @@ pub(super) fn log(
             let found = table.number(row, cell.index);
             let found = found.map_err(|why| fault(row, cell.index, why))?;
             match cell.scale * found {
-                reading if reading.abs() <= READING => Ok(reading),
+                reading if is_reading(reading) => Ok(reading),
                 _ => Err(fault(row, cell.index, CellFault::TooLarge(found))),
             }
         };
@@ -93,6 +94,17 @@ pub(super) fn log(
             previous_place: table.place(previous),
         };
         return Err(fault(previous + 1, layout.time.index, late));
+    }
+    if let Some(row) = time.iter().position(|time| time.abs() > LOG_TIME) {
+        return Err(fault(row, layout.time.index, CellFault::TooLate(time[row])));
+    }
+    if let Some(pause) = longest_pause(&time) {
+        let long = CellFault::Pause {
+            pause_s: pause.length_s,
+            step_s: pause.step_s,
+            previous_place: table.place(pause.row - 1),
+        };
+        return Err(fault(pause.row, layout.time.index, long));
     }
     let mut notes = [table.notes().to_vec(), notes(&layout)].concat();
     let mut values = |cell: &Cell| -> Result<Vec<f64>, LogError> {
@@ -129,6 +141,32 @@ pub(super) fn log(
         }),
         _ => Ok(log),
     }
+}
+
+/// A pause in a log, before a row of it.
+struct Pause {
+    row: usize,
+    length_s: f64,
+    /// The median step of the log \[s\].
+    step_s: f64,
+}
+
+/// The longest pause of a log that lasts for more of its median steps than are taken.
+fn longest_pause(time: &[f64]) -> Option<Pause> {
+    let duration_s = time.last()? - time.first()?;
+    let most = LOG_STEPS.max(PAUSED_STEPS * time.len() as f64);
+    let steps = || time.windows(2).map(|pair| pair[1] - pair[0]);
+    // Most logs need no median.
+    if duration_s <= most * steps().fold(f64::INFINITY, f64::min) {
+        return None;
+    }
+    let step_s = median(&steps().collect::<Vec<_>>());
+    let (longest, length_s) = steps().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (duration_s > most * step_s).then_some(Pause {
+        row: longest + 1,
+        length_s,
+        step_s,
+    })
 }
 
 fn notes(layout: &Layout) -> Vec<String> {

@@ -241,10 +241,8 @@ impl Session {
     }
 
     pub(super) fn seeds(&self) -> Vec<u64> {
-        (self.first_seed..)
-            .zip(0..self.config.seeds)
-            .map(|(seed, _)| seed)
-            .collect()
+        let numbers = 0..self.config.seeds;
+        numbers.map(|k| self.first_seed.wrapping_add(k)).collect()
     }
 
     fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {

@@ -75,13 +75,13 @@ impl Notation for Latex {
         format!("\\left({inner}\\right)")
     }
 
-    fn product(&self, a: &str, b: &str) -> String {
+    fn product(&self, a: String, b: &str) -> String {
         let between = if b.starts_with(|c: char| c.is_ascii_digit()) {
             "\\cdot "
         } else {
             "\\,"
         };
-        format!("{a} {between}{b}")
+        a + " " + between + b
     }
 
     fn quotient(&self, a: Part, b: Part) -> Part {

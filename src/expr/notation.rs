@@ -21,14 +21,14 @@ pub trait Notation {
         format!("({inner})")
     }
 
-    fn product(&self, a: &str, b: &str) -> String {
-        format!("{a} * {b}")
+    fn product(&self, a: String, b: &str) -> String {
+        a + " * " + b
     }
 
     fn quotient(&self, a: Part, b: Part) -> Part {
         let (a, b) = (a.binding(self, PRODUCT), b.binding(self, PRODUCT + 1));
         Part {
-            text: format!("{a} / {b}"),
+            text: a + " / " + &b,
             precedence: PRODUCT,
         }
     }
@@ -76,16 +76,16 @@ impl Part {
     }
 
     /// The text as a factor of a product, in parentheses if it needs them.
-    pub fn factor<N: Notation + ?Sized>(&self, notation: &N) -> String {
+    pub fn factor<N: Notation + ?Sized>(self, notation: &N) -> String {
         self.binding(notation, PRODUCT + 1)
     }
 
     /// The text, in parentheses if it binds weaker than `least`.
-    pub(super) fn binding<N: Notation + ?Sized>(&self, notation: &N, least: u8) -> String {
+    pub(super) fn binding<N: Notation + ?Sized>(self, notation: &N, least: u8) -> String {
         if self.precedence < least {
             notation.parenthesis(&self.text)
         } else {
-            self.text.clone()
+            self.text
         }
     }
 }

@@ -98,7 +98,8 @@ impl Term {
 /// Operators by rising precedence: `< > <= >=`, `+ -`, `* /`, unary `-`, `^` (to the right).
 ///
 /// # Errors
-/// A [`FormulaError`] that points at the first place that cannot be parsed, or that lies too deep ([`crate::limits`]).
+/// A [`FormulaError`] that points at the first place that cannot be parsed, that is no finite number whatever the names
+/// stand for, or that lies too deep ([`crate::limits`]).
 pub fn parse(text: &str) -> Result<Formula, FormulaError> {
     let mut parser = Parser {
         text,
@@ -112,11 +113,13 @@ pub fn parse(text: &str) -> Result<Formula, FormulaError> {
         let found = parser.next_char_text();
         return Err(parser.error_here(format!("expected an operator, found `{found}`")));
     }
-    Ok(Formula {
+    let formula = Formula {
         text: text.to_owned(),
         root,
         terms: parser.terms,
-    })
+    };
+    formula.check_constants()?;
+    Ok(formula)
 }
 
 struct Parser<'a> {
@@ -387,6 +390,12 @@ mod tests {
         assert!(message("a ** 2").starts_with("powers are written `^`"));
         assert!(message("1.2.3 + a").starts_with("expected an operator, found `.`"));
         assert!(message("1e999 * a").starts_with("`1e999` is not a number"));
+        assert_eq!(
+            message("a + 1e200 * 1e200"),
+            "this is inf, no finite number\n    a + 1e200 * 1e200\n        ^^^^^^^^^^^^^"
+        );
+        assert!(message("log(1 - 1) * a").starts_with("this is -inf"));
+        assert!(message("a / (2 - 2)").starts_with("this is divided by zero"));
     }
 
     #[test]

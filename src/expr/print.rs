@@ -22,18 +22,12 @@ impl Program {
     /// The equations as assignments, left side and right side, with a name for every value that is used more than once;
     /// `names` are those of the outputs.
     pub fn assignments(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
-        let shared = self.shared(0);
-        self.lines_with(notation, &shared, names).collect()
+        self.lines_with(notation, &self.shared(0), names)
     }
 
     /// The labels, and names for whatever else is used more than once and has more than `terms` inputs and constants when it
     /// is written out.
     fn shared(&self, terms: usize) -> Vec<(Node, String)> {
-        let mut uses = vec![0; self.ops.len()];
-        let operands = self.ops.iter().flat_map(|op| op.operands());
-        for node in operands.chain(self.outputs.iter().copied()) {
-            uses[node.index()] += 1;
-        }
         let mut taken: HashSet<String> = self.inputs.iter().cloned().collect();
         taken.extend(self.labels.iter().map(|(_, label)| label.clone()));
         let mut fresh = (1..)
@@ -42,7 +36,7 @@ impl Program {
         let mut named = self.labels.clone();
         let mut known: HashSet<Node> = named.iter().map(|(node, _)| *node).collect();
         let mut sizes: Vec<usize> = Vec::with_capacity(self.ops.len());
-        for (node, uses) in (0..).map(Node).zip(uses) {
+        for (node, uses) in (0..).map(Node).zip(self.uses()) {
             let operands = self.ops[node.index()].operands();
             let size: usize = operands.map(|operand| sizes[operand.index()]).sum();
             if uses > 1 && size > terms && self.is_step(node) && known.insert(node) {
@@ -59,14 +53,12 @@ impl Program {
 
     /// The formula of one output, with all intermediates written out.
     pub fn formula(&self, output: usize) -> String {
-        let parts = self.parts(&Text, &[]);
-        parts[self.outputs[output].index()].text.clone()
+        self.written(&Text, &[]).outputs.swap_remove(output)
     }
 
     /// The formula of one output in LaTeX, with all intermediates written out.
     pub fn latex_formula(&self, output: usize) -> String {
-        let parts = self.parts(&Latex, &[]);
-        parts[self.outputs[output].index()].text.clone()
+        self.written(&Latex, &[]).outputs.swap_remove(output)
     }
 
     /// The equations as lines of a LaTeX `align` environment.
@@ -77,8 +69,7 @@ impl Program {
     }
 
     fn lines(&self, notation: &dyn Notation, names: &[&str]) -> Vec<(String, String)> {
-        let named = self.shared(READABLE);
-        self.lines_with(notation, &named, names).collect()
+        self.lines_with(notation, &self.shared(READABLE), names)
     }
 
     /// One line for each node that has a name, then one for each output.
@@ -87,59 +78,57 @@ impl Program {
         notation: &dyn Notation,
         named: &[(Node, String)],
         names: &[&str],
-    ) -> impl Iterator<Item = (String, String)> {
-        let parts = self.parts(notation, named);
-        let unlabelled = self.definitions(notation, named, &parts);
-        let outputs: Vec<_> = self
-            .outputs
-            .iter()
-            .zip(names)
-            .map(|(node, name)| (notation.name(name), parts[node.index()].text.clone()))
-            .collect();
-        unlabelled.into_iter().chain(outputs)
-    }
-
-    /// The right-hand side of each named intermediate, in terms of earlier ones.
-    fn definitions(
-        &self,
-        notation: &dyn Notation,
-        named: &[(Node, String)],
-        parts: &[Part],
     ) -> Vec<(String, String)> {
-        let mut labels: Vec<_> = named.iter().filter(|(n, _)| self.is_step(*n)).collect();
-        labels.sort_by_key(|(node, _)| *node);
-        labels.dedup_by_key(|(node, _)| *node);
-        labels
-            .iter()
-            .map(|(node, name)| {
-                let whole = self.part(notation, self.ops[node.index()], parts);
-                (notation.name(name), whole.text)
-            })
-            .collect()
+        let Written { mut lines, outputs } = self.written(notation, named);
+        let names = names.iter().map(|name| notation.name(name));
+        lines.extend(names.zip(outputs));
+        lines
     }
 
     fn is_step(&self, node: Node) -> bool {
         !matches!(self.ops[node.index()], Op::Const(_) | Op::Input(_))
     }
 
-    /// Each node printed, with labelled ones by their name.
-    fn parts(&self, notation: &dyn Notation, labels: &[(Node, String)]) -> Vec<Part> {
-        let mut parts: Vec<Part> = Vec::with_capacity(self.ops.len());
+    /// Each node printed once, those with a name in a line of their own.
+    fn written(&self, notation: &dyn Notation, named: &[(Node, String)]) -> Written {
         let mut names: HashMap<usize, &str> = HashMap::new();
-        for (node, name) in labels.iter().filter(|(node, _)| self.is_step(*node)) {
+        for (node, name) in named.iter().filter(|(node, _)| self.is_step(*node)) {
             names.entry(node.index()).or_insert(name);
         }
+        let mut parts = Parts {
+            parts: Vec::with_capacity(self.ops.len()),
+            uses: self.uses(),
+        };
+        let mut lines = Vec::new();
         for (index, op) in self.ops.iter().enumerate() {
-            parts.push(match names.get(&index) {
-                Some(name) => atom(notation.name(name)),
-                None => self.part(notation, *op, &parts),
+            let whole = self.part(notation, *op, &mut parts);
+            parts.parts.push(match names.get(&index) {
+                Some(name) => {
+                    lines.push((notation.name(name), whole.text));
+                    atom(notation.name(name))
+                }
+                None => whole,
             });
         }
-        parts
+        let outputs = self.outputs.iter().map(|node| parts.take(*node).text);
+        Written {
+            outputs: outputs.collect(),
+            lines,
+        }
     }
 
-    fn part(&self, notation: &dyn Notation, op: Op, parts: &[Part]) -> Part {
-        let at = |node: Node| parts[node.index()].clone();
+    /// How often each node is an operand or an output.
+    fn uses(&self) -> Vec<usize> {
+        let mut uses = vec![0; self.ops.len()];
+        let operands = self.ops.iter().flat_map(|op| op.operands());
+        for node in operands.chain(self.outputs.iter().copied()) {
+            uses[node.index()] += 1;
+        }
+        uses
+    }
+
+    fn part(&self, notation: &dyn Notation, op: Op, parts: &mut Parts) -> Part {
+        let mut at = |node: Node| parts.take(node);
         match op {
             Op::Const(value) if value < 0.0 => Part {
                 text: notation.number(value),
@@ -156,6 +145,33 @@ impl Program {
             }
             Op::Binary(op, a, b) => binary(notation, op, at(a), at(b)),
             Op::Where(c, a, b) => atom(notation.choice(&at(c), &at(a).text, &at(b).text)),
+        }
+    }
+}
+
+/// A program in a notation.
+struct Written {
+    /// Name and formula of each node that has a name.
+    lines: Vec<(String, String)>,
+    outputs: Vec<String>,
+}
+
+/// The nodes that are printed so far.
+struct Parts {
+    parts: Vec<Part>,
+    /// How often each is still to be written.
+    uses: Vec<usize>,
+}
+
+impl Parts {
+    /// The text of a node: handed over where it is written for the last time, since a sum of many terms would otherwise be
+    /// copied with each of them.
+    fn take(&mut self, node: Node) -> Part {
+        let (part, uses) = (&mut self.parts[node.index()], &mut self.uses[node.index()]);
+        *uses -= 1;
+        match *uses {
+            0 => std::mem::replace(part, atom(String::new())),
+            _ => part.clone(),
         }
     }
 }
@@ -182,21 +198,21 @@ fn unary(notation: &dyn Notation, op: Unary, a: Part) -> Part {
 }
 
 fn binary(notation: &dyn Notation, op: Binary, a: Part, b: Part) -> Part {
-    let infix = |sign: &str, precedence: u8| Part {
-        text: format!(
-            "{} {sign} {}",
-            a.binding(notation, precedence),
-            b.binding(notation, precedence + 1)
-        ),
+    let infix = |sign: &str, precedence: u8, a: Part, b: Part| Part {
+        text: a.binding(notation, precedence)
+            + " "
+            + sign
+            + " "
+            + &b.binding(notation, precedence + 1),
         precedence,
     };
     match op {
-        Binary::Add => infix("+", SUM),
-        Binary::Sub => infix("-", SUM),
-        Binary::Less => infix("<", COMPARE),
+        Binary::Add => infix("+", SUM, a, b),
+        Binary::Sub => infix("-", SUM, a, b),
+        Binary::Less => infix("<", COMPARE, a, b),
         Binary::Mul => Part {
             text: notation.product(
-                &a.binding(notation, PRODUCT),
+                a.binding(notation, PRODUCT),
                 &b.binding(notation, PRODUCT + 1),
             ),
             precedence: PRODUCT,

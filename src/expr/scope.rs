@@ -1,4 +1,5 @@
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
+use std::ops::Range;
 
 use super::error::{listed, shortened, suggestion};
 use super::graph::Graph;
@@ -16,6 +17,9 @@ pub enum SignForm {
     Smooth { width: f64 },
 }
 
+/// Bytes of a formula and what is wrong there.
+type Fault = (Range<usize>, String);
+
 /// The names that a formula may use, and their nodes.
 #[derive(Debug, Clone)]
 pub struct Scope {
@@ -23,6 +27,8 @@ pub struct Scope {
     sign: SignForm,
     /// Nodes whose signs are nodes of their own.
     signs: HashMap<Node, Node>,
+    /// Whether constants have to be finite.
+    is_checked: bool,
 }
 
 impl Formula {
@@ -41,6 +47,19 @@ impl Formula {
     }
 }
 
+impl Formula {
+    /// Refuse parts that are no finite numbers whatever the names stand for.
+    pub(super) fn check_constants(&self) -> Result<(), FormulaError> {
+        let mut graph = Graph::new();
+        let names: BTreeSet<&str> = self.names().into_iter().collect();
+        let scope = Scope {
+            is_checked: true,
+            ..Scope::of_inputs(&mut graph, names)
+        };
+        scope.lower(&mut graph, self).map(|_| ())
+    }
+}
+
 impl Scope {
     /// An empty scope.
     pub fn new(sign: SignForm) -> Self {
@@ -48,6 +67,7 @@ impl Scope {
             names: HashMap::new(),
             sign,
             signs: HashMap::new(),
+            is_checked: false,
         }
     }
 
@@ -84,11 +104,18 @@ impl Scope {
             .map_err(|(span, message)| FormulaError::new(&formula.text, span, message))
     }
 
-    fn term(
-        &self,
-        graph: &mut Graph,
-        term: &Term,
-    ) -> Result<Node, (std::ops::Range<usize>, String)> {
+    fn term(&self, graph: &mut Graph, term: &Term) -> Result<Node, Fault> {
+        let node = self.unchecked(graph, term)?;
+        match graph.constant_value(node) {
+            Some(value) if self.is_checked && !value.is_finite() => Err((
+                term.span.clone(),
+                format!("this is {value}, no finite number"),
+            )),
+            _ => Ok(node),
+        }
+    }
+
+    fn unchecked(&self, graph: &mut Graph, term: &Term) -> Result<Node, Fault> {
         match &term.kind {
             Kind::Number(value) => Ok(graph.constant(*value)),
             Kind::Name(name) => self.names.get(name).copied().ok_or_else(|| {
@@ -109,6 +136,10 @@ impl Scope {
             }
             Kind::Infix(infix, a, b) => {
                 let (a, b) = (self.term(graph, a)?, self.term(graph, b)?);
+                let divides = *infix == Infix::Plain(Binary::Div);
+                if self.is_checked && divides && graph.is_zero(b) {
+                    return Err((term.span.clone(), "this is divided by zero".to_owned()));
+                }
                 Ok(infix_node(graph, *infix, a, b))
             }
             Kind::Call(function, arguments) => {

@@ -6,9 +6,11 @@ use thiserror::Error;
 
 use super::verify::{Client, ClientError, Predictions, Samples};
 use super::{Change, ExportModel};
+use crate::data::Joint;
 use crate::files::{OutputError, write_whole};
+use crate::limits::DELAY_STEPS;
 use crate::model::chain::{Chain, model_text};
-use crate::model::{FileError, Library, Model, NetworkError, ReadyDrive};
+use crate::model::{CommandFilter, FileError, Library, Model, NetworkError, ReadyDrive};
 
 /// A format of other programs.
 #[derive(Debug)]
@@ -114,11 +116,28 @@ impl Format {
     /// # Errors
     /// A model that the format cannot carry, or a folder that cannot be written.
     pub fn write(&self, model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+        self.check_delays(model)?;
         let files = (self.files)(model, path)?;
         for file in &files {
             write_whole(&file.path, &file.bytes)?;
         }
         Ok(files)
+    }
+
+    /// Refuse delays of more steps than what is written remembers commands for.
+    fn check_delays(&self, model: &ExportModel) -> Result<(), ExportError> {
+        let step_s = model.step_s;
+        for joint in Joint::all(model.joints()) {
+            let delay_s = model.filter(joint, CommandFilter::Delay).unwrap_or(0.0);
+            if !(delay_s / step_s <= DELAY_STEPS as f64) {
+                let reason = format!(
+                    "the delay of joint {joint} is {delay_s:?} s, and at most {DELAY_STEPS} steps of {step_s:?} s are remembered; \
+                     give a longer --step"
+                );
+                return Err(model.refused(self.name, reason));
+            }
+        }
+        Ok(())
     }
 
     /// What the format's client predicts from a written file.

@@ -24,7 +24,7 @@ pub use export_model::{ExportModel, ExportedEffect};
 pub use format::{ExportError, File, Format, RobotReader};
 pub use json::{ImportError, Imported};
 pub use robot::write_back::{Change, WrittenBack, write_back};
-pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples};
+pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples, rollout_s};
 
 use crate::expr::suggestion;
 

@@ -1,5 +1,6 @@
 use thiserror::Error;
 
+use crate::control::EpisodeError;
 use crate::data::LogError;
 use crate::plant::PlantError;
 use crate::runs::RunFolderError;
@@ -10,6 +11,8 @@ use crate::train::{CheckpointError, TrainError};
 pub enum RunError {
     #[error("{0}")]
     Plant(#[from] PlantError),
+    #[error("{0}")]
+    Episode(#[from] EpisodeError),
     #[error("{0}")]
     Train(#[source] TrainError),
     #[error("{0}")]

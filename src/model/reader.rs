@@ -85,7 +85,7 @@ impl Document {
     }
 
     pub fn error(&self, at: usize, message: impl Into<String>) -> FileError {
-        let before = &self.text[..at.min(self.text.len())];
+        let before = &self.text[..self.text.floor_char_boundary(at)];
         let line = before.matches('\n').count() + 1;
         let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
         FileError {

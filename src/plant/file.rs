@@ -9,7 +9,7 @@ use super::Excitation;
 use crate::data::Joint;
 use crate::expr::suggestion;
 use crate::files::{beside_or_named, from_toml, text_or_embedded};
-use crate::limits::{LOG_ROWS, RUNS, TONES};
+use crate::limits::{LOG_ROWS, RUNS, SIMULATED, TONES, check_readings};
 use crate::model::{FileError, FittedEffect, Library, Model};
 
 /// Why a plant cannot be simulated.
@@ -200,9 +200,17 @@ impl Plant {
         if !(low > 0.0 && high > low) {
             return Err("`excitation.band_hz` is two rising frequencies above zero".into());
         }
-        if !(self.sensor.position_noise >= 0.0 && self.sensor.position_step >= 0.0) {
+        let noise = [self.sensor.position_noise, self.sensor.position_step];
+        if !noise.iter().all(|number| *number >= 0.0) {
             return Err("noise and resolution of the sensors are not negative".into());
         }
+        check_readings("sensor", noise)?;
+        check_readings("excitation.band_hz", [high])?;
+        check_readings(
+            "excitation.amplitude",
+            self.excitation.amplitude.iter().copied(),
+        )?;
+        check_readings("recording.start", self.recording.start.iter().copied())?;
         let counts = [
             ("excitation.tones", self.excitation.tones, TONES),
             ("recording.logs", self.recording.logs, RUNS),
@@ -215,6 +223,11 @@ impl Plant {
             return Err(format!(
                 "`sensor.rate_hz` times `recording.duration_s` must give from two to {LOG_ROWS} rows, {rate:?} Hz for \
                  {duration:?} s do not"
+            ));
+        }
+        if duration > SIMULATED {
+            return Err(format!(
+                "`recording.duration_s` is at most {SIMULATED:e}, found {duration:?}"
             ));
         }
         Ok(())

@@ -9,4 +9,5 @@ mod simulate;
 pub use excitation::Excitation;
 pub use file::{HiddenEffect, Plant, PlantError, Sensor};
 pub use rig::{Noise, Rig};
+pub(crate) use sampling::check_step;
 pub use sampling::{Sampling, Starts};

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::PlantError;
 use crate::data::{Log, Quantity};
+use crate::limits::is_reading;
 use crate::model::Dynamics;
 use crate::sim::{Environment, Integrator};
 
@@ -95,7 +96,7 @@ impl<'d> Rig<'d> {
         let from = self.time_s();
         self.environment.step(&mut self.state, tau, from);
         self.steps += 1;
-        if self.state.iter().all(|value| value.is_finite()) {
+        if self.state.iter().copied().all(is_reading) {
             return Ok(());
         }
         let time_s = self.time_s();

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::file::{Plant, PlantError};
 use crate::data::Trajectory;
-use crate::limits::SAMPLED_STEPS;
+use crate::limits::{LOG_TIME, SAMPLED_STEPS, check_readings, is_reading};
 use crate::sim::{Environment, Integrator};
 
 /// Random trajectories of a plant with its exact states: starts uniform in the ranges, a new torque
@@ -92,19 +92,14 @@ impl Sampling {
                     "`{name}` needs a range [lowest, highest] for each of {joints} joints, found {found}"
                 ));
             }
-            let sound = |[low, high]: &[f64; 2]| low.is_finite() && high.is_finite() && low <= high;
-            if let Some(bad) = ranges.iter().find(|range| !sound(range)) {
+            if let Some(bad) = ranges.iter().find(|[low, high]| !(low <= high)) {
                 return Err(format!(
                     "`{name}` has the range {bad:?}; write [lowest, highest]"
                 ));
             }
+            check_readings(name, ranges.iter().flatten().copied())?;
         }
-        if !(self.step_s > 0.0 && self.step_s.is_finite()) {
-            return Err(format!(
-                "`step_s` is {}; it must be above zero",
-                self.step_s
-            ));
-        }
+        check_step(self.step_s)?;
         if self.trajectories == 0 || self.length == 0 {
             return Err("`trajectories` and `length` must be at least 1".to_owned());
         }
@@ -148,7 +143,7 @@ impl Sampling {
             let from = trajectory.time[trajectory.time.len() - 1];
             environment.step(&mut state, tau, from);
             let time = f64::from(step) * self.step_s;
-            if !state.iter().all(|value| value.is_finite()) {
+            if !state.iter().copied().all(is_reading) {
                 return Err(time);
             }
             trajectory.time.push(time);
@@ -167,6 +162,16 @@ impl Draw {
             *velocity = -*velocity;
         }
         self
+    }
+}
+
+/// Refuse what is no length of a step \[s\].
+pub(crate) fn check_step(step_s: f64) -> Result<(), String> {
+    match step_s > 0.0 && step_s <= LOG_TIME {
+        true => Ok(()),
+        false => Err(format!(
+            "`step_s` is {step_s:?}; it must be above zero, and at most {LOG_TIME:e}"
+        )),
     }
 }
 

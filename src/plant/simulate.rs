@@ -4,6 +4,7 @@ use rand_distr::{Distribution, Normal};
 use super::file::{Plant, PlantError};
 use crate::data::Log;
 use crate::lanes::Row;
+use crate::limits::is_reading;
 use crate::model::{Dynamics, Model};
 use crate::sim::{Commands, Hold, RIG_S, RK4, Simulator, substeps};
 
@@ -54,7 +55,7 @@ impl Plant {
             self.measure(&mut log, time, angles, &tau, rng);
             let held: Vec<Row<f64, 1>> = tau.iter().map(|tau| Row([*tau])).collect();
             simulator.advance(&Hold::lasting(commands, &held, Row([time]), dt, substeps));
-            if simulator.state.iter().any(|value| !value[0].is_finite()) {
+            if !simulator.state.iter().all(|value| is_reading(value[0])) {
                 return Err(self.diverged(time));
             }
         }

@@ -101,7 +101,11 @@ pub(super) fn torques(report: &Report) -> String {
         "---|".repeat(names.len())
     );
     let mut row = |name: &str, cells: Vec<String>, ratio: f64| {
-        let _ = writeln!(out, "| {name} | {} | {ratio:.2} |", cells.join(" | "));
+        let ratio = match ratio.is_finite() {
+            true => format!("{ratio:.2}"),
+            false => "-".to_owned(),
+        };
+        let _ = writeln!(out, "| {name} | {} | {ratio} |", cells.join(" | "));
     };
     let ratio = |error: &dyn Fn(&TorqueError) -> f64| {
         error(&errors.after) / error(&errors.before).max(f64::MIN_POSITIVE)
@@ -114,8 +118,7 @@ pub(super) fn torques(report: &Report) -> String {
             ratio(&|error| error.rms[joint]),
         );
     }
-    let percent = |error: &TorqueError| format!("{:.2} %", 100.0 * error.relative);
-    let cells = models.iter().map(|(_, error)| percent(error));
+    let cells = models.iter().map(|(_, error)| error.share());
     row(
         "all, share of the logged torques",
         cells.collect(),
@@ -307,14 +310,13 @@ pub(super) fn errors(report: &Report) -> String {
     out += &paragraph(uneven(report));
     out += &paragraph(zeroed_in_vain(&report.error));
     if let (Some(torque), Space::Motion) = (&report.torque, report.compared) {
-        let percent = |error: &TorqueError| 100.0 * error.relative;
         let _ = writeln!(
             out,
-            "\nThe torques that the logged motion needs, low-passed, differ from the logged ones by {:.2} % ({AS_WRITTEN}), \
-             {:.2} % ({FITTED}) and {:.2} % ({WITH_EFFECTS}), root mean square.",
-            percent(&torque.as_declared),
-            percent(&torque.before),
-            percent(&torque.after)
+            "\nThe torques that the logged motion needs, low-passed, differ from the logged ones by {} ({AS_WRITTEN}), \
+             {} ({FITTED}) and {} ({WITH_EFFECTS}), root mean square.",
+            torque.as_declared.share(),
+            torque.before.share(),
+            torque.after.share()
         );
     }
     for horizon in &report.error.unscored_s {

@@ -124,12 +124,12 @@ fn put_all(
     for (name, picture) in PLOTS.iter().zip(&pictures) {
         put(name, picture)?;
     }
-    if let Some(learned) = &outcome.learned {
+    if let Some(network) = outcome.network() {
         let origin = Origin {
             model_toml: model_file(outcome),
             ..origin.clone()
         };
-        learned.network.save(&folder.join(CHECKPOINT), &origin)?;
+        network.save(&folder.join(CHECKPOINT), &origin)?;
     }
     Ok(())
 }

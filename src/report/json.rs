@@ -102,7 +102,7 @@ impl Report {
                 model: MODEL.to_owned(),
                 report: TEXT.to_owned(),
                 page: PAGE.to_owned(),
-                checkpoint: (outcome.learned.as_ref()).map(|_| CHECKPOINT.to_owned()),
+                checkpoint: outcome.network().map(|_| CHECKPOINT.to_owned()),
                 plots: PLOTS.map(str::to_owned).to_vec(),
             },
         }

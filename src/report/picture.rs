@@ -38,8 +38,8 @@ fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
         (Role::Before, FITTED, fitted.before.model.dynamics()),
         (Role::After, WITH_EFFECTS, fitted.after.model.dynamics()),
     ];
-    if let Some(learned) = &outcome.learned {
-        models.push((Role::Hybrid, WITH_NETWORK, learned.network.hybrid().clone()));
+    if let Some(network) = outcome.network() {
+        models.push((Role::Hybrid, WITH_NETWORK, network.hybrid().clone()));
     }
     let panel = |joint: Joint| Panel {
         label: label(outcome, joint),

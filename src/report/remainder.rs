@@ -59,15 +59,17 @@ pub(super) fn structure(report: &Report) -> String {
     }
 }
 
-/// That no network is used, where one was trained.
-pub(super) fn network(report: &Report) -> &'static str {
-    match &report.network {
-        Some(check) if !check.used => {
-            "No residual network lowers the error on parts of the training logs that it was not trained on: the hybrid \
-             model is the one without a network.\n"
-        }
-        _ => "",
-    }
+/// That no network is used and why, where one was to be trained.
+pub(super) fn network(report: &Report) -> String {
+    let why = match &report.network {
+        None => return String::new(),
+        Some(check) if check.used => return String::new(),
+        Some(check) => match &check.failure {
+            None => "No residual network lowers the error on parts of the training logs that it was not trained on".to_owned(),
+            Some(failure) => format!("The training of a residual network failed ({failure})"),
+        },
+    };
+    format!("{why}: the hybrid model is the one without a network.\n")
 }
 
 fn proposed(proposal: &Proposal) -> String {

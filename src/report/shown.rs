@@ -103,8 +103,8 @@ fn motions(outcome: &Outcome) -> Vec<Course<'_>> {
     let fitted = &outcome.models;
     let both = [&fitted.before.model, &fitted.after.model];
     let mut models: Vec<Dynamics> = both.map(Model::dynamics).into();
-    let networks = (outcome.learned.iter()).filter(|learned| learned.check.used);
-    models.extend(networks.map(|learned| learned.network.hybrid().clone()));
+    let used = (outcome.learned.iter()).filter(|learned| learned.check.used);
+    models.extend(used.filter_map(|learned| learned.hybrid().cloned()));
     let tests = outcome.given.test.iter();
     tests
         .map(|log| motion(log, &models, horizon_s))

@@ -113,10 +113,13 @@ pub(super) fn digits_of(value: f64, ci95: Option<[f64; 2]>) -> (String, Option<[
     (number(value), ci95.map(|ends| ends.map(number)))
 }
 
-/// A number with as many decimals as the resolution needs.
+/// A number with as many decimals as the resolution needs; very large and very small ones with an exponent.
 fn rounded(x: f64, resolution: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
+    }
+    if !(1e-9..1e9).contains(&x.abs()) {
+        return format!("{x:.2e}");
     }
     let resolution = resolution.max(1e-9 * x.abs()).max(1e-12);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and 12

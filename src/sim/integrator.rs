@@ -5,6 +5,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme};
+use crate::limits::SUBSTEPS;
 
 /// How a step is integrated while its input is held: a scheme, in equal substeps.
 ///
@@ -54,6 +55,16 @@ impl Integrator {
         whole.chain([Self::fine(substeps)]).collect()
     }
 
+    /// Substeps that a user gives.
+    fn checked(substeps: NonZeroU32) -> Result<Self, String> {
+        match substeps.get() <= SUBSTEPS {
+            true => Ok(Self::fine(substeps)),
+            false => Err(format!(
+                "a step is integrated in at most {SUBSTEPS} substeps, found {substeps}"
+            )),
+        }
+    }
+
     fn named(name: &str) -> Result<Self, String> {
         Scheme::named(name).map(Self::of).ok_or_else(|| {
             let names = SCHEMES.map(|scheme| scheme.name).join(", ");
@@ -76,7 +87,7 @@ impl FromStr for Integrator {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let substeps = text.strip_prefix("fine:").and_then(|n| n.parse().ok());
-        substeps.map_or_else(|| Self::named(text), |substeps| Ok(Self::fine(substeps)))
+        substeps.map_or_else(|| Self::named(text), Self::checked)
     }
 }
 
@@ -118,7 +129,7 @@ impl TryFrom<Form> for Integrator {
     fn try_from(form: Form) -> Result<Self, String> {
         match form {
             Form::Name(name) => Self::named(&name),
-            Form::Substeps(Fine { fine }) => Ok(Self::fine(fine.steps)),
+            Form::Substeps(Fine { fine }) => Self::checked(fine.steps),
         }
     }
 }

@@ -60,12 +60,9 @@ fn window_at(log: &Log, step_s: f64, first: usize, length_s: f64) -> Result<usiz
     // Half a step of tolerance, because logged times are rounded decimals.
     let end = log.time[first] + length_s + 0.5 * step_s;
     let last = log.time.partition_point(|t| *t <= end) - 1;
-    if log.time[last] < log.time[first] + length_s - 0.5 * step_s {
-        return Err(if last + 1 < log.rows() {
-            last + 1
-        } else {
-            log.rows()
-        });
+    // Rows further apart than the length are no window.
+    if last == first || log.time[last] < log.time[first] + length_s - 0.5 * step_s {
+        return Err(last + 1);
     }
     let touched = log
         .leave_out

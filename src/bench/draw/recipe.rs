@@ -211,6 +211,9 @@ impl Recipe {
         while loops.len() > 2 {
             loops.remove(rng.random_range(0..loops.len()));
         }
+        if rules.filter_s.is_empty() {
+            return Err("`filter_s` needs a number".to_owned());
+        }
         let quantum = TAU / 2.0_f64.powf(rules.bits.plain(rng)?);
         Ok(Condition {
             drive: loops,

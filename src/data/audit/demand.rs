@@ -52,10 +52,12 @@ pub(super) fn torque_demand(
     }
     let basis = orthonormal(columns.into_iter());
     let (slow, logged) = (&motion.tau, &motion.tau_logged);
-    if logged.iter().all(|tau| *tau == logged[0]) {
+    let (about_mean, of_logged) = (deviation(slow), deviation(logged));
+    let is_constant = logged.windows(2).all(|pair| pair[0] == pair[1]);
+    // The squares of very small torques are zero as well.
+    if is_constant || about_mean == 0.0 || of_logged == 0.0 {
         return None;
     }
-    let (about_mean, of_logged) = (deviation(slow), deviation(logged));
     let needed = explained_by(&basis, slow);
     let needed_nm = needed.iter().fold(0.0_f64, |top, tau| top.max(tau.abs()));
     let far = |tau: &&f64| tau.abs() > FAR_OFF * needed_nm;

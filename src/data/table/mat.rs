@@ -1,6 +1,8 @@
 //! MATLAB's files of versions 5 to 7: data elements of type, size and bytes, packed with zlib or not. Read here, since of the
 //! crates that do it one prints what it does not know and passes over what is damaged, and the other is a serializer.
 
+#![warn(clippy::indexing_slicing)]
+
 use std::path::Path;
 
 use flate2::read::ZlibDecoder;

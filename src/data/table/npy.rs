@@ -1,6 +1,8 @@
 //! NumPy arrays (format versions 1 to 3, numpy.lib.format): a dictionary of three Python literals, then the numbers. Read here,
 //! since the crates that do it bring a parser generator and C code for those three.
 
+#![warn(clippy::indexing_slicing)]
+
 /// An array whose numbers are still to be read.
 pub(super) struct Array<'a> {
     /// `<f8`
@@ -16,8 +18,8 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 impl<'a> Array<'a> {
     /// `None` for what is no array.
     pub fn of(bytes: &'a [u8]) -> Option<Self> {
-        let (version, rest) = bytes.strip_prefix(MAGIC)?.split_at_checked(2)?;
-        let (length, rest) = match version[0] {
+        let ([version, _], rest) = bytes.strip_prefix(MAGIC)?.split_first_chunk()?;
+        let (length, rest) = match *version {
             1 => rest.split_at_checked(2)?,
             _ => rest.split_at_checked(4)?,
         };

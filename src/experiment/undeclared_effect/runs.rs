@@ -52,7 +52,7 @@ impl Session {
     pub fn trials(&self) -> impl Iterator<Item = (usize, u64)> {
         let cases = 0..self.experiment.cases.len();
         cases.flat_map(move |case| {
-            (0..self.experiment.seeds).map(move |k| (case, self.first_seed + k))
+            (0..self.experiment.seeds).map(move |k| (case, self.first_seed.wrapping_add(k)))
         })
     }
 

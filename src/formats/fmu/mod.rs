@@ -213,7 +213,7 @@ fn library(
     match compile(command) {
         Ok(()) => std::fs::read(at("library")).map(Some).map_err(io),
         Err(ClientError::Unavailable(_)) => Ok(None),
-        Err(ClientError::Failed(said)) => Err(refused(said)),
+        Err(ClientError::Failed(said) | ClientError::NotFinite(said)) => Err(refused(said)),
     }
 }
 

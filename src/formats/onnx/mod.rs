@@ -15,6 +15,7 @@ use super::discrete_filter::DiscreteFilter;
 use super::verify::{Client, PythonClient};
 use super::{ExportError, ExportModel, File, Format};
 use crate::data::Joint;
+use crate::expr::Op;
 use builder::Builder;
 use derivative::Derivative;
 use proto::{Graph, Model, OperatorSet, Property};
@@ -50,7 +51,25 @@ fn not_carried(model: &ExportModel) -> Vec<String> {
     lost
 }
 
+/// Refuse numbers that single precision has none for.
+fn check_single(model: &ExportModel) -> Result<(), ExportError> {
+    let constant = |op: &Op| match op {
+        Op::Const(value) => Some(*value),
+        _ => None,
+    };
+    let constants = model.equations.program.ops().iter().filter_map(constant);
+    let mut numbers = constants.chain(model.equations.values());
+    match numbers.find(|number| number.abs() > f64::from(f32::MAX)) {
+        Some(number) => Err(model.refused(
+            FORMAT.name,
+            format!("{number:e} is beyond single precision"),
+        )),
+        None => Ok(()),
+    }
+}
+
 fn files(model: &ExportModel, path: &Path) -> Result<Vec<File>, ExportError> {
+    check_single(model)?;
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("-derivative.");
     name.push(path.extension().unwrap_or("onnx".as_ref()));

@@ -25,6 +25,9 @@ pub enum ClientError {
     /// There is no client on this machine: what to install, or why there is none.
     #[error("{0}")]
     Unavailable(String),
+    /// There is nothing to compare with: where the model itself leaves the finite numbers.
+    #[error("{0}")]
+    NotFinite(String),
     /// The client's own message about the file.
     #[error("{0}")]
     Failed(String),

@@ -8,8 +8,10 @@ use crate::model::Dynamics;
 
 /// Number of sample points.
 const POINTS: usize = 256;
-/// Length of the rollout, in s.
+/// Length of the rollout, in s,
 const ROLLOUT_S: f64 = 5.0;
+/// and its steps at most.
+const ROLLOUT_STEPS: f64 = 5000.0;
 /// Steps of the rollout over which a torque stays constant.
 const HOLD: usize = 5;
 /// Range of the rollout's torques and start velocities, relative to that of the points.
@@ -47,13 +49,18 @@ pub(in crate::formats) fn draw(
     }
 }
 
+/// Length of the rollout in steps of this length, in s.
+pub fn rollout_s(step_s: f64) -> f64 {
+    ROLLOUT_S.min(ROLLOUT_STEPS * step_s)
+}
+
 fn scaled(range: &[f64]) -> Vec<f64> {
     range.iter().map(|x| ROLLOUT_RANGE * x).collect()
 }
 
 fn held_torques(step_s: f64, range: &[f64], rng: &mut impl Rng) -> Vec<Vec<f64>> {
-    let steps = (ROLLOUT_S / step_s).ceil().max(1.0);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a number of steps
+    let steps = (rollout_s(step_s) / step_s).ceil().max(1.0);
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
     let steps = steps as usize;
     let pieces = rows(steps.div_ceil(HOLD), range, rng);
     (0..steps).map(|k| pieces[k / HOLD].clone()).collect()

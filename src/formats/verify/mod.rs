@@ -9,6 +9,7 @@ mod samples;
 
 pub use client::{Client, ClientError, PythonClient};
 pub(super) use draw::draw;
+pub use draw::rollout_s;
 pub use predictions::{Difference, Predictions};
 pub(super) use reference::ReferenceModel;
 pub use samples::Samples;

@@ -1,5 +1,7 @@
 use serde::{Deserialize, Serialize};
 
+use super::{ClientError, Samples};
+
 /// What a client predicts at [`Samples`](super::Samples). What a format does not offer is left out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Predictions {
@@ -23,6 +25,45 @@ pub struct Difference {
 }
 
 impl Predictions {
+    /// Refuse predictions that are no finite numbers: nothing could be compared with them.
+    ///
+    /// # Errors
+    /// Where the first of them is.
+    pub fn check_finite(&self, samples: &Samples) -> Result<(), ClientError> {
+        let point = |k: usize| {
+            format!(
+                "state {:?} under {:?}",
+                samples.states[k], samples.torques[k]
+            )
+        };
+        let places: [(_, &dyn Fn(usize) -> String); 3] = [
+            (&self.derivative, &|k| {
+                format!("the derivative at the {}", point(k))
+            }),
+            (&self.next, &|k| {
+                format!("a step of {:?} s from the {}", samples.step_s, point(k))
+            }),
+            (&self.rollout, &|k| {
+                let time_s = (k + 1) as f64 * samples.step_s;
+                format!(
+                    "a rollout from the state {:?} in {time_s:?} s",
+                    samples.start
+                )
+            }),
+        ];
+        for (rows, place) in places {
+            let is_finite = |row: &Vec<f64>| row.iter().all(|number| number.is_finite());
+            let mut rows = rows.iter().flatten();
+            if let Some(row) = rows.position(|row| !is_finite(row)) {
+                return Err(ClientError::NotFinite(format!(
+                    "the model itself leaves the finite numbers in {}",
+                    place(row)
+                )));
+            }
+        }
+        Ok(())
+    }
+
     /// How far `other` is from these; infinite where it has another number of rows, or a NaN.
     pub fn difference(&self, other: &Self) -> Difference {
         let between = |mine: &Option<Vec<Vec<f64>>>, theirs: &Option<Vec<Vec<f64>>>| {

@@ -41,6 +41,9 @@ pub(super) fn section(report: &Report) -> Section {
 /// A share of the error before, as a bar of that length.
 fn ratio(after: f64, before: f64) -> Markup {
     let share = after / before.max(f64::MIN_POSITIVE);
+    if !share.is_finite() {
+        return html! { td { "-" } };
+    }
     let width = 100.0 * share.clamp(0.0, 1.0);
     html! { td.ratio { span.bar.worse[share > 1.0] style={ "--share:" (format!("{width:.1}%")) } { (format!("{share:.2}")) } } }
 }
@@ -62,7 +65,7 @@ fn of_torques(report: &Report, errors: &TorqueEntry) -> Markup {
                 }
                 tr {
                     th scope="row" { "all, share of the logged torques" }
-                    @for (_, model) in &models { td { (format!("{:.2} %", 100.0 * model.relative)) } }
+                    @for (_, model) in &models { td { (model.share()) } }
                     (ratio(errors.after.relative, errors.before.relative))
                 }
             }

@@ -51,12 +51,10 @@ fn of_torques(report: &Report, errors: &TorqueEntry) -> Vec<String> {
     };
     let rows = Joint::all(report.joints).map(of_joint).collect();
     let mut rows = listed(rows, ROWS, "joints");
-    let share = models.map(|model| format!("{:.2} %", 100.0 * model.relative));
+    let share = models.map(|model| model.share());
     rows.push(row("all, share of the logged torques", share));
     let friction = errors.with_friction.as_ref();
-    rows.extend(
-        friction.map(|model| format!("  {WITH_FRICTION} alone: {:.2} %", 100.0 * model.relative)),
-    );
+    rows.extend(friction.map(|model| format!("  {WITH_FRICTION} alone: {}", model.share())));
     table(
         "Torque errors on the test logs, N m",
         rows,

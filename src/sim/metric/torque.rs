@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::data::{Log, Smooth};
 use crate::lanes::Row;
@@ -17,11 +17,28 @@ const LANES: usize = 8;
 pub struct TorqueError {
     /// Root mean square of each joint, N m (or N).
     pub rms: Vec<f64>,
-    /// The norm of all differences over that of all logged torques.
+    /// The norm of all differences over that of all logged torques; infinite, in files null, where these are zero.
+    #[serde(deserialize_with = "infinite_where_null")]
+    #[schemars(with = "Option<f64>")]
     pub relative: f64,
     /// Squares of the differences of all joints, summed over stretches of two seconds of each log.
     #[serde(skip)]
     pub stretches: Vec<f64>,
+}
+
+impl TorqueError {
+    /// `relative` in percent; in words where there is no such share.
+    pub fn share(&self) -> String {
+        match self.relative.is_finite() {
+            true => format!("{:.2} %", 100.0 * self.relative),
+            false => "no share, the logged torques are zero".to_owned(),
+        }
+    }
+}
+
+fn infinite_where_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let number = Option::<f64>::deserialize(from)?;
+    Ok(number.unwrap_or(f64::INFINITY))
 }
 
 /// Errors are taken as independent beyond this time, s.
@@ -37,6 +54,16 @@ pub fn torque_error(model: &Model, logs: &[Log]) -> Option<TorqueError> {
         sums.add(&smooth, &differences);
     }
     sums.error()
+}
+
+/// Where the torques that a model needs for the motion of logs first are no finite numbers: the log, and the time in s.
+pub fn torques_leave(model: &Model, logs: &[Log]) -> Option<(String, f64)> {
+    logs.iter().find_map(|log| {
+        let NeededTorques { time, needed, .. } = needed_torques(model, log)?;
+        let is_finite = |row: &usize| needed.iter().all(|channel| channel[*row].is_finite());
+        let row = (0..time.len()).find(|row| !is_finite(row))?;
+        Some((log.name(), time[row]))
+    })
 }
 
 /// The torques of a log and those that its motion needs, low-passed.

@@ -84,7 +84,7 @@ impl Recording {
     /// Messages of the topic that are no rows of the log.
     fn told_of_left_out(&self, chosen: &Series, early: usize) -> Vec<String> {
         let Topic { name, messages, .. } = &self.topics[chosen.topic];
-        let others = messages - chosen.samples.len();
+        let others = messages.saturating_sub(chosen.samples.len());
         let told = [
             (others, "hold other joints"),
             (early, "are earlier than the first of the other topics"),
