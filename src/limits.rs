@@ -61,6 +61,11 @@ pub const EPOCHS: usize = 100_000_000;
 /// Logs, models, episodes or simulations that one command makes.
 pub const RUNS: usize = 100_000;
 
+/// How many median steps a log of so many rows may last.
+pub fn log_steps(rows: usize) -> f64 {
+    LOG_STEPS.max(PAUSED_STEPS * rows as f64)
+}
+
 /// Whether a sensor can read this: false for what is no finite number.
 pub fn is_reading(value: f64) -> bool {
     value.abs() <= READING

@@ -146,6 +146,14 @@ fn measure(
     let samples = model.samples(&mut rng).map_err(refused)?;
     let own = model.predict(&samples).map_err(refused)?;
     own.check_finite(&samples)?;
+    let (own, lost) = own.without_lost_rollout();
+    if let Some(step) = lost {
+        voice::say(format!(
+            "note: the rollout leaves the finite numbers in step {} of {:?} s and is not compared",
+            step + 1,
+            samples.step_s
+        ));
+    }
     Ok(own.difference(&format.predict(&arguments.out, &samples)?))
 }
 

@@ -12,7 +12,7 @@ use super::log::Log;
 use super::statistics::median;
 use super::table::{Table, open};
 use crate::expr::listed;
-use crate::limits::{LOG_STEPS, LOG_TIME, PAUSED_STEPS, is_reading};
+use crate::limits::{LOG_TIME, is_reading, log_steps};
 
 impl Log {
     /// Reads one trajectory of a rig with `joints` joints from a file, or a folder, of any format that is read.
@@ -154,7 +154,7 @@ struct Pause {
 /// The longest pause of a log that lasts for more of its median steps than are taken.
 fn longest_pause(time: &[f64]) -> Option<Pause> {
     let duration_s = time.last()? - time.first()?;
-    let most = LOG_STEPS.max(PAUSED_STEPS * time.len() as f64);
+    let most = log_steps(time.len());
     let steps = || time.windows(2).map(|pair| pair[1] - pair[0]);
     // Most logs need no median.
     if duration_s <= most * steps().fold(f64::INFINITY, f64::min) {

@@ -2,6 +2,7 @@
 
 use super::log::Log;
 use super::low_pass::LowPass;
+use crate::limits::log_steps;
 
 /// Hz
 const CUTOFF_HZ: f64 = 10.0;
@@ -131,9 +132,10 @@ impl Smooth {
     }
 }
 
-/// Even steps over the log.
+/// Even steps over the log; none over a part of one that is nearly all pause.
 fn even(log: &Log, step_s: f64) -> Vec<f64> {
-    let Some(first) = log.time.first().filter(|_| step_s > 0.0) else {
+    let is_dense = step_s > 0.0 && log.duration() <= log_steps(log.rows()) * step_s;
+    let Some(first) = log.time.first().filter(|_| is_dense) else {
         return Vec::new();
     };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

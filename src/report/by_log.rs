@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::json::parameter;
-use super::schema::ParameterEntry;
+use super::schema::{Ends, ParameterEntry, ends};
 use crate::closeloop::{OfLog, Outcome};
 use crate::model::Parameter;
 
@@ -29,7 +29,9 @@ pub(super) struct RangeEntry {
     pub unit: String,
     pub value: f64,
     /// 95 % of runs: the interval of the fit, widened by the spread between logs beyond their own intervals, within the
-    /// parameter's bounds
+    /// parameter's bounds; an end is null where there is none
+    #[serde(deserialize_with = "ends")]
+    #[schemars(with = "Ends")]
     pub range: [f64; 2],
     /// that spread as a standard deviation; null where fewer than two logs tell
     pub between_logs: Option<f64>,

@@ -4,7 +4,7 @@
 
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Value, json};
 
 use super::by_log::{OfLogEntry, RangeEntry};
@@ -166,7 +166,9 @@ pub(super) struct ParameterEntry {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub log: Option<String>,
     pub value: f64,
-    /// 95 % interval, lower end first; null for a parameter that was held
+    /// 95 % interval, lower end first; null for a parameter that was held, and an end is null where the logs tell none
+    #[serde(deserialize_with = "some_ends")]
+    #[schemars(with = "Option<Ends>")]
     pub ci95: Option<[f64; 2]>,
     pub unit: String,
     /// whether the interval is narrower than the parameter's magnitude
@@ -286,7 +288,9 @@ pub(super) struct CombinationEntry {
     /// at the values in the model file
     pub declared: f64,
     pub value: f64,
-    /// 95 % interval, lower end first
+    /// 95 % interval, lower end first; an end is null where the logs tell none
+    #[serde(deserialize_with = "ends")]
+    #[schemars(with = "Ends")]
     pub ci95: [f64; 2],
     pub unit: String,
 }
@@ -442,6 +446,24 @@ pub(super) struct FilesEntry {
     pub page: String,
     pub checkpoint: Option<String>,
     pub plots: Vec<String>,
+}
+
+/// An interval in JSON, which has no infinite numbers.
+pub(super) type Ends = [Option<f64>; 2];
+
+pub(super) fn ends<'de, D: Deserializer<'de>>(from: D) -> Result<[f64; 2], D::Error> {
+    Ends::deserialize(from).map(infinite_where_null)
+}
+
+fn some_ends<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 2]>, D::Error> {
+    Ok(Option::<Ends>::deserialize(from)?.map(infinite_where_null))
+}
+
+fn infinite_where_null([low, high]: Ends) -> [f64; 2] {
+    [
+        low.unwrap_or(f64::NEG_INFINITY),
+        high.unwrap_or(f64::INFINITY),
+    ]
 }
 
 #[cfg(test)]

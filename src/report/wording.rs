@@ -83,10 +83,14 @@ pub(super) fn amount(parameter: &ParameterEntry) -> String {
 /// The same of a number with its interval and unit.
 pub(super) fn amount_of(value: f64, ci95: Option<[f64; 2]>, unit: &str) -> String {
     let (value, ends) = digits_of(value, ci95);
-    let interval = ends.map_or_else(
-        || "not fitted".to_owned(),
-        |[low, high]| format!("{low} to {high}"),
-    );
+    let is_told = |end: usize| ci95.is_some_and(|ends| ends[end].is_finite());
+    let interval = match (ends, is_told(0), is_told(1)) {
+        (None, ..) => "not fitted".to_owned(),
+        (Some([low, high]), true, true) => format!("{low} to {high}"),
+        (Some([low, _]), true, false) => format!("{low} or more"),
+        (Some([_, high]), false, true) => format!("{high} or less"),
+        (Some(_), false, false) => "any value, as far as these logs tell".to_owned(),
+    };
     format!("{} ({interval})", with_unit(value, unit))
 }
 
@@ -106,8 +110,8 @@ pub(crate) fn digits(parameter: &Parameter) -> (String, Option<[String; 2]>) {
 /// The same of a number with its interval.
 pub(super) fn digits_of(value: f64, ci95: Option<[f64; 2]>) -> (String, Option<[String; 2]>) {
     let resolution = match ci95 {
-        Some([low, high]) => 0.05 * (high - low),
-        None => 1e-4 * value.abs(),
+        Some([low, high]) if (high - low).is_finite() => 0.05 * (high - low),
+        _ => 1e-4 * value.abs(),
     };
     let number = |x: f64| rounded(x, resolution);
     (number(value), ci95.map(|ends| ends.map(number)))

@@ -3,6 +3,9 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
 use crate::data::{Joint, Quantity};
 
+/// Rows of a motion at most, where those of the log are denser than any motion needs.
+const MOST_ROWS: f64 = 1e5;
+
 /// The torque, or the command, of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drive {
@@ -225,11 +228,11 @@ impl MenuItem {
         let settings = &study.settings.discriminate;
         let window = study.shooting.windows[w];
         let log = &study.logs[window.log];
-        let step_s = log.median_step() / f64::from(self.finer);
         let length_s = match self.drive {
             Drive::Ramps(_) => settings.ramps_s,
             _ => settings.motion_s,
         };
+        let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / MOST_ROWS);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (length_s / step_s).round() as usize;
         let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);

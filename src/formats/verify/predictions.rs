@@ -25,43 +25,34 @@ pub struct Difference {
 }
 
 impl Predictions {
-    /// Refuse predictions that are no finite numbers: nothing could be compared with them.
+    /// Refuse steps and derivatives that are no finite numbers: nothing could be compared with them.
     ///
     /// # Errors
     /// Where the first of them is.
     pub fn check_finite(&self, samples: &Samples) -> Result<(), ClientError> {
-        let point = |k: usize| {
-            format!(
-                "state {:?} under {:?}",
-                samples.states[k], samples.torques[k]
-            )
-        };
-        let places: [(_, &dyn Fn(usize) -> String); 3] = [
-            (&self.derivative, &|k| {
-                format!("the derivative at the {}", point(k))
-            }),
-            (&self.next, &|k| {
-                format!("a step of {:?} s from the {}", samples.step_s, point(k))
-            }),
-            (&self.rollout, &|k| {
-                let time_s = (k + 1) as f64 * samples.step_s;
-                format!(
-                    "a rollout from the state {:?} in {time_s:?} s",
-                    samples.start
-                )
-            }),
-        ];
-        for (rows, place) in places {
-            let is_finite = |row: &Vec<f64>| row.iter().all(|number| number.is_finite());
+        let step = format!("a step of {:?} s", samples.step_s);
+        for (rows, what) in [
+            (&self.derivative, "the derivative"),
+            (&self.next, step.as_str()),
+        ] {
             let mut rows = rows.iter().flatten();
-            if let Some(row) = rows.position(|row| !is_finite(row)) {
+            if let Some(k) = rows.position(|row| !is_finite(row)) {
                 return Err(ClientError::NotFinite(format!(
-                    "the model itself leaves the finite numbers in {}",
-                    place(row)
+                    "the model itself leaves the finite numbers in {what} from the state {:?} under {:?}",
+                    samples.states[k], samples.torques[k]
                 )));
             }
         }
         Ok(())
+    }
+
+    /// The same without a rollout that leaves the finite numbers, and the step in which it does.
+    pub fn without_lost_rollout(mut self) -> (Self, Option<usize>) {
+        let lost = (self.rollout.iter().flatten()).position(|row| !is_finite(row));
+        if lost.is_some() {
+            self.rollout = None;
+        }
+        (self, lost)
     }
 
     /// How far `other` is from these; infinite where it has another number of rows, or a NaN.
@@ -75,6 +66,10 @@ impl Predictions {
             rollout: between(&self.rollout, &other.rollout),
         }
     }
+}
+
+fn is_finite(row: &[f64]) -> bool {
+    row.iter().all(|number| number.is_finite())
 }
 
 impl Difference {
