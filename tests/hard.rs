@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
-use crate::support::{answers, refuses, residyn, says, succeeds, text};
+use crate::support::{answers, refuses, residyn, residyn_within, says, succeeds, text};
 use crate::train::config;
 
 const PENDULUM: &str = include_str!("../models/pendulum.toml");
@@ -74,15 +74,7 @@ pub fn swinging(time: f64) -> [f64; 3] {
 /// What the program says that refuses its arguments while its memory is bounded.
 #[cfg(unix)]
 fn refuses_in_little_memory(arguments: &[&str]) -> String {
-    // The threads' own shares of virtual memory depend on the machine.
-    let output = Command::new("bash")
-        .args(["-c", "ulimit -v 200000; exec \"$0\" \"$@\""])
-        .arg(env!("CARGO_BIN_EXE_residyn"))
-        .args(arguments)
-        .env("MALLOC_ARENA_MAX", "1")
-        .env("RAYON_NUM_THREADS", "2")
-        .output()
-        .unwrap();
+    let output = residyn_within(200_000, arguments);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{arguments:?}:\n{message}");
     assert!(message.len() < 3000, "{} bytes", message.len());

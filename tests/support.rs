@@ -11,6 +11,21 @@ pub fn residyn(arguments: &[&str]) -> Output {
         .expect("the binary runs")
 }
 
+/// Run the program in so many kB of virtual memory.
+#[cfg(unix)]
+pub fn residyn_within(memory_kb: u64, arguments: &[&str]) -> Output {
+    // The threads' own shares of virtual memory depend on the machine.
+    Command::new("bash")
+        .args(["-c", "ulimit -v \"$0\"; exec \"$@\""])
+        .arg(memory_kb.to_string())
+        .arg(env!("CARGO_BIN_EXE_residyn"))
+        .args(arguments)
+        .env("MALLOC_ARENA_MAX", "1")
+        .env("RAYON_NUM_THREADS", "2")
+        .output()
+        .expect("the binary runs")
+}
+
 /// Run the program, which must succeed, and return its standard output.
 pub fn succeeds(arguments: &[&str]) -> String {
     let output = residyn(arguments);

@@ -27,6 +27,7 @@ mod guide;
 mod hard;
 mod identify;
 mod interrupts;
+mod load;
 mod log_formats;
 mod logs;
 mod measured;

@@ -177,6 +177,13 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
     inputs::print_notes_and_faults(&train, &declared.columns);
     inputs::print_notes_and_faults(&test, &declared.columns);
+    for log in train.iter().chain(&test).filter(|log| log.is_long()) {
+        voice::say(format!(
+            "note: {}: a part of its {} rows is fitted, see the report",
+            log.name(),
+            log.rows()
+        ));
+    }
     let split = if test.is_empty() {
         Split::of(train, &Settings::default().split)
     } else {

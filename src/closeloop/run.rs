@@ -13,11 +13,12 @@ use super::refine::{Refined, refine};
 use super::remainder::{ResidualForce, proposal, residual_force};
 use super::request::Request;
 use super::score::{Scored, Scorer, contradicted, findings};
+use super::select::is_of_too_many;
 use super::space::Space;
 use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
-use crate::data::{Log, audit_together, tell_repeats};
+use crate::data::{Audit, Finding, Log, Severity, audit_together, tell_repeats};
 use crate::model::{Library, Status};
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
@@ -34,7 +35,7 @@ pub fn close_loop(
     let Request {
         model,
         library,
-        split,
+        mut split,
         against,
         settings,
         space,
@@ -54,7 +55,9 @@ pub fn close_loop(
             .map(|log| log.for_fits(settings.fit.window_s))
             .collect()
     };
-    let (of_train, mut of_test) = (audits(&split.train), audits(&split.test));
+    let (mut of_train, mut of_test) = (audits(&split.train), audits(&split.test));
+    split.train = shortened(split.train, &mut of_train);
+    split.test = shortened(split.test, &mut of_test);
     let (studied, tested) = (for_fits(&split.train), for_fits(&split.test));
     if space == Some(Space::Torque) && model.torque_balance().is_none() {
         return Err(StudyError::without_torques(model));
@@ -74,10 +77,10 @@ pub fn close_loop(
     let refined = refine(&study, &found.before, &found.chosen.after);
     study.identifiability = refined.identifiability.clone();
     let remainder = remainder(&study, &found, &refined);
-    let mut of_train = of_train;
     let with_friction = study.with_usual_friction(library.effects());
     study.tell_reversed(library.effects(), with_friction.as_ref(), &mut of_train);
     tell_gravity(&found.gravity, &mut of_train);
+    tell_too_many(&study, library, &mut of_train);
     // Logs over which the model diverges tell of no push.
     if let Ok(residual) = &remainder.after {
         tell_pushes(&study, &residual.samples, &mut of_train);
@@ -145,6 +148,36 @@ pub fn close_loop(
             studied,
         },
     })
+}
+
+/// What fits read of logs; of long ones their audits say so.
+fn shortened(logs: Vec<Log>, audits: &mut [Audit]) -> Vec<Log> {
+    let shorten = |(log, audit): (Log, &mut Audit)| {
+        let is_long = log.is_long();
+        let log = log.shortened();
+        if let Some(note) = log.notes.last().filter(|_| is_long) {
+            audit.add(Finding::new(Severity::Info, note.clone()));
+        }
+        log
+    };
+    logs.into_iter().zip(audits).map(shorten).collect()
+}
+
+/// Say in the audit of the first log which effects are not looked for because there are too many logs.
+fn tell_too_many(study: &Study<'_>, library: &Library, audits: &mut [Audit]) {
+    let Some(audit) = audits.first_mut() else {
+        return;
+    };
+    let effects = library.effects().iter();
+    for effect in effects.filter(|effect| is_of_too_many(study, effect)) {
+        let text = format!(
+            "{} has a value for each log and is not looked for in {} logs, but in at most {}: give fewer if the logs may differ by it",
+            effect.name,
+            study.logs.len(),
+            study.settings.select.most_by_log
+        );
+        audit.add(Finding::new(Severity::Info, text));
+    }
 }
 
 /// What the effects leave unexplained.

@@ -109,6 +109,9 @@ settings! {
         most_effects: usize = 12,
         /// or so many for each joint, where that is more.
         most_of_joint: usize = 4,
+        /// Effects with a value for each log are looked for in so many logs at most: the time for one set grows with the
+        /// third power of its values.
+        most_by_log: usize = 64,
         /// Steps of the search over predicted losses, each of which adds or drops one effect.
         depth: usize = 12,
         /// Sets that lead from one of these steps to the next.

@@ -96,21 +96,5 @@ impl SplitSettings {
 pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
     let rows =
         log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
-    let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[rows.clone()].to_vec()).collect();
-    let marked = |all: &Vec<usize>| {
-        let kept = all.iter().filter(|row| rows.contains(row));
-        kept.map(|row| row - rows.start).collect()
-    };
-    Log {
-        path: log.path.clone(),
-        time: log.time[rows.clone()].to_vec(),
-        q: cut(&log.q),
-        qd: cut(&log.qd),
-        tau: cut(&log.tau),
-        driven_by: log.driven_by,
-        masked: log.masked.iter().map(marked).collect(),
-        filled: marked(&log.filled),
-        leave_out: log.leave_out.clone(),
-        notes: log.notes.clone(),
-    }
+    log.at(std::slice::from_ref(&rows))
 }

@@ -41,7 +41,12 @@ impl Channels {
                 table.add(format!("{stem}{number}"), column);
             }
         }
-        log(name, &table, joints, &Columns::standard(joints, driven_by))
+        log(
+            name,
+            &mut table,
+            joints,
+            &Columns::standard(joints, driven_by),
+        )
     }
 }
 

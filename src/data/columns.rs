@@ -194,10 +194,20 @@ pub(super) struct Layout {
 }
 
 impl Layout {
+    /// The channels: angles, velocities, torques.
+    fn channels(&self) -> impl Iterator<Item = &Cell> {
+        let driven = self.qd.iter().chain(&self.tau).flatten();
+        self.q.iter().chain(driven)
+    }
+
+    /// Time and all channels.
+    pub fn cells(&self) -> impl Iterator<Item = &Cell> {
+        std::iter::once(&self.time).chain(self.channels())
+    }
+
     /// How late each channel is, s.
     pub fn late_s(&self) -> impl Iterator<Item = f64> {
-        let driven = self.qd.iter().chain(&self.tau).flatten();
-        self.q.iter().chain(driven).map(|cell| cell.late_s)
+        self.channels().map(|cell| cell.late_s)
     }
 }
 

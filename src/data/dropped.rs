@@ -52,67 +52,101 @@ impl Log {
     /// The log with rows in the place of those that the logger dropped, so that the torque changes as smoothly
     /// as it does around them. Where it does not pass a step smoothly, nobody knows when it changed: such steps
     /// are left out, unless windows of `window_s` around them make up more than half of the log.
-    pub(super) fn completed(&self, window_s: f64) -> Log {
-        let missing = dropped(self);
-        let rough: Vec<&Dropped> = missing.iter().filter(|d| !self.is_smooth_over(d)).collect();
-        let mut log = self.clone();
+    pub(super) fn completed(mut self, window_s: f64) -> Log {
+        let missing = dropped(&self);
+        if missing.is_empty() {
+            return self;
+        }
+        let small: Vec<f64> = (self.tau.iter())
+            .map(|tau| SMALL_CHANGE * range(tau))
+            .collect();
+        let rough = missing.iter().filter(|d| !self.is_smooth_over(d, &small));
+        let rough: Vec<Interval> = rough.map(|d| self.step_of(d)).collect();
         if rough.len() as f64 * window_s <= 0.5 * self.duration() {
-            log.leave_out.extend(rough.iter().map(|dropped| Interval {
-                start_s: self.time[dropped.row],
-                end_s: self.time[dropped.row + 1],
-            }));
+            self.leave_out.extend(rough);
         }
-        for dropped in missing.iter().rev() {
-            log.insert(dropped);
-        }
-        log
+        self.insert(&missing);
+        self
     }
 
-    /// Whether the torques of all joints change over the step as they do from row to row around it.
-    fn is_smooth_over(&self, dropped: &Dropped) -> bool {
+    fn step_of(&self, dropped: &Dropped) -> Interval {
+        Interval {
+            start_s: self.time[dropped.row],
+            end_s: self.time[dropped.row + 1],
+        }
+    }
+
+    /// Whether the torques of all joints change over the step as they do from row to row around it, or by no more than
+    /// what is small for them.
+    fn is_smooth_over(&self, dropped: &Dropped, small: &[f64]) -> bool {
         let (row, count) = (dropped.row, dropped.count as f64 + 1.0);
         let from = row.saturating_sub(CLOSE_BY);
         let to = (row + 1 + CLOSE_BY).min(self.rows() - 1);
-        self.tau.iter().all(|tau| {
+        self.tau.iter().zip(small).all(|(tau, small)| {
             let change = |at: usize| (tau[at + 1] - tau[at]).abs();
             let close_by = (from..to).filter(|at| *at != row).map(change);
             let largest = close_by.fold(0.0, f64::max);
-            let range = tau.iter().fold(f64::NEG_INFINITY, |a, b| a.max(*b))
-                - tau.iter().fold(f64::INFINITY, |a, b| a.min(*b));
-            change(row) <= (SMALL_CHANGE * range).max(count * SMOOTH * largest)
+            change(row) <= small.max(count * SMOOTH * largest)
         })
     }
 
-    /// Puts rows into a step, at equal times.
-    fn insert(&mut self, dropped: &Dropped) {
-        let Dropped { row, count } = *dropped;
-        let around = [row.saturating_sub(1), row, row + 1, row + 2];
-        let (from, to) = (self.time[row], self.time[row + 1]);
-        let shares: Vec<f64> = (1..=count)
-            .map(|k| k as f64 / (count as f64 + 1.0))
-            .collect();
-        let times: Vec<f64> = shares
-            .iter()
-            .map(|share| from + share * (to - from))
-            .collect();
+    /// Puts rows into steps, which rise, at equal times.
+    fn insert(&mut self, missing: &[Dropped]) {
+        let time = &self.time;
+        let between = |channel: &[f64], row: usize, share: f64| {
+            channel[row] + share * (channel[row + 1] - channel[row])
+        };
         for q in &mut self.q {
-            let at = |t: &f64| interpolated(&self.time, q, around, *t);
-            let new: Vec<f64> = times.iter().map(at).collect();
-            q.splice(row + 1..row + 1, new);
+            *q = with_rows(q, missing, |row, share| {
+                let around = [row.saturating_sub(1), row, row + 1, row + 2];
+                interpolated(time, q, around, between(time, row, share))
+            });
         }
         for channel in self.qd.iter_mut().chain(&mut self.tau) {
-            let (a, b) = (channel[row], channel[row + 1]);
-            let new: Vec<f64> = shares.iter().map(|share| a + share * (b - a)).collect();
-            channel.splice(row + 1..row + 1, new);
+            *channel = with_rows(channel, missing, |row, share| between(channel, row, share));
         }
-        self.time.splice(row + 1..row + 1, times);
+        self.time = with_rows(time, missing, |row, share| between(time, row, share));
+        // Rows put in before each step, and before the end.
+        let before: Vec<usize> = std::iter::once(0)
+            .chain(missing.iter().scan(0, |sum, dropped| {
+                *sum += dropped.count;
+                Some(*sum)
+            }))
+            .collect();
         for marked in self.masked.iter_mut().chain([&mut self.filled]) {
-            let later = marked.iter_mut().filter(|at| **at > row);
-            later.for_each(|at| *at += count);
+            for at in marked {
+                *at += before[missing.partition_point(|dropped| dropped.row < *at)];
+            }
         }
-        self.filled.extend(row + 1..=row + count);
+        let new = missing.iter().zip(&before);
+        let new = new.flat_map(|(Dropped { row, count }, before)| {
+            (row + 1..=row + count).map(move |at| at + before)
+        });
+        self.filled.extend(new);
         self.filled.sort_unstable();
     }
+}
+
+/// A channel with values put into steps, which rise: what `value` tells of the step's first row and the share of it that
+/// has passed.
+fn with_rows(channel: &[f64], missing: &[Dropped], value: impl Fn(usize, f64) -> f64) -> Vec<f64> {
+    let added: usize = missing.iter().map(|dropped| dropped.count).sum();
+    let mut whole = Vec::with_capacity(channel.len() + added);
+    let mut from = 0;
+    for Dropped { row, count } in missing {
+        whole.extend_from_slice(&channel[from..=*row]);
+        let share = |k: usize| k as f64 / (*count as f64 + 1.0);
+        whole.extend((1..=*count).map(|k| value(*row, share(k))));
+        from = row + 1;
+    }
+    whole.extend_from_slice(&channel[from..]);
+    whole
+}
+
+/// Largest less smallest value.
+fn range(values: &[f64]) -> f64 {
+    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    highest - values.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -153,7 +187,7 @@ mod tests {
     #[test]
     fn a_torque_that_jumps_while_rows_are_missing_leaves_the_step_out() {
         let steps = log(|t| if t > 3.0 { 1.0 } else { -1.0 });
-        let full = steps.completed(0.5);
+        let full = steps.clone().completed(0.5);
         assert_eq!(
             full.leave_out,
             [Interval {

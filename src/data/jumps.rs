@@ -1,5 +1,6 @@
 //! Single readings that jump: a bit lost on a bus, a frame that was damaged.
 
+use super::examined::at_examined;
 use super::signal::resolution;
 use super::statistics::{mad, quantile};
 
@@ -15,11 +16,12 @@ pub(super) const JUMP_RESOLUTION_STEPS: f64 = 3.0;
 /// The rows that jump away from both neighbours while the neighbours agree with each other.
 pub(super) fn rows_that_jump(values: &[f64]) -> Vec<usize> {
     let jump = |triple: &[f64]| triple[1] - 0.5 * (triple[0] + triple[2]);
-    let jumps: Vec<f64> = values.windows(3).map(jump).collect();
-    let working_range = quantile(values, 0.95) - quantile(values, 0.05);
+    let examined = at_examined(values);
+    let jumps: Vec<f64> = examined.windows(3).map(jump).collect();
+    let working_range = quantile(&examined, 0.95) - quantile(&examined, 0.05);
     let floor = (JUMP_MADS * mad(&jumps))
         .max(JUMP_SHARE_OF_RANGE * working_range)
-        .max(JUMP_RESOLUTION_STEPS * resolution(values));
+        .max(JUMP_RESOLUTION_STEPS * resolution(&examined));
     let isolated = |triple: &[f64]| {
         let [before, after] = [triple[1] - triple[0], triple[1] - triple[2]];
         let smaller = before.abs().min(after.abs());

@@ -8,8 +8,8 @@ pub(super) fn undone(time: &[f64], channel: Vec<f64>, late_s: f64) -> Vec<f64> {
     if late_s == 0.0 {
         return channel;
     }
-    let wanted: Vec<f64> = time.iter().map(|time| time + late_s).collect();
-    resampled(&wanted, time, &channel)
+    let wanted = time.iter().map(|time| time + late_s);
+    resampled(wanted, time, &channel).collect()
 }
 
 /// The rows of a log for which all channels have values, where these are so late.

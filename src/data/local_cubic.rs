@@ -5,7 +5,7 @@
 //! is, and follows accelerations that change over the window.
 
 use super::signal::differences;
-use super::statistics::median;
+use super::statistics::median_of;
 
 /// Half width of the window that the fit reads \[s\]: 16 ms, or four median steps of slower logs.
 ///
@@ -98,7 +98,7 @@ pub fn local_cubic(
 /// The derivative of a channel at every row: the slope of the cubic fitted around it or, where there is none (ends, gaps),
 /// the difference of the rows on either side over the time between them. At least two rows.
 pub(super) fn slopes(time: &[f64], values: &[f64]) -> Vec<f64> {
-    let half_width = half_width_s(median(&differences(time)));
+    let half_width = half_width_s(median_of(differences(time)));
     let between = |a: usize, b: usize| (values[b] - values[a]) / (time[b] - time[a]);
     let neighbours = |row: usize| between(row.saturating_sub(1), (row + 1).min(time.len() - 1));
     let slope = |row| {

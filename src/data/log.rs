@@ -1,5 +1,6 @@
 //! One trajectory of a rig, in memory and as a file.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{self, Write};
 use std::ops::RangeInclusive;
@@ -12,7 +13,7 @@ use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
 use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
-use super::statistics::median;
+use super::statistics::median_of;
 use crate::files::write_with;
 use crate::limits::is_reading;
 
@@ -107,7 +108,7 @@ impl Log {
 
     /// Median time between neighbouring rows \[s\]; 0 for fewer than two rows.
     pub fn median_step(&self) -> f64 {
-        median(&differences(&self.time))
+        median_of(differences(&self.time))
     }
 
     /// The file's name without its folder.
@@ -138,20 +139,23 @@ impl Log {
     /// with the windows of `window_s` around them.
     #[must_use]
     pub fn for_fits(&self, window_s: f64) -> Log {
-        self.without_jumps().completed(window_s)
+        let jumps: Vec<Vec<usize>> = self.q.iter().map(|q| rows_that_jump(q)).collect();
+        self.without(&jumps).into_owned().completed(window_s)
     }
 
-    /// The log with angles that jump for a single row masked.
-    pub(super) fn without_jumps(&self) -> Log {
+    /// The log with angles masked that jump at these rows, `[joint]`.
+    pub(super) fn without(&self, jumps: &[Vec<usize>]) -> Cow<'_, Log> {
+        if jumps.iter().all(Vec::is_empty) {
+            return Cow::Borrowed(self);
+        }
         let mut log = self.clone();
-        for (q, masked) in log.q.iter_mut().zip(&mut log.masked) {
-            let rows = rows_that_jump(q);
-            bridge(&self.time, q, &rows);
+        for ((q, masked), rows) in log.q.iter_mut().zip(&mut log.masked).zip(jumps) {
+            bridge(&self.time, q, rows);
             masked.extend(rows);
             masked.sort_unstable();
             masked.dedup();
         }
-        log
+        Cow::Owned(log)
     }
 
     /// Writes the log as CSV with the standard header `time,q1..,qd1..,tau1..`, or `cmd1..`.

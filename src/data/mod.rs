@@ -14,6 +14,7 @@ mod column;
 mod columns;
 mod dropped;
 mod error;
+mod examined;
 mod joint;
 mod jumps;
 mod lag;

@@ -27,7 +27,7 @@ impl Log {
     pub fn read(path: impl AsRef<Path>, joints: usize, columns: &Columns) -> Result<Log, LogError> {
         let path = path.as_ref();
         let columns = columns.completed(joints, path)?;
-        log(path, open(path, &columns)?.as_ref(), joints, &columns)
+        log(path, open(path, &columns)?.as_mut(), joints, &columns)
     }
 
     /// Reads a file with the standard columns, of as many joints as its header has, in its order where they have names.
@@ -36,7 +36,7 @@ impl Log {
     /// As [`Log::read`].
     pub fn read_standard(path: impl AsRef<Path>) -> Result<Log, LogError> {
         let path = path.as_ref();
-        let table = open(path, &Columns::default())?;
+        let mut table = open(path, &Columns::default())?;
         let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
         let numbered = (1..).take_while(has).count();
         let named = joints(table.names()).into_iter();
@@ -46,14 +46,14 @@ impl Log {
         };
         // A header of no joint lacks the first.
         let count = numbered.max(columns.joint_names.len()).max(1);
-        log(path, table.as_ref(), count, &columns)
+        log(path, table.as_mut(), count, &columns)
     }
 }
 
 /// The log that the table of a file is.
 pub(super) fn log(
     path: &Path,
-    table: &dyn Table,
+    table: &mut dyn Table,
     joints: usize,
     columns: &Columns,
 ) -> Result<Log, LogError> {
@@ -63,35 +63,53 @@ pub(super) fn log(
         names: table.names().to_vec(),
     };
     let layout = header.layout(joints, columns)?;
-    let rows = table.rows();
     let path = path.to_owned();
-    if rows < 2 {
+    let wanted: Vec<usize> = layout.cells().map(|cell| cell.index).collect();
+    let numbers = table.numbers(&wanted)?;
+    if numbers.rows < 2 {
+        let rows = numbers.rows;
         return Err(LogError::TooFewRows { path, rows });
     }
-    table.check()?;
-    let fault = |row: usize, column: usize, fault: CellFault| LogError::Cell {
-        path: path.clone(),
-        place: table.place(row),
-        column: header.names[column].clone(),
-        fault,
+    if let Some((row, found)) = numbers.ragged {
+        return Err(LogError::Width {
+            path,
+            place: table.place(row)?,
+            found,
+            expected: header.names.len(),
+        });
+    }
+    let table: &dyn Table = table;
+    let fault = |row: usize, column: usize, fault: CellFault| match table.place(row) {
+        Ok(place) => LogError::Cell {
+            path: path.clone(),
+            place,
+            column: header.names[column].clone(),
+            fault,
+        },
+        Err(unreadable) => unreadable,
     };
-    let column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
-        let number = |row: usize| {
-            let found = table.number(row, cell.index);
-            let found = found.map_err(|why| fault(row, cell.index, why))?;
-            match cell.scale * found {
-                reading if is_reading(reading) => Ok(reading),
-                _ => Err(fault(row, cell.index, CellFault::TooLarge(found))),
+    // The cells are gone through in the order in which they were asked for.
+    let mut numbers = numbers.columns.into_iter();
+    let mut column = |cell: &Cell| -> Result<Vec<f64>, LogError> {
+        let mut read = numbers.next().unwrap_or_default();
+        for (row, value) in read.values.iter_mut().enumerate() {
+            let reading = cell.scale * *value;
+            if !is_reading(reading) {
+                return Err(fault(row, cell.index, CellFault::TooLarge(*value)));
             }
-        };
-        (0..rows).map(number).collect()
+            *value = reading;
+        }
+        match read.fault {
+            Some(why) => Err(fault(read.values.len(), cell.index, why)),
+            None => Ok(read.values),
+        }
     };
     let time = column(&layout.time)?;
     if let Some(previous) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
         let late = CellFault::NotLater {
             time: time[previous + 1],
             previous: time[previous],
-            previous_place: table.place(previous),
+            previous_place: table.place(previous)?,
         };
         return Err(fault(previous + 1, layout.time.index, late));
     }
@@ -102,7 +120,7 @@ pub(super) fn log(
         let long = CellFault::Pause {
             pause_s: pause.length_s,
             step_s: pause.step_s,
-            previous_place: table.place(pause.row - 1),
+            previous_place: table.place(pause.row - 1)?,
         };
         return Err(fault(pause.row, layout.time.index, long));
     }
@@ -196,7 +214,7 @@ mod tests {
     use std::fs;
 
     use super::super::column::Column;
-    use super::super::table::Csv;
+    use super::super::table::{Csv, Source};
     use super::*;
 
     fn read(text: &str, joints: usize) -> Result<Log, LogError> {
@@ -204,8 +222,11 @@ mod tests {
     }
 
     fn read_as(text: &str, joints: usize, columns: &Columns) -> Result<Log, LogError> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(&file, text).unwrap();
         let path = Path::new("rig.csv");
-        log(path, &Csv::of(path, text.to_owned())?, joints, columns)
+        let mut table = Csv::of(path, Source::of(file.path())?)?;
+        log(path, &mut table, joints, columns)
     }
 
     fn message(text: &str) -> String {

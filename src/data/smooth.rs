@@ -76,8 +76,9 @@ impl Smoothing {
 
     /// At all even times.
     fn filtered(&self, channel: &[f64]) -> Vec<f64> {
-        self.filter
-            .apply(&resampled(&self.even, &self.logged, channel))
+        let even = self.even.iter().copied();
+        let even: Vec<f64> = resampled(even, &self.logged, channel).collect();
+        self.filter.apply(&even)
     }
 
     fn used_of(&self, filtered: &[f64]) -> Vec<f64> {
@@ -145,16 +146,19 @@ fn even(log: &Log, step_s: f64) -> Vec<f64> {
 }
 
 /// A channel at other times that rise, on straight lines between its rows.
-pub(super) fn resampled(times: &[f64], rows: &[f64], channel: &[f64]) -> Vec<f64> {
+pub(super) fn resampled(
+    times: impl IntoIterator<Item = f64>,
+    rows: &[f64],
+    channel: &[f64],
+) -> impl Iterator<Item = f64> {
     let mut row = 0;
-    let value = |time: &f64| {
-        while row + 2 < rows.len() && rows[row + 1] < *time {
+    times.into_iter().map(move |time| {
+        while row + 2 < rows.len() && rows[row + 1] < time {
             row += 1;
         }
         let share = (time - rows[row]) / (rows[row + 1] - rows[row]);
         channel[row] + share.min(1.0) * (channel[row + 1] - channel[row])
-    };
-    times.iter().map(value).collect()
+    })
 }
 
 fn is_used(log: &Log, time: f64) -> bool {

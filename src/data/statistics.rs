@@ -51,7 +51,11 @@ fn squares_about_mean(values: &[f64]) -> f64 {
 
 /// The middle value, or the mean of the two middle ones; 0 of no values.
 pub(crate) fn median(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
+    median_of(values.to_vec())
+}
+
+/// [`median`] of values that nobody needs in their order.
+pub(crate) fn median_of(mut values: Vec<f64>) -> f64 {
     let (half, even) = (values.len() / 2, values.len().is_multiple_of(2));
     if values.is_empty() {
         return 0.0;
@@ -72,8 +76,7 @@ pub(crate) fn upper_median(values: &[f64]) -> f64 {
 /// Median absolute deviation from the median; 0 of no values.
 pub(crate) fn mad(values: &[f64]) -> f64 {
     let centre = median(values);
-    let deviations: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
-    median(&deviations)
+    median_of(values.iter().map(|value| (value - centre).abs()).collect())
 }
 
 /// The value at the place nearest to `share` (0 to 1) of the way from the lowest to the highest; 0 of no values.

@@ -30,6 +30,7 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
         for joint in Joint::all(study.declared.joints) {
             if is_driven_enough(study, effect, joint)
                 && !is_told_by_bodies(study, effect)
+                && !is_of_too_many(study, effect)
                 && study.declared.can_carry(effect, joint).is_ok()
             {
                 let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
@@ -46,6 +47,12 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
 /// A load at the tip is no other torque where the bodies are free: what is declared of them tells it, in a stage of its own.
 fn is_told_by_bodies(study: &Study<'_>, effect: &Effect) -> bool {
     matches!(effect.entry, Entry::Payload(_)) && study.has_free_bodies()
+}
+
+/// An effect with a value for each log, of more logs than those are looked for in.
+pub fn is_of_too_many(study: &Study<'_>, effect: &Effect) -> bool {
+    study.logs.len() > study.settings.select.most_by_log
+        && effect.parameters.iter().any(|parameter| parameter.per_log)
 }
 
 /// Effects of the torque cannot be observed where there is none.
@@ -96,6 +103,17 @@ pub fn promise(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> 
         candidate,
         &fitted.fit.locals,
     )
+}
+
+/// The same of a sample of the windows.
+pub fn promise_on_sample(
+    study: &Study<'_>,
+    fitted: &Fitted,
+    candidate: &FittedEffect,
+) -> Option<f64> {
+    let locals = study.sample.locals(&fitted.fit.locals);
+    let shooting = &study.sample.shooting;
+    promised(study, shooting, fitted, candidate, &locals)
 }
 
 /// The cost of some windows that one Gauss-Newton step predicts for a candidate.

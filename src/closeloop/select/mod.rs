@@ -17,7 +17,7 @@ mod tests;
 mod trial;
 
 pub(super) use self::blocks::usual_friction;
-pub(super) use self::candidate::{acting, best_start, candidates, promise, starts};
+pub(super) use self::candidate::{acting, best_start, candidates, is_of_too_many, promise, starts};
 pub(super) use self::evidence::{gain, p_of_gains, p_value};
 pub(super) use self::folds::{Folds, left_out_losses};
 pub(super) use self::losses::Losses;

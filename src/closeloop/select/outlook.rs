@@ -3,7 +3,7 @@ use std::ops::{AddAssign, Range};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::candidate::{beside, best_start, has_switch};
+use super::candidate::{beside, best_start, has_switch, promise_on_sample};
 use super::folds::{Folds, predicted, step_without};
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
@@ -64,6 +64,7 @@ impl Outlook {
                 best_start(study, &beside, candidate)
             })
             .collect();
+        let options = together(study, fitted, options);
         let model = fitted.model.with_effects(fitted.effects_and(&options));
         let dynamics = study.compiled(&model);
         let added = study.declared.effects.len()..model.effects.len();
@@ -233,6 +234,38 @@ impl Outlook {
     }
 }
 
+/// The candidates that are compared at once: all or, of more than there is memory for, those that promise most alone.
+fn together(study: &Study<'_>, fitted: &Fitted, options: Vec<FittedEffect>) -> Vec<FittedEffect> {
+    // Each window's as they come and without its own values, and those of stretches.
+    let equations = 3 * study.shooting.windows.len().max(1);
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss
+    )] // at most the root of 2^28
+    let values = (NUMBERS as f64 / equations as f64).sqrt() as usize;
+    let room = values.saturating_sub(fitted.fit.columns.len());
+    let switches = |option: &FittedEffect| {
+        let parameters = option.effect.parameters.iter();
+        parameters.filter(|parameter| parameter.is_switch()).count()
+    };
+    if options.iter().map(switches).sum::<usize>() <= room {
+        return options;
+    }
+    let promises = options.par_iter().enumerate();
+    let promises =
+        promises.filter_map(|(k, option)| Some((promise_on_sample(study, fitted, option)?, k)));
+    let mut promises: Vec<(f64, usize)> = promises.collect();
+    promises.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let fits = promises.iter().scan(0, |sum, (_, k)| {
+        *sum += switches(&options[*k]);
+        (*sum <= room).then_some(*k)
+    });
+    let mut kept: Vec<usize> = fits.collect();
+    kept.sort_unstable();
+    kept.into_iter().map(|k| options[k].clone()).collect()
+}
+
 /// Whether the logs tell the values after the first `base` ones from each other and from those: the information of each
 /// that is left when those before it are free.
 pub fn tells_apart(matrix: &DMatrix<f64>, base: usize) -> bool {
@@ -255,6 +288,8 @@ fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64>
     })
 }
 
+/// Numbers in the normal equations of all windows and candidates at most: 2 GB.
+const NUMBERS: usize = 1 << 28;
 /// Smallest information of a direction, in units in which each value alone has 1: items that say the same share it.
 const RIDGE: f64 = 1e-9;
 /// An effect of which less than this share of the information is its own is not told from the rest of the model.

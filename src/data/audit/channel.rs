@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::data::examined::at_examined;
 use crate::data::signal::{noise_std, resolution};
 
 /// One column of a log: what its numbers look like, in the column's own unit.
@@ -38,8 +39,9 @@ impl Channel {
     pub(super) fn of(name: String, values: &[f64], spikes: usize) -> Self {
         let min = values.iter().copied().fold(f64::INFINITY, f64::min);
         let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let resolution = resolution(values);
-        let noise = noise_std(values);
+        let examined = at_examined(values);
+        let resolution = resolution(&examined);
+        let noise = noise_std(&examined);
         let at_limit = |limit: &f64| saturated_rows(values, *limit, max - min, resolution);
         let saturated: usize = [max, min].iter().map(at_limit).sum();
         Self {

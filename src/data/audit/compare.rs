@@ -1,5 +1,7 @@
 //! How the channels of one joint agree: logged with derived velocity, acceleration with torque.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::channel::Channel;
@@ -9,7 +11,7 @@ use crate::data::Joint;
 use crate::data::jumps::{JUMP_MADS, JUMP_RESOLUTION_STEPS, JUMP_SHARE_OF_RANGE};
 use crate::data::lag::{Lag, lag};
 use crate::data::projection::{explained_by, orthonormal};
-use crate::data::signal::{interpolate, resample};
+use crate::data::signal::interpolate;
 use crate::data::statistics::{SIGMA_PER_MAD, mad, median};
 
 /// The longest lag looked for \[s\]. Filters and buses of real rigs stay below 40 ms; a longer search
@@ -123,11 +125,16 @@ pub(super) fn opposed_velocity(
 
 /// Rows, and the logged velocity of each with the derivative of the angle `lag_s` earlier.
 fn aligned_velocities(motion: &Motion, lag_s: f64) -> (Vec<usize>, Vec<(f64, f64)>) {
-    let derived = |t: f64| interpolate(&motion.time, &motion.velocity, t - lag_s);
-    let logged = motion.time.iter().zip(&motion.qd);
-    (motion.rows.iter().zip(logged))
-        .filter_map(|(row, (t, logged))| Some((*row, (*logged, derived(*t)?))))
-        .unzip()
+    let of_stretch = |stretch: &Range<usize>| {
+        let (time, velocity) = (
+            &motion.time[stretch.clone()],
+            &motion.velocity[stretch.clone()],
+        );
+        let derived = move |k: usize| interpolate(time, velocity, motion.time[k] - lag_s);
+        let pair = move |k: usize| Some((motion.rows[k], (motion.qd[k], derived(k)?)));
+        stretch.clone().filter_map(pair)
+    };
+    motion.stretches.iter().flat_map(of_stretch).unzip()
 }
 
 /// Ratio of logged to derived velocity: the median over the rows faster than a third of the fast
@@ -154,7 +161,7 @@ fn reach(step_s: f64) -> isize {
 
 /// The lag of a velocity behind the derivative of the angle.
 fn lag_of(motion: &Motion, velocity: &[f64], step_s: f64) -> Option<Lag> {
-    let uniform = |values: &[f64]| resample(&motion.time, values, lag_step_s(step_s));
+    let uniform = |values: &[f64]| motion.resampled(values, lag_step_s(step_s));
     let (derived, logged) = (uniform(&motion.velocity), uniform(velocity));
     let ones = vec![1.0; derived.len()];
     let reach = reach(step_s);
@@ -174,7 +181,7 @@ pub(super) fn torque_lag(
     joint: Joint,
     step_s: f64,
 ) -> Option<TorqueLag> {
-    let uniform = |values: &[f64]| resample(&motions[joint].time, values, lag_step_s(step_s));
+    let uniform = |values: &[f64]| motions[joint].resampled(values, lag_step_s(step_s));
     let columns = regressors(motions, fast_rad_s, joint);
     let basis: Vec<Vec<f64>> = columns.iter().map(|column| uniform(column)).collect();
     let (tau, acceleration) = (

@@ -1,5 +1,7 @@
 //! One joint: whether its channels agree with each other, and what its motion can show.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use super::channel::Channel;
@@ -50,7 +52,7 @@ pub struct JointAudit {
     pub torque_lag: Option<TorqueLag>,
     /// How the torque compares with what the motion needs; `None` where it is constant or the log is too short.
     pub torque_demand: Option<TorqueDemand>,
-    /// How often the motion changes direction, jitter about rest not counted.
+    /// How often the motion changes direction in the rows that are examined, jitter about rest not counted.
     pub reversals: usize,
     /// Share of the rows at rest: slower than 1 % of the fast speed, or than three standard deviations
     /// of what noise on the angle looks like as a velocity.
@@ -77,32 +79,38 @@ pub struct JointAudit {
 ///
 /// Angles that jump for a single row are counted, and then masked.
 pub(super) fn audit_joints(log: &Log) -> Vec<JointAudit> {
-    let spikes: Vec<usize> = log.q.iter().map(|q| rows_that_jump(q).len()).collect();
-    let log = &log.without_jumps();
+    with_motions(log).0
+}
+
+/// As [`audit_joints`], with the motions that accelerations are compared with torques in.
+pub(super) fn with_motions(log: &Log) -> (Vec<JointAudit>, Vec<Motion>) {
+    let jumps: Vec<Vec<usize>> = log.q.iter().map(|q| rows_that_jump(q)).collect();
+    let log = &*log.without(&jumps);
+    let step_s = log.median_step();
     let smoothed = |half_width_s: f64| -> Vec<Motion> {
         Joint::all(log.joints())
             .map(|joint| Motion::of(log, joint, half_width_s))
             .collect()
     };
-    let motions = smoothed(half_width_s(log.median_step()));
-    let slow_s = half_width_s(log.median_step()).max(SLOW_S);
-    let slow = smoothed(slow_s);
     let mut joints: Vec<JointAudit> = Joint::all(log.joints())
-        .map(|joint| JointAudit::of(log, joint, &motions[joint]))
+        .zip(&smoothed(half_width_s(step_s)))
+        .map(|(joint, motion)| JointAudit::of(log, step_s, joint, motion))
         .collect();
+    let slow_s = half_width_s(step_s).max(SLOW_S);
+    let slow = smoothed(slow_s);
     for joint in Joint::all(log.joints()) {
         let fast: Vec<f64> = joints.iter().map(|joint| joint.fast_rad_s).collect();
-        joints[joint].q.spikes = spikes[joint];
+        joints[joint].q.spikes = jumps[joint].len();
         joints[joint].response = response(&slow, &fast, joint);
         if log.driven_by == Quantity::Torque {
-            joints[joint].torque_lag = torque_lag(&slow, &fast, joint, log.median_step());
+            joints[joint].torque_lag = torque_lag(&slow, &fast, joint, step_s);
             joints[joint].torque_demand = torque_demand(&slow, &fast, joint, slow_s);
         } else if let Some(response) = &mut joints[joint].response {
             // What a drive makes of its command depends on the motion.
             response.to_torque = None;
         }
     }
-    joints
+    (joints, slow)
 }
 
 impl JointAudit {
@@ -113,33 +121,32 @@ impl JointAudit {
     }
 
     /// All but what needs the other joints as well, or the log as it is.
-    fn of(log: &Log, joint: Joint, motion: &Motion) -> Self {
+    fn of(log: &Log, step_s: f64, joint: Joint, motion: &Motion) -> Self {
         let (q, qd, tau) = (&log.q[joint], &log.qd[joint], &log.tau[joint]);
         let channel = |kind: &str, values, spikes| Channel::of(joint.name(kind), values, spikes);
         let q_channel = channel("q", q, 0);
         let qd_channel = channel("qd", qd, 0);
         // A log too short for derivatives still has a speed: the logged one.
-        let every: Vec<usize> = (0..log.rows()).collect();
         let (rows, velocity) = match motion.rows() {
-            0 => (&every, qd),
-            _ => (&motion.rows, &motion.velocity),
+            0 => (Cow::from_iter(0..log.rows()), qd),
+            _ => (Cow::from(&motion.rows), &motion.velocity),
         };
         let speeds: Vec<f64> = velocity.iter().map(|v| v.abs()).collect();
         let fast_rad_s = quantile(&speeds, 0.95);
-        let rest_rad_s = rest_speed(&q_channel, fast_rad_s, log.median_step());
+        let rest_rad_s = rest_speed(&q_channel, fast_rad_s, step_s);
         let range = Speeds {
             rest_rad_s,
             fast_rad_s,
         };
-        let (check, disagreeing) = velocity_check(motion, &qd_channel, range, log.median_step());
+        let (check, disagreeing) = velocity_check(motion, &qd_channel, range, step_s);
         let resting: Vec<usize> = (rows.iter().zip(&speeds))
             .filter(|(_, speed)| **speed <= rest_rad_s)
             .map(|(row, _)| *row)
             .collect();
-        let repeats = Repeats::of(motion, rest_rad_s, &q_channel, log.median_step());
+        let repeats = Repeats::of(motion, rest_rad_s, &q_channel, step_s);
         Self {
             joint,
-            opposed: opposed_velocity(motion, check, log.median_step()),
+            opposed: opposed_velocity(motion, check, step_s),
             velocity: check,
             response: None,
             torque_lag: None,

@@ -27,8 +27,11 @@ pub use quality::{Audit, Finding, Remedy, Severity};
 pub use repeats::tell_repeats;
 pub use response::Response;
 
+use std::ops::Range;
+
 use super::columns::Columns;
 use super::dropped::{GAP_STEPS, dropped};
+use super::examined::examined;
 use super::log::{Interval, Log};
 use super::signal::differences;
 use super::statistics::{deviation, median};
@@ -73,8 +76,10 @@ fn of_log(log: &Log, columns: &Columns) -> Audit {
 
 /// The numbers of an audit.
 fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
-    let steps = differences(&log.time);
+    let mut steps = differences(&log.time);
     let median_step_s = median(&steps);
+    let min_step_s = steps.iter().copied().reduce(f64::min).unwrap_or(0.0);
+    let max_step_s = steps.iter().copied().reduce(f64::max).unwrap_or(0.0);
     let is_gap = |step: &f64| *step > GAP_STEPS * median_step_s;
     let gap = |pair: &[f64]| Interval {
         start_s: pair[0],
@@ -84,15 +89,16 @@ fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
         .time
         .windows(2)
         .filter(|pair| is_gap(&(pair[1] - pair[0])));
-    let regular: Vec<f64> = steps.iter().copied().filter(|step| !is_gap(step)).collect();
+    steps.retain(|step| !is_gap(step));
     Audit {
         log: log.name(),
         rows: log.rows(),
+        examined_rows: examined(log.rows()).iter().map(Range::len).sum(),
         duration_s: log.duration(),
         median_step_s,
-        min_step_s: steps.iter().copied().reduce(f64::min).unwrap_or(0.0),
-        max_step_s: steps.iter().copied().reduce(f64::max).unwrap_or(0.0),
-        jitter: relative_deviation(&regular, median_step_s),
+        min_step_s,
+        max_step_s,
+        jitter: relative_deviation(&steps, median_step_s),
         gaps: gaps.map(gap).collect(),
         dropped_rows: dropped(log).iter().map(|dropped| dropped.count).sum(),
         driven_by: log.driven_by,

@@ -1,16 +1,23 @@
 //! The motion of one joint as its angles tell it.
 
+use std::ops::Range;
+
 use crate::data::Joint;
+use crate::data::examined::examined;
 use crate::data::local_cubic::local_cubic;
 use crate::data::log::Log;
+use crate::data::signal::resample;
 
 /// One joint's channels at the rows where the motion around them is known.
 ///
-/// These are the rows that a cubic can be fitted around: not the ends of the log, nor its gaps. They
+/// These are the rows that are examined and that a cubic can be fitted around: not the ends of the log, nor its gaps. They
 /// depend on the times alone, so they are the same rows for all joints of a log.
+#[derive(Clone)]
 pub(super) struct Motion {
     /// The rows.
     pub rows: Vec<usize>,
+    /// Which of them belong to each stretch of the log that is examined.
+    pub stretches: Vec<Range<usize>>,
     /// Time of the rows \[s\].
     pub time: Vec<f64>,
     /// Smoothed angle \[rad\].
@@ -34,6 +41,7 @@ impl Motion {
     pub fn of(log: &Log, joint: Joint, half_width_s: f64) -> Self {
         let mut motion = Self {
             rows: vec![],
+            stretches: vec![],
             time: vec![],
             q: vec![],
             velocity: vec![],
@@ -43,22 +51,54 @@ impl Motion {
             qd: vec![],
             moved: vec![],
         };
-        for row in 1..log.rows() {
+        for stretch in examined(log.rows()) {
+            let first = motion.rows();
+            motion.follow(log, joint, half_width_s, stretch);
+            motion.stretches.push(first..motion.rows());
+        }
+        motion
+    }
+
+    /// Adds a stretch of the log.
+    fn follow(&mut self, log: &Log, joint: Joint, half_width_s: f64, stretch: Range<usize>) {
+        for row in stretch.filter(|row| *row > 0) {
             let fit = |values: &[f64]| local_cubic(&log.time, values, row, half_width_s);
             let (Some(q), Some(tau)) = (fit(&log.q[joint]), fit(&log.tau[joint])) else {
                 continue;
             };
-            motion.rows.push(row);
-            motion.time.push(log.time[row]);
-            motion.q.push(q.value);
-            motion.velocity.push(q.slope);
-            motion.acceleration.push(q.curvature);
-            motion.tau.push(tau.value);
-            motion.tau_logged.push(log.tau[joint][row]);
-            motion.qd.push(log.qd[joint][row]);
-            motion.moved.push(log.q[joint][row] - log.q[joint][row - 1]);
+            self.rows.push(row);
+            self.time.push(log.time[row]);
+            self.q.push(q.value);
+            self.velocity.push(q.slope);
+            self.acceleration.push(q.curvature);
+            self.tau.push(tau.value);
+            self.tau_logged.push(log.tau[joint][row]);
+            self.qd.push(log.qd[joint][row]);
+            self.moved.push(log.q[joint][row] - log.q[joint][row - 1]);
         }
-        motion
+    }
+
+    /// The motion with all of it that is of the angle at this many times its size.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let mut scaled = self.clone();
+        let of_angle = [
+            &mut scaled.q,
+            &mut scaled.velocity,
+            &mut scaled.acceleration,
+            &mut scaled.qd,
+            &mut scaled.moved,
+        ];
+        let values = of_angle.into_iter().flatten();
+        values.for_each(|value| *value *= factor);
+        scaled
+    }
+
+    /// One of its columns at a uniform step \[s\], stretch after stretch.
+    pub fn resampled(&self, values: &[f64], step_s: f64) -> Vec<f64> {
+        let stretches = self.stretches.iter().cloned();
+        let of_stretch =
+            |rows: Range<usize>| resample(&self.time[rows.clone()], &values[rows], step_s);
+        stretches.flat_map(of_stretch).collect()
     }
 
     /// Number of rows.

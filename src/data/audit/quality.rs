@@ -21,6 +21,9 @@ pub struct Audit {
     pub log: String,
     /// Number of rows.
     pub rows: usize,
+    /// Rows that tell what channels look like and how joints move: all, or of a long log as many as say the same, in stretches
+    /// that are spread evenly over it.
+    pub examined_rows: usize,
     /// Time from the first to the last row \[s\].
     pub duration_s: f64,
     /// Median time between neighbouring rows \[s\].

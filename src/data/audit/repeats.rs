@@ -2,6 +2,7 @@ use super::quality::{Audit, Finding, Severity};
 use super::table::short;
 use crate::data::log::Log;
 use crate::data::smooth::resampled;
+use crate::data::statistics::deviation;
 
 /// Logs repeat each other whose angles differ by less than this share of their motion, root mean square: what a controller
 /// leaves that follows the same reference twice.
@@ -18,9 +19,12 @@ const WHOLE: f64 = 0.8;
 pub fn tell_repeats<'l>(logs: impl IntoIterator<Item = &'l Log>, audits: &mut [Audit]) {
     let mut before: Vec<&Log> = Vec::new();
     for (log, audit) in logs.into_iter().zip(audits) {
-        let differs = |other: &&Log| Some((other.name(), difference(log, other)?));
-        let mut alike = before.iter().filter_map(differs);
-        if let Some((name, share)) = alike.find(|(_, share)| *share < SAME) {
+        let moves = motion(log);
+        let mut alike = before
+            .iter()
+            .filter_map(|other| Some((other, difference(log, moves, other)?)));
+        if let Some((other, share)) = alike.next() {
+            let name = other.name();
             audit.add(finding(&name, share));
             audit.repeats = Some(name);
         }
@@ -43,9 +47,15 @@ fn finding(name: &str, share: f64) -> Finding {
     Finding::new(Severity::Warning, text)
 }
 
-/// Difference of the angles of two logs, each in the time since its start, as a share of their motion; `None` where they
-/// differ in joints or in length, or nothing moves.
-fn difference(a: &Log, b: &Log) -> Option<f64> {
+/// Mean square of a log's angles about their means, of all joints together.
+fn motion(log: &Log) -> f64 {
+    let of_joint = |q: &Vec<f64>| deviation(q).powi(2);
+    log.q.iter().map(of_joint).sum()
+}
+
+/// Difference of the angles of two logs, each in the time since its start, as a share of the motion of the first, whose mean
+/// square is `moves`. `None` where it is no repetition: they differ by more, in joints or in length, or nothing moves.
+fn difference(a: &Log, moves: f64, b: &Log) -> Option<f64> {
     let (shorter, longer) = (
         a.duration().min(b.duration()),
         a.duration().max(b.duration()),
@@ -53,23 +63,23 @@ fn difference(a: &Log, b: &Log) -> Option<f64> {
     if a.joints() != b.joints() || a.rows() < 2 || b.rows() < 2 || shorter < WHOLE * longer {
         return None;
     }
-    let since_start = a.time.iter().map(|time| time - a.time[0]);
-    let common = since_start.take_while(|time| *time <= shorter);
-    let times: Vec<f64> = common.map(|time| b.time[0] + time).collect();
-    let (mut differs, mut moves) = (0.0, 0.0);
+    let since_start = |time: &f64| time - a.time[0];
+    let common = a.time.partition_point(|time| since_start(time) <= shorter);
+    let most = SAME.powi(2) * moves * common as f64;
+    let mut differs = 0.0;
     for (a_q, b_q) in a.q.iter().zip(&b.q) {
-        let other = resampled(&times, &b.time, b_q);
-        let differences: Vec<f64> = a_q.iter().zip(&other).map(|(a, b)| a - b).collect();
-        let middle = a_q.iter().sum::<f64>() / a_q.len() as f64;
-        let motion: Vec<f64> = a_q.iter().map(|q| q - middle).collect();
-        differs += mean_square(&differences);
-        moves += mean_square(&motion);
+        let times = a.time[..common]
+            .iter()
+            .map(|time| b.time[0] + since_start(time));
+        for (a, b) in a_q.iter().zip(resampled(times, &b.time, b_q)) {
+            differs += (a - b).powi(2);
+            // Of many logs most are told apart by their first rows.
+            if differs >= most {
+                return None;
+            }
+        }
     }
-    (moves > 0.0).then(|| (differs / moves).sqrt())
-}
-
-fn mean_square(numbers: &[f64]) -> f64 {
-    numbers.iter().map(|x| x * x).sum::<f64>() / numbers.len() as f64
+    Some(SAME * (differs / most).sqrt())
 }
 
 #[cfg(test)]

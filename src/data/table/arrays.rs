@@ -1,7 +1,9 @@
 //! Columns of numbers in memory: what readers of binary formats make.
 
-use super::Table;
+use std::mem;
+
 use super::npy::Array;
+use super::{Numbers, Numeric, Table};
 use crate::data::error::{CellFault, LogError, Place};
 
 /// Columns, those that are shorter than others with empty cells at their ends.
@@ -59,27 +61,41 @@ impl Table for Arrays {
         Place::Arrays
     }
 
-    fn rows(&self) -> usize {
-        self.columns.iter().map(Vec::len).max().unwrap_or(0)
+    fn numbers(&mut self, wanted: &[usize]) -> Result<Numbers, LogError> {
+        let rows = self.columns.iter().map(Vec::len).max().unwrap_or(0);
+        let column = |(asked, index): (usize, &usize)| {
+            let is_asked_again = wanted[asked + 1..].contains(index);
+            let values = match is_asked_again {
+                true => self.columns[*index].clone(),
+                false => mem::take(&mut self.columns[*index]),
+            };
+            Numeric::of(values, rows)
+        };
+        Ok(Numbers {
+            rows,
+            columns: wanted.iter().enumerate().map(column).collect(),
+            ragged: None,
+        })
     }
 
-    fn check(&self) -> Result<(), LogError> {
-        Ok(())
-    }
-
-    fn number(&self, row: usize, column: usize) -> Result<f64, CellFault> {
-        let value = self.columns[column].get(row).ok_or(CellFault::Empty)?;
-        match value.is_finite() {
-            true => Ok(*value),
-            false => Err(CellFault::NotFinite(value.to_string())),
-        }
-    }
-
-    fn place(&self, row: usize) -> Place {
-        Place::Row(row + 1)
+    fn place(&self, row: usize) -> Result<Place, LogError> {
+        Ok(Place::Row(row + 1))
     }
 
     fn notes(&self) -> &[String] {
         &self.notes
+    }
+}
+
+impl Numeric {
+    /// A column of a table of so many rows.
+    fn of(mut values: Vec<f64>, rows: usize) -> Self {
+        let bad = values.iter().position(|value| !value.is_finite());
+        let fault = match bad {
+            Some(row) => Some(CellFault::NotFinite(values[row].to_string())),
+            None => (values.len() < rows).then_some(CellFault::Empty),
+        };
+        values.truncate(bad.unwrap_or(rows));
+        Self { values, fault }
     }
 }

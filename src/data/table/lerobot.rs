@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::arrays::Arrays;
-use super::parquet::{columns, lists};
+use super::parquet::{List, lists};
 use crate::data::error::LogError;
 use crate::files::read_saved;
 
@@ -66,10 +66,10 @@ impl Episode {
     /// # Errors
     /// A data set that cannot be read, no such episode, and several where none is named.
     pub fn read(&self) -> Result<Arrays, LogError> {
-        let (frames, info) = (self.frames()?, self.info()?);
-        let of = |name: &str| {
-            let rows = frames.get(name).map_or(&[][..], Vec::as_slice);
-            columns(rows, name, &self.path)
+        let (mut frames, info) = (self.frames()?, self.info()?);
+        let mut of = |name: &str| {
+            let list = frames.remove(name);
+            list.map_or(Ok(Vec::new()), |list| list.columns(&self.path))
         };
         let mut table = Arrays::default();
         for time in of(TIME)? {
@@ -84,19 +84,25 @@ impl Episode {
     }
 
     /// The rows of the episode, by column.
-    fn frames(&self) -> Result<BTreeMap<String, Vec<Vec<f64>>>, LogError> {
+    fn frames(&self) -> Result<BTreeMap<String, List>, LogError> {
         let is_wanted = |name: &str| [STATE.0, ACTION.0, EPISODE, TIME].contains(&name);
-        let mut frames: BTreeMap<String, Vec<Vec<f64>>> = BTreeMap::new();
+        let mut frames: BTreeMap<String, List> = BTreeMap::new();
         for file in self.files().map_err(|why| self.unreadable(why))? {
             for list in lists(&file, is_wanted)? {
-                frames.entry(list.name).or_default().extend(list.rows);
+                match frames.get_mut(&list.name) {
+                    Some(before) => before.extend(&list),
+                    None => {
+                        frames.insert(list.name.clone(), list);
+                    }
+                }
             }
         }
-        let episodes = frames.remove(EPISODE).unwrap_or_default().concat();
-        let episode = self.number(&episodes)?;
-        for rows in frames.values_mut() {
+        let episodes = frames.remove(EPISODE);
+        let episodes = episodes.as_ref().map_or(&[][..], List::numbers);
+        let episode = self.number(episodes)?;
+        for list in frames.values_mut() {
             let mut of_rows = episodes.iter();
-            rows.retain(|_| of_rows.next() == Some(&episode));
+            list.retain(|| of_rows.next() == Some(&episode));
         }
         Ok(frames)
     }

@@ -35,7 +35,7 @@ fn table(bytes: &[u8]) -> Result<Arrays, String> {
         return Err("its numbers are not in little-endian order".to_owned());
     }
     let mut table = Arrays::default();
-    let mut unpacking = Unpacking::of(bytes.len());
+    let mut unpacking = Unpacking::of(bytes.len() as u64);
     while !rest.is_empty() {
         let (element, behind) = element(rest).ok_or_else(cut_off)?;
         match element.kind {

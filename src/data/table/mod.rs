@@ -10,20 +10,16 @@ mod npz;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod recording;
+mod source;
 mod unpack;
 
-use std::fs::File;
-use std::io::{self, Read, Seek};
 use std::path::Path;
-
-use flate2::read::MultiGzDecoder;
 
 pub(super) use self::arrays::Arrays;
 pub(super) use self::csv::Csv;
-use self::unpack::Unpacking;
+pub(super) use self::source::Source;
 use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
-use crate::files;
 use crate::guarded::guarded;
 use crate::limits::LOG_COLUMNS;
 
@@ -34,18 +30,17 @@ pub(super) trait Table {
     /// Where the names are.
     fn head(&self) -> Place;
 
-    fn rows(&self) -> usize;
-
+    /// The numbers of these columns, in this order. They may be asked for once.
+    ///
     /// # Errors
-    /// Rows that are not whole.
-    fn check(&self) -> Result<(), LogError>;
-
-    /// # Errors
-    /// A cell that is no finite number.
-    fn number(&self, row: usize, column: usize) -> Result<f64, CellFault>;
+    /// A file that cannot be read to its end.
+    fn numbers(&mut self, wanted: &[usize]) -> Result<Numbers, LogError>;
 
     /// Where a row is.
-    fn place(&self, row: usize) -> Place;
+    ///
+    /// # Errors
+    /// A file that cannot be read once more.
+    fn place(&self, row: usize) -> Result<Place, LogError>;
 
     /// What a reader of the log should know about how the file was read.
     fn notes(&self) -> &[String] {
@@ -53,8 +48,46 @@ pub(super) trait Table {
     }
 }
 
+/// Columns of a table, each as far as it can be read.
+pub(super) struct Numbers {
+    /// Of the table.
+    pub rows: usize,
+    pub columns: Vec<Numeric>,
+    /// The first row that has not one cell for each name, and how many it has. Nothing is read from there on.
+    pub ragged: Option<(usize, usize)>,
+}
+
+/// The numbers of a column up to its first cell that is no finite number, and what is wrong with that.
+#[derive(Clone, Default)]
+pub(super) struct Numeric {
+    pub values: Vec<f64>,
+    pub fault: Option<CellFault>,
+}
+
+impl Numbers {
+    /// No row of so many columns.
+    fn of(columns: usize) -> Self {
+        Self {
+            rows: 0,
+            columns: vec![Numeric::default(); columns],
+            ragged: None,
+        }
+    }
+}
+
+impl Numeric {
+    /// Reads one more cell.
+    fn push(&mut self, number: impl FnOnce() -> Result<f64, CellFault>) {
+        if self.fault.is_none() {
+            match number() {
+                Ok(number) => self.values.push(number),
+                Err(fault) => self.fault = Some(fault),
+            }
+        }
+    }
+}
+
 /// How files of each format but text begin.
-const GZIP: &[u8] = b"\x1f\x8b";
 const ZIP: &[u8] = b"PK\x03\x04";
 const PARQUET: &[u8] = b"PAR1";
 
@@ -119,61 +152,33 @@ fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
     if path.is_dir() {
         return Ok(Box::new(recording::of_folder(path, columns)?));
     }
-    let unreadable = |why| LogError::Open {
-        path: path.to_owned(),
-        why,
-    };
-    let mut file = files::open(path).map_err(unreadable)?;
-    let begin = begin(&mut file).map_err(unreadable)?;
+    let source = Source::of(path)?;
+    let begin = source.begin()?;
     // Recordings may be larger than the memory: they are not read at once.
-    if begin.starts_with(recording::SQLITE) {
-        return Ok(Box::new(recording::of_bag(path, columns)?));
+    if !source.is_packed() {
+        if begin.starts_with(recording::SQLITE) {
+            return Ok(Box::new(recording::of_bag(path, columns)?));
+        }
+        if begin.starts_with(recording::MCAP) {
+            return Ok(Box::new(recording::of_mcap(path, columns)?));
+        }
+        #[cfg(feature = "parquet")]
+        if begin.starts_with(PARQUET) {
+            return Ok(Box::new(parquet::read(path)?));
+        }
     }
-    if begin.starts_with(recording::MCAP) {
-        return Ok(Box::new(recording::of_mcap(path, columns)?));
-    }
-    #[cfg(feature = "parquet")]
-    if begin.starts_with(PARQUET) {
-        return Ok(Box::new(parquet::read(path)?));
-    }
-    let bytes = unpacked(path, contents(file).map_err(unreadable)?)?;
-    if let Some((_, remedy)) = FOREIGN.iter().find(|(begin, _)| bytes.starts_with(begin)) {
+    if let Some((_, remedy)) = FOREIGN.iter().find(|(known, _)| begin.starts_with(known)) {
         return Err(LogError::Form {
             path: path.to_owned(),
             fault: (*remedy).to_owned(),
         });
     }
-    if bytes.starts_with(ZIP) {
-        return Ok(Box::new(npz::read(path, bytes)?));
+    if begin.starts_with(ZIP) {
+        let archive = source.archive()?;
+        return Ok(Box::new(npz::read(path, archive)?));
     }
-    if bytes.starts_with(mat::MAGIC) {
-        return Ok(Box::new(mat::read(path, &bytes)?));
+    if begin.starts_with(mat::MAGIC) {
+        return Ok(Box::new(mat::read(path, &source.contents()?)?));
     }
-    Ok(Box::new(Csv::of_bytes(path, &bytes)?))
-}
-
-/// The first bytes of a file.
-fn begin(file: &mut File) -> io::Result<Vec<u8>> {
-    let mut begin = Vec::new();
-    file.take(16).read_to_end(&mut begin)?;
-    file.rewind()?;
-    Ok(begin)
-}
-
-fn contents(mut file: File) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    file.read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// The bytes of a file, unpacked where they are packed with gzip.
-fn unpacked(path: &Path, bytes: Vec<u8>) -> Result<Vec<u8>, LogError> {
-    if !bytes.starts_with(GZIP) {
-        return Ok(bytes);
-    }
-    let unpacked = Unpacking::of(bytes.len()).read(MultiGzDecoder::new(bytes.as_slice()));
-    unpacked.map_err(|why| LogError::Form {
-        path: path.to_owned(),
-        fault: format!("cannot be unpacked: {why}"),
-    })
+    Ok(Box::new(Csv::of(path, source)?))
 }

@@ -1,6 +1,6 @@
 //! NumPy's `.npz`: arrays of numbers by name, a column each; of `q`, `qd` and the like with a row a sample, a column a joint.
 
-use std::io::Cursor;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use zip::ZipArchive;
@@ -12,17 +12,18 @@ use crate::data::error::LogError;
 
 /// # Errors
 /// An archive that cannot be read, and arrays of what is neither number nor text.
-pub(super) fn read(path: &Path, bytes: Vec<u8>) -> Result<Arrays, LogError> {
-    table(bytes).map_err(|fault| LogError::Form {
+pub(super) fn read(path: &Path, archive: impl Read + Seek) -> Result<Arrays, LogError> {
+    table(archive).map_err(|fault| LogError::Form {
         path: path.to_owned(),
         fault,
     })
 }
 
-fn table(bytes: Vec<u8>) -> Result<Arrays, String> {
+fn table(mut archive: impl Read + Seek) -> Result<Arrays, String> {
     let mut table = Arrays::default();
-    let mut unpacking = Unpacking::of(bytes.len());
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|why| broken(&why))?;
+    let packed = archive.seek(SeekFrom::End(0));
+    let mut unpacking = Unpacking::of(packed.map_err(|why| broken(&why))?);
+    let mut archive = ZipArchive::new(archive).map_err(|why| broken(&why))?;
     for index in 0..archive.len() {
         let mut file = archive.by_index(index).map_err(|why| broken(&why))?;
         let name = file.name().map_err(|why| broken(&why))?.into_owned();

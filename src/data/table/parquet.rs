@@ -19,13 +19,9 @@ use crate::limits::unpacked_bytes;
 /// A file that is damaged, or whose lists are of different lengths.
 pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
     let mut table = Arrays::default();
-    for List {
-        name,
-        is_list,
-        rows,
-    } in lists(path, |_| true)?
-    {
-        for (number, column) in (1..).zip(columns(&rows, &name, path)?) {
+    for list in lists(path, |_| true)? {
+        let (name, is_list) = (list.name.clone(), list.is_list);
+        for (number, column) in (1..).zip(list.columns(path)?) {
             match is_list {
                 true => table.add(format!("{name}{number}"), column),
                 false => table.add(&name, column),
@@ -39,31 +35,76 @@ pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
 pub(super) struct List {
     pub name: String,
     pub is_list: bool,
-    pub rows: Vec<Vec<f64>>,
+    /// Row after row, and how many each has.
+    numbers: Vec<f64>,
+    lengths: Vec<u32>,
 }
 
-/// The columns that the rows of a list make.
-///
-/// # Errors
-/// A list of another length than the first.
-pub(super) fn columns(
-    rows: &[Vec<f64>],
-    name: &str,
-    path: &Path,
-) -> Result<Vec<Vec<f64>>, LogError> {
-    let width = rows.first().map_or(0, Vec::len);
-    if let Some(row) = rows.iter().position(|row| row.len() != width) {
-        let found = rows[row].len();
-        return Err(LogError::Form {
-            path: path.to_owned(),
-            fault: format!(
-                "row {} of {name:?} has {found} number(s) where the first has {width}; write as many in all",
-                row + 1
-            ),
-        });
+impl List {
+    /// The columns that the rows make.
+    ///
+    /// # Errors
+    /// A row of another length than the first.
+    pub fn columns(self, path: &Path) -> Result<Vec<Vec<f64>>, LogError> {
+        let width = self.lengths.first().copied().unwrap_or(0);
+        if let Some(row) = self.lengths.iter().position(|length| *length != width) {
+            return Err(LogError::Form {
+                path: path.to_owned(),
+                fault: format!(
+                    "row {} of {:?} has {} number(s) where the first has {width}; write as many in all",
+                    row + 1,
+                    self.name,
+                    self.lengths[row]
+                ),
+            });
+        }
+        let width = width as usize;
+        let column = |k: usize| {
+            self.numbers
+                .iter()
+                .skip(k)
+                .step_by(width)
+                .copied()
+                .collect()
+        };
+        Ok(match width {
+            1 => vec![self.numbers],
+            _ => (0..width).map(column).collect(),
+        })
     }
-    let column = |k: usize| rows.iter().map(|row| row[k]).collect();
-    Ok((0..width).map(column).collect())
+
+    /// All numbers, row after row.
+    pub fn numbers(&self) -> &[f64] {
+        &self.numbers
+    }
+
+    /// Adds the rows of another file.
+    pub fn extend(&mut self, other: &Self) {
+        self.numbers.extend(&other.numbers);
+        self.lengths.extend(&other.lengths);
+    }
+
+    /// Those rows of which this says so, in their order.
+    pub fn retain(&mut self, mut is_kept: impl FnMut() -> bool) {
+        let (mut numbers, mut lengths) = (Vec::new(), Vec::new());
+        let mut rest = self.numbers.as_slice();
+        for length in &self.lengths {
+            let (row, behind) = rest.split_at(*length as usize);
+            rest = behind;
+            if is_kept() {
+                numbers.extend_from_slice(row);
+                lengths.push(*length);
+            }
+        }
+        (self.numbers, self.lengths) = (numbers, lengths);
+    }
+
+    fn push(&mut self, field: &Field) {
+        let before = self.numbers.len();
+        add_numbers(field, &mut self.numbers);
+        let added = u32::try_from(self.numbers.len() - before);
+        self.lengths.push(added.unwrap_or(u32::MAX));
+    }
 }
 
 /// The columns of numbers whose names are wanted.
@@ -106,20 +147,24 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
                 lists.push(List {
                     name: name.clone(),
                     is_list: matches!(field, Field::ListInternal(_)),
-                    rows: Vec::new(),
+                    numbers: Vec::new(),
+                    lengths: Vec::new(),
                 });
             }
-            lists[index].rows.push(numbers(field));
+            lists[index].push(field);
         }
     }
     Ok(lists)
 }
 
 /// The numbers of a cell; none where it holds something else.
-fn numbers(field: &Field) -> Vec<f64> {
+fn add_numbers(field: &Field, numbers: &mut Vec<f64>) {
     match field {
-        Field::ListInternal(list) => list.elements().iter().flat_map(numbers).collect(),
-        field => number(field).into_iter().collect(),
+        Field::ListInternal(list) => {
+            let elements = list.elements().iter();
+            elements.for_each(|element| add_numbers(element, numbers));
+        }
+        field => numbers.extend(number(field)),
     }
 }
 

@@ -11,9 +11,9 @@ pub(super) struct Unpacking {
 
 impl Unpacking {
     /// Of a file, or a part of one, of so many bytes.
-    pub fn of(packed: usize) -> Self {
+    pub fn of(packed: u64) -> Self {
         Self {
-            left: unpacked_bytes(packed as u64),
+            left: unpacked_bytes(packed),
         }
     }
 
@@ -23,10 +23,38 @@ impl Unpacking {
     /// A part that is damaged, or that holds more than may still be unpacked.
     pub fn read(&mut self, part: impl Read) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        part.take(self.left + 1).read_to_end(&mut bytes)?;
-        let left = self.left.checked_sub(bytes.len() as u64);
-        self.left = left.ok_or_else(too_large)?;
+        let mut part = Unpacked {
+            part,
+            left: self.left,
+        };
+        part.read_to_end(&mut bytes)?;
+        self.left = part.left;
         Ok(bytes)
+    }
+}
+
+/// What a packed part holds, as it is unpacked. More than may be unpacked is an error where it is reached.
+pub(super) struct Unpacked<R> {
+    part: R,
+    left: u64,
+}
+
+impl<R> Unpacked<R> {
+    /// Of a file of so many bytes.
+    pub fn of(packed: u64, part: R) -> Self {
+        Self {
+            part,
+            left: unpacked_bytes(packed),
+        }
+    }
+}
+
+impl<R: Read> Read for Unpacked<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let read = self.part.read(bytes)?;
+        let left = self.left.checked_sub(read as u64);
+        self.left = left.ok_or_else(too_large)?;
+        Ok(read)
     }
 }
 

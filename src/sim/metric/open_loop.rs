@@ -27,13 +27,14 @@ const SHORTEST_STEP_S: f64 = PREDICTION_S / 64.0;
 pub fn assess(dynamics: &Dynamics, logs: &[Log], horizons_s: &[f64]) -> Assessment {
     let models: Vec<Cow<'_, Dynamics>> = logs.iter().map(|log| dynamics.in_log(log)).collect();
     let mut step_s = PREDICTION_S;
-    let mut coarse = run(&models, logs, horizons_s, step_s);
+    let mut coarse = summarise(&run(&models, logs, horizons_s, step_s), dynamics.joints);
     loop {
-        let fine = run(&models, logs, horizons_s, step_s / 2.0);
-        let step_error = largest_change(&coarse, &fine, dynamics.joints);
+        let horizons = run(&models, logs, horizons_s, step_s / 2.0);
+        let fine = summarise(&horizons, dynamics.joints);
+        let step_error = largest_change(&coarse, &fine);
         if step_error <= STEP_TOLERANCE || step_s / 2.0 <= SHORTEST_STEP_S {
             return Assessment {
-                horizons: fine,
+                horizons,
                 step_s: step_s / 2.0,
                 step_error,
             };
@@ -158,8 +159,9 @@ struct Replay<'l> {
     model: Point<'l>,
     commands: Commands<'l>,
     log: &'l Log,
-    /// The log with the rig's own angles, from which start states are estimated.
+    /// The log with the rig's own angles, from which start states are estimated, and half of the time that tells them, s.
     own: Cow<'l, Log>,
+    half_width_s: f64,
 }
 
 impl<'l> Replay<'l> {
@@ -167,6 +169,7 @@ impl<'l> Replay<'l> {
         Self {
             commands: Commands::of_log(&model, log),
             own: with_own_angles(&model, log),
+            half_width_s: half_width_s(log.median_step()),
             model,
             log,
         }
@@ -200,9 +203,10 @@ impl<'l> Replay<'l> {
 
     /// The states (`[2n][lane]`) at the windows' starts; empty lanes repeat the last.
     fn starts(&self, pack: &[Window]) -> Vec<Row<f64, LANES>> {
-        let half_width = half_width_s(self.log.median_step());
         let starts: Vec<Vec<f64>> = (pack.iter())
-            .map(|w| initial_state(&self.own, half_width, w.first).expect("windows() checks this"))
+            .map(|w| {
+                initial_state(&self.own, self.half_width_s, w.first).expect("windows() checks this")
+            })
             .collect();
         (0..self.model.dynamics.states())
             .map(|k| Row(std::array::from_fn(|l| starts[l.min(pack.len() - 1)][k])))
@@ -253,16 +257,20 @@ impl WindowError {
     }
 }
 
-fn largest_change(coarse: &[OpenLoop], fine: &[OpenLoop], joints: usize) -> f64 {
-    let numbers = |all: &[OpenLoop]| -> Vec<f64> {
-        let summary: Summary = summarise(all, joints);
-        [
-            summary.position_rmse,
-            summary.position_median,
-            summary.velocity_rmse,
-        ]
-        .concat()
-        .concat()
+fn largest_change(coarse: &Summary, fine: &Summary) -> f64 {
+    let numbers = |summary: &Summary| -> Vec<f64> {
+        let Summary {
+            position_rmse,
+            position_median,
+            velocity_rmse,
+            ..
+        } = summary;
+        [position_rmse, position_median, velocity_rmse]
+            .into_iter()
+            .flatten()
+            .flatten()
+            .copied()
+            .collect()
     };
     let pairs = numbers(coarse).into_iter().zip(numbers(fine));
     pairs

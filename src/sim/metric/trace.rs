@@ -18,13 +18,14 @@ pub fn traces(dynamics: &Dynamics, log: &Log, horizon_s: f64) -> Vec<Trace> {
     let model = Point::from(&*in_log);
     let commands = Commands::of_log(&model, log);
     let own = with_own_angles(&model, log);
+    let half_width = half_width_s(log.median_step());
     // The windows of the error overlap by half: every second one covers the log once.
     super::open_loop::windows(0, log, horizon_s)
         .iter()
         .step_by(2)
         .map(|window| {
-            let start = initial_state(&own, half_width_s(log.median_step()), window.first)
-                .expect("windows() checks this");
+            let start =
+                initial_state(&own, half_width, window.first).expect("windows() checks this");
             trace(&model, &commands, log, window, &start)
         })
         .collect()

@@ -28,15 +28,16 @@ impl Found {
             short(log.time[first])
         );
         let severity = spike_severity(rows.len(), log.rows()).min(Warning);
-        let spans: Vec<Interval> = rows.iter().map(|&row| around(log, row)).collect();
+        let step_s = log.median_step();
+        let spans = rows.iter().map(|&row| around(log, step_s, row));
+        let spans: Vec<Interval> = spans.collect();
         let finding = Finding::new(severity, text).of(joint.joint);
         self.0.push(finding.within(&log.name(), &spans));
     }
 }
 
 /// From halfway to the row before, in digits that a log has, until no start state of a window is estimated from the row.
-fn around(log: &Log, row: usize) -> Interval {
-    let step_s = log.median_step();
+fn around(log: &Log, step_s: f64, row: usize) -> Interval {
     let digits = (1e3 / step_s).log10().ceil().clamp(0.0, 9.0);
     let rounded = |t: f64| (t * 10.0_f64.powf(digits)).round() / 10.0_f64.powf(digits);
     Interval {

@@ -43,6 +43,7 @@ const FEW_DROPPED: f64 = 0.001;
 pub(super) fn of(audit: &Audit, log: &Log) -> Vec<Finding> {
     let mut found = Found(vec![]);
     found.about_reading(log);
+    found.about_examined(audit);
     found.about_sampling(audit, log);
     found.about_amount_of_motion(audit);
     let by_torque = log.driven_by == Quantity::Torque;
@@ -116,6 +117,23 @@ impl Found {
             self.add(
                 Info,
                 format!("left out, but audited: {}", intervals.join(", ")),
+            );
+        }
+    }
+
+    fn about_examined(&mut self, audit: &Audit) {
+        let Audit {
+            rows,
+            examined_rows,
+            ..
+        } = audit;
+        if examined_rows < rows {
+            self.add(
+                Info,
+                format!(
+                    "noise, resolution and motion are told by {examined_rows} of the {rows} rows, in stretches that are spread evenly \
+                     over the log; ranges, jumps, gaps and missing rows by all"
+                ),
             );
         }
     }

@@ -23,7 +23,7 @@ impl Found {
         self.about_velocity_scale(name, number, check);
         self.about_velocity_lag(name, number, check, audit.median_step_s);
         if joint.qd.spikes > 0 {
-            self.about_velocity_spikes(joint, check, audit.rows);
+            self.about_velocity_spikes(joint, check, audit.examined_rows);
         }
     }
 

@@ -1,10 +1,11 @@
 //! Angles and velocities both in degrees, told by gravity: it goes with the sine of the angle.
 
-use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use super::{Change, Misread, Reading, To};
 use crate::data::audit::JointAudit;
+use crate::data::audit::motion::Motion;
+use crate::data::audit::response::response;
 use crate::data::audit::table::short;
 use crate::data::column::Quantity;
 
@@ -13,6 +14,9 @@ const MUCH_BETTER: f64 = 1.0 / 3.0;
 
 /// and to explain this much more of their variance: the last percent is a matter of friction, not of gravity.
 const MUCH_MORE: f64 = 0.1;
+
+/// rad
+const DEGREE: f64 = TAU / 360.0;
 
 pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
     // A motion of fewer degrees than a turn has radians is too small to tell them apart.
@@ -35,16 +39,13 @@ pub(super) fn misread(reading: &Reading<'_>) -> Vec<Misread> {
             change(Quantity::Velocity, "deg/s"),
         ]
     };
-    let mut log = reading.log.clone().into_owned();
-    reading
-        .joints
-        .iter()
-        .flat_map(changes)
-        .for_each(|change| change.apply(&mut log));
-    let in_degrees = Reading::of(Cow::Owned(log));
+    let in_degrees = reading.motions.iter().map(|motion| motion.scaled(DEGREE));
+    let in_degrees: Vec<Motion> = in_degrees.collect();
+    let fast = reading.joints.iter();
+    let fast: Vec<f64> = fast.map(|joint| DEGREE * joint.fast_rad_s).collect();
     let left = |audit: &JointAudit| {
-        let left = |joints: &[JointAudit]| Some(1.0 - joints[audit.joint].response?.explained);
-        Some((left(&reading.joints)?, left(&in_degrees.joints)?))
+        let in_degrees = response(&in_degrees, &fast, audit.joint)?;
+        Some((1.0 - audit.response?.explained, 1.0 - in_degrees.explained))
     };
     let is_beyond_doubt = |audit: &&JointAudit| {
         let is_much_better = |(radians, degrees): (f64, f64)| {

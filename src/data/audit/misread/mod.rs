@@ -11,7 +11,8 @@ mod velocity;
 
 use std::borrow::Cow;
 
-use super::joint::{JointAudit, audit_joints};
+use super::joint::{JointAudit, with_motions};
+use super::motion::Motion;
 use super::quality::{Finding, Remedy, Severity};
 use super::table::short;
 use crate::data::column::{Quantity, unwrap};
@@ -23,6 +24,8 @@ use crate::data::{Joint, Log};
 pub(super) struct Reading<'l> {
     pub log: Cow<'l, Log>,
     pub joints: Vec<JointAudit>,
+    /// The motions that accelerations are compared with torques in.
+    motions: Vec<Motion>,
 }
 
 /// One way in which columns are misread.
@@ -103,9 +106,11 @@ pub fn reversed_driving(
 
 impl<'l> Reading<'l> {
     fn of(log: Cow<'l, Log>) -> Self {
+        let (joints, motions) = with_motions(&log);
         Self {
-            joints: audit_joints(&log),
             log,
+            joints,
+            motions,
         }
     }
 }

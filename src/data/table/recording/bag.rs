@@ -58,5 +58,5 @@ fn add_messages(
 }
 
 fn unpacked(message: &[u8]) -> io::Result<Vec<u8>> {
-    Unpacking::of(message.len()).read(zstd::Decoder::new(message)?)
+    Unpacking::of(message.len() as u64).read(zstd::Decoder::new(message)?)
 }

@@ -1,0 +1,157 @@
+//! The rows of a log that tell what its channels look like and how its joints move.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use super::local_cubic::half_width_s;
+use super::log::{Interval, Log};
+
+/// So many rows are examined at most, four minutes at 1 kHz: more say the same and cost many times the memory of the log.
+const EXAMINED_ROWS: usize = 1 << 18;
+
+/// Those of a longer log are taken in so many stretches, which are spread evenly from its first row to its last.
+const STRETCHES: usize = 8;
+
+/// The stretches of a log of so many rows that are examined: one, but of long logs.
+pub(super) fn examined(rows: usize) -> Vec<Range<usize>> {
+    if rows <= EXAMINED_ROWS {
+        return std::iter::once(0..rows).collect();
+    }
+    let length = EXAMINED_ROWS / STRETCHES;
+    let first = |stretch: usize| stretch * (rows - length) / (STRETCHES - 1);
+    let rows_of = |stretch: usize| first(stretch)..first(stretch) + length;
+    (0..STRETCHES).map(rows_of).collect()
+}
+
+/// The values at the rows that are examined, one stretch after the other.
+pub(super) fn at_examined(values: &[f64]) -> Cow<'_, [f64]> {
+    match &*examined(values.len()) {
+        [all] => Cow::Borrowed(&values[all.clone()]),
+        stretches => {
+            let stretches = stretches.iter().map(|rows| &values[rows.clone()]);
+            Cow::Owned(stretches.collect::<Vec<_>>().concat())
+        }
+    }
+}
+
+impl Log {
+    /// Whether it has more rows than are examined.
+    pub fn is_long(&self) -> bool {
+        self.rows() > EXAMINED_ROWS
+    }
+
+    /// What fits read of a long log: the stretches of it that are examined, without what is near their ends, and a note that says
+    /// so. Fits to all rows take hours and tell no more.
+    #[must_use]
+    pub fn shortened(self) -> Log {
+        if !self.is_long() {
+            return self;
+        }
+        let stretches = examined(self.rows());
+        let half_width_s = half_width_s(self.median_step());
+        let mut log = self.at(&stretches);
+        log.leave_out
+            .extend(stretches.windows(2).map(|pair| Interval {
+                start_s: self.time[pair[0].end - 1] - half_width_s,
+                end_s: self.time[pair[1].start] + half_width_s,
+            }));
+        log.notes.push(format!(
+            "fits and errors are of {EXAMINED_ROWS} of its {} rows, in {STRETCHES} stretches that are spread evenly over it",
+            self.rows()
+        ));
+        log
+    }
+
+    /// The rows of these ranges, which rise.
+    pub(crate) fn at(&self, ranges: &[Range<usize>]) -> Log {
+        let cut = |column: &Vec<f64>| {
+            let parts = ranges.iter().map(|rows| &column[rows.clone()]);
+            parts.collect::<Vec<_>>().concat()
+        };
+        let begins = ranges.iter().scan(0, |sum, rows| {
+            let begin = *sum;
+            *sum += rows.len();
+            Some((rows, begin))
+        });
+        let begins: Vec<(&Range<usize>, usize)> = begins.collect();
+        let marked = |all: &Vec<usize>| {
+            let place = |row: &usize| {
+                let (rows, begin) = begins.iter().find(|(rows, _)| rows.contains(row))?;
+                Some(begin + row - rows.start)
+            };
+            all.iter().filter_map(place).collect()
+        };
+        Log {
+            path: self.path.clone(),
+            time: cut(&self.time),
+            q: self.q.iter().map(cut).collect(),
+            qd: self.qd.iter().map(cut).collect(),
+            tau: self.tau.iter().map(cut).collect(),
+            driven_by: self.driven_by,
+            masked: self.masked.iter().map(marked).collect(),
+            filled: marked(&self.filled),
+            leave_out: self.leave_out.clone(),
+            notes: self.notes.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_log_is_examined_from_its_first_row_to_its_last() {
+        assert_eq!(examined(500), [0..500]);
+        assert_eq!(examined(EXAMINED_ROWS).len(), 1);
+        for rows in [EXAMINED_ROWS + 1, 10_000_000] {
+            let stretches = examined(rows);
+            assert_eq!(
+                (stretches[0].start, stretches[STRETCHES - 1].end),
+                (0, rows)
+            );
+            assert!(
+                stretches
+                    .windows(2)
+                    .all(|pair| pair[0].end <= pair[1].start)
+            );
+            let values: Vec<f64> = (0..rows).map(|row| row as f64).collect();
+            assert_eq!(at_examined(&values).len(), EXAMINED_ROWS);
+        }
+    }
+
+    #[test]
+    fn what_fits_read_of_a_long_log_is_left_where_it_was() {
+        let mut log = Log::empty(1);
+        log.time = (0..400_000).map(|row| 0.001 * f64::from(row)).collect();
+        for channel in [&mut log.q[0], &mut log.qd[0], &mut log.tau[0]] {
+            channel.clone_from(&log.time);
+        }
+        log.masked[0] = vec![0, 40_000, 399_999];
+        let short = log.at(&examined(400_000)).shortened();
+        assert!(short.leave_out.is_empty() && short.notes.is_empty());
+        let of_log = log.shortened();
+        assert_eq!(
+            (of_log.rows(), of_log.leave_out.len()),
+            (EXAMINED_ROWS, STRETCHES - 1)
+        );
+        assert!(of_log.time == of_log.q[0] && of_log.time == of_log.tau[0]);
+        let is_row = |row: &usize| of_log.time[*row] == 0.0 || of_log.time[*row] == 399.999;
+        assert!(of_log.masked[0].len() == 2 && of_log.masked[0].iter().all(is_row));
+        assert!(of_log.notes[0].contains("262144 of its 400000 rows"));
+        // No window begins or ends at the end of a stretch that the log does not end with.
+        let ends = of_log
+            .time
+            .windows(2)
+            .filter(|pair| pair[1] - pair[0] > 0.01);
+        let is_left_out = |time: f64| {
+            of_log
+                .leave_out
+                .iter()
+                .any(|span| span.start_s < time && time < span.end_s)
+        };
+        assert!(
+            ends.clone().count() == STRETCHES - 1 && ends.flatten().all(|time| is_left_out(*time))
+        );
+    }
+}

@@ -1,0 +1,147 @@
+//! Large logs, many logs and many effects in one call.
+//!
+//! `RESIDYN_LOAD_MB` is the size of the large log, 100 unless told otherwise; a folder for temporary files of such a size is
+//! named by `TMPDIR`. `benches/load` measures speeds.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::support::{answers, residyn_within, succeeds, text};
+
+/// A row of a pendulum with gravity and friction, driven by two sines from an own time on, in the digits of a logger that
+/// prints doubles.
+fn row(time: f64) -> [f64; 3] {
+    let angle = 0.9 * (1.1 * time).sin() + 0.2 * (3.7 * time).sin();
+    let speed = 0.99 * (1.1 * time).cos() + 0.74 * (3.7 * time).cos();
+    let acceleration = -1.089 * (1.1 * time).sin() - 2.738 * (3.7 * time).sin();
+    // The built-in pendulum with its declared values, and dry friction of 0.16 N m.
+    let torque = (acceleration - 15.0 * angle.sin()) / 3.0 + 0.16 * (speed / 0.01).tanh();
+    [angle, speed, torque]
+}
+
+/// Writes a log of so many rows that begins at a time of the motion.
+fn write_log(path: &Path, rows: usize, step_s: f64, start_s: f64) {
+    let mut out = BufWriter::new(File::create(path).unwrap());
+    writeln!(out, "time,q1,qd1,tau1").unwrap();
+    for k in 0..rows {
+        let time = step_s * k as f64;
+        let [angle, speed, torque] = row(start_s + time);
+        writeln!(out, "{time:.3},{angle:.16},{speed:.16},{torque:.16}").unwrap();
+    }
+    out.flush().unwrap();
+}
+
+fn megabytes() -> u64 {
+    let told = std::env::var("RESIDYN_LOAD_MB").ok();
+    told.map_or(100, |told| {
+        told.parse().expect("RESIDYN_LOAD_MB is a number")
+    })
+}
+
+#[test]
+#[cfg(unix)]
+fn a_large_log_is_read_and_audited_in_twice_its_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.csv");
+    write_log(&path, 15_000 * megabytes() as usize, 0.001, 0.0);
+    let kilobytes = fs::metadata(&path).unwrap().len() / 1000;
+    let output = residyn_within(2 * kilobytes, &["audit", "--json", text(&path)]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+    let audit: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(audit[0]["rows"], 15_000 * megabytes());
+    assert_eq!(audit[0]["examined_rows"], 262_144);
+}
+
+/// A folder with so many logs of a second, each of another part of the motion.
+fn logs(count: usize) -> (TempDir, Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let log = |k: usize| {
+        let path = folder.path().join(format!("run{k}.csv"));
+        write_log(&path, 120, 0.01, 7.3 * k as f64);
+        text(&path).to_owned()
+    };
+    let logs = (0..count).map(log).collect();
+    (folder, logs)
+}
+
+#[test]
+#[cfg(unix)]
+fn a_thousand_logs_are_taken_in_one_call() {
+    let (folder, logs) = logs(1000);
+    let logs: Vec<&str> = logs.iter().map(String::as_str).collect();
+    let out = folder.path().join("report");
+    let within = |arguments: &[&str]| -> Value {
+        let all = [arguments, &logs].concat();
+        let output = residyn_within(400_000, &all);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(matches!(output.status.code(), Some(0 | 1)), "{errors}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let audits = within(&["audit", "--json"]);
+    assert_eq!(audits.as_array().unwrap().len(), 1000);
+    let evaluated = within(&["evaluate", "--json", "--model", "pendulum", "--test"]);
+    assert!(evaluated["windows"][0].as_u64().unwrap() > 10_000);
+    let closed = [
+        "closeloop",
+        "--json",
+        "--model",
+        "pendulum",
+        "--out",
+        text(&out),
+        "--train",
+    ];
+    let report = within(&closed);
+    let effects = report["effects"].as_array().unwrap().iter();
+    let names: Vec<&Value> = effects.map(|effect| &effect["name"]).collect();
+    assert!(
+        names.contains(&&Value::from("coulomb_friction")),
+        "{names:?}"
+    );
+    let told = fs::read_to_string(out.join("report.md")).unwrap();
+    assert!(
+        told.contains("sensor_offset has a value for each log"),
+        "{told}"
+    );
+}
+
+/// Writes so many effects of a joint: no two of the same shape.
+fn write_effects(folder: &Path, count: usize) {
+    for k in 0..count {
+        let wave = 0.2 + 0.05 * k as f64;
+        let file = format!(
+            "[effect]\nname = \"wave{k}\"\nabout = \"a torque of wave number {wave:.2}\"\nforce = \"-a * sin({wave:.2} * q)\"\n\n\
+             [parameters]\na = {{ unit = \"N m\", typical = 0.1, about = \"size\" }}\n"
+        );
+        fs::write(folder.join(format!("wave{k}.toml")), file).unwrap();
+    }
+}
+
+#[test]
+fn a_library_of_five_hundred_effects_is_searched_within_its_time() {
+    let (folder, logs) = logs(12);
+    let effects = folder.path().join("effects");
+    fs::create_dir(&effects).unwrap();
+    write_effects(&effects, 500);
+    let listed = succeeds(&["list", "effects", "--effects", text(&effects)]);
+    assert_eq!(listed.matches("wave number").count(), 500);
+    let out = folder.path().join("report");
+    let logs: Vec<&str> = logs.iter().map(String::as_str).collect();
+    let closed = [
+        "closeloop",
+        "--json",
+        "--model",
+        "pendulum",
+        "--budget",
+        "5s",
+        "--effects",
+        text(&effects),
+    ];
+    let json = answers(&[&closed[..], &["--out", text(&out), "--train"], &logs].concat());
+    let report: Value = serde_json::from_str(&json).unwrap();
+    assert!(report["effects"].is_array());
+}
