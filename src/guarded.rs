@@ -1,22 +1,45 @@
 //! Calls of crates that take a damaged file for granted, and panic.
 
 use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
+use std::sync::Once;
 
 thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `work` returns; `None` where it panics.
+/// What `work` returns; `None` where it panics, of which nothing is printed.
 pub fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
+    static SILENT: Once = Once::new();
+    SILENT.call_once(be_silent);
     let before = GUARDED.replace(true);
     let done = catch_unwind(AssertUnwindSafe(work));
     GUARDED.set(before);
     done.ok()
 }
 
-/// Whether a panic of this thread is caught, and no defect.
-#[cfg(feature = "cli")]
-pub fn is_guarded() -> bool {
-    GUARDED.get()
+/// From now on, panics that are caught here do not reach the hook of the program.
+fn be_silent() {
+    let told = take_hook();
+    set_hook(Box::new(move |panic| {
+        if !GUARDED.get() {
+            told(panic);
+        }
+    }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::guarded;
+
+    #[test]
+    fn a_panic_is_caught_and_others_after_it_are_not() {
+        assert_eq!(guarded(|| 1), Some(1));
+        assert!(guarded(|| panic!("as it must")).is_none());
+        assert!(std::panic::catch_unwind(|| panic!("as it must")).is_err());
+        assert_eq!(
+            guarded(|| guarded(|| panic!("as it must")).is_none()),
+            Some(true)
+        );
+    }
 }

@@ -10,11 +10,17 @@ pub const MODEL_TERMS: usize = 20_000;
 pub const MODEL_NAMES: usize = 1000;
 /// Joints of a model: enough for every serial arm, and a limit that catches slips such as `joints = 100`.
 pub const JOINTS: usize = 12;
-/// Elements of a robot description within each other.
+/// Elements of a robot description within each other, and joints behind each other.
 pub const XML_DEPTH: usize = 200;
+/// Attributes of an element of a robot description, and names of namespaces of all of it.
+pub const XML_ATTRIBUTES: usize = 200;
+/// Elements of which one has its defaults in a robot description.
+pub const XML_DEFAULTS: usize = 200;
 
 /// A text that people write: a model, an effect, a recipe, a robot description \[bytes\].
 pub const TEXT_BYTES: u64 = 4 << 20;
+/// Values, keys, tables and lines of a text in TOML: each takes hundreds of bytes when it is read.
+pub const TOML_PARTS: usize = 100_000;
 /// A file that the program wrote itself: weights, a description of a model, a report \[bytes\].
 pub const SAVED_BYTES: u64 = 1 << 30;
 /// A message of a recording, or a part of one that is packed as a whole \[bytes\].
@@ -32,18 +38,20 @@ pub const LOG_TIME: f64 = 1e12;
 pub const LOG_STEPS: f64 = 2e7;
 /// or this many times its rows.
 pub const PAUSED_STEPS: f64 = 10.0;
+/// Joints of a log that is read without a model.
+pub const LOG_JOINTS: usize = 100;
 /// Columns of a log.
 pub const LOG_COLUMNS: usize = 4096;
 /// Rows of a log that is simulated or, unlike text, may take less than a byte a row.
 pub const LOG_ROWS: usize = 10_000_000;
+/// Time that a log of a simulated rig, or one of a bench, lasts \[s\].
+pub const SIMULATED_S: f64 = 1e5;
 /// Steps of all trajectories that are sampled for a training.
 pub const SAMPLED_STEPS: usize = 10_000_000;
 /// Neurons of a layer.
 pub const LAYER_WIDTH: usize = 4096;
 /// Weights and biases of a network.
 pub const NETWORK_NUMBERS: usize = 20_000_000;
-/// How long a rig is simulated for one log \[s\].
-pub const SIMULATED: f64 = 1e5;
 /// Substeps of an integrator's step.
 pub const SUBSTEPS: u32 = 1000;
 /// Steps over which an exported model remembers commands.
@@ -60,6 +68,8 @@ pub const ITERATIONS: usize = 10_000;
 pub const EPOCHS: usize = 100_000_000;
 /// Logs, models, episodes or simulations that one command makes.
 pub const RUNS: usize = 100_000;
+/// Cells of a bench.
+pub const CELLS: usize = 20_000;
 
 /// How many median steps a log of so many rows may last.
 pub fn log_steps(rows: usize) -> f64 {

@@ -653,3 +653,87 @@ fn a_singular_mass_matrix_is_called_so_where_it_stops_the_motion() {
         &["the mass matrix is singular"],
     );
 }
+
+#[test]
+#[cfg(unix)]
+fn descriptions_of_very_many_parts_are_refused_at_once() {
+    let scratch = Scratch::new();
+    let new = |name: &str, text: String| {
+        refuses_in_little_memory(&["new", "--from-urdf", &scratch.file(name, text)])
+    };
+    let links: String = (0..9000)
+        .map(|k| format!("<link name=\"l{k}\"/>\n"))
+        .collect();
+    let robot = |parent_of: fn(usize) -> usize| {
+        let joint = |k: usize| {
+            let (parent, child) = (parent_of(k), k + 1);
+            format!(
+                "<joint name=\"j{k}\" type=\"fixed\"><parent link=\"l{parent}\"/><child link=\"l{child}\"/></joint>\n"
+            )
+        };
+        let joints: String = (0..8999).map(joint).collect();
+        format!("<robot name=\"r\">\n{links}{joints}</robot>")
+    };
+    says(
+        &new("chain.urdf", robot(|k| k)),
+        &["chain.urdf, line 203", "behind more than 200 joints"],
+    );
+    says(&new("star.urdf", robot(|_| 0)), &["no joint that moves"]);
+    for name in ["a", "xmlns:a"] {
+        let attributes: String = (0..100_000).map(|k| format!(" {name}{k}=\"b\"")).collect();
+        says(
+            &new("wide.urdf", format!("<robot{attributes}/>")),
+            &["wide.urdf, line 1, column 1", "more than 200 attributes"],
+        );
+    }
+    let defaults = "<geom size='1'/>".repeat(201);
+    let text = format!("<mujoco><default>{defaults}</default></mujoco>");
+    let file = scratch.file("defaults.xml", text);
+    says(
+        &refuses_in_little_memory(&["new", "--from-mjcf", &file]),
+        &["defaults.xml, line 1", "more than 200 elements"],
+    );
+}
+
+#[test]
+fn a_bag_whose_messages_are_computed_is_refused() {
+    let scratch = Scratch::new();
+    let path = scratch.path("run.db3");
+    let endless =
+        "CREATE TABLE topics (id INTEGER, name TEXT, type TEXT, serialization_format TEXT);
+        INSERT INTO topics VALUES (1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr');
+        CREATE VIEW messages AS WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n)
+            SELECT 1 AS topic_id, k AS timestamp, x'00' AS data FROM n;";
+    let bag = rusqlite::Connection::open(&path).unwrap();
+    bag.execute_batch(endless).unwrap();
+    says(
+        &refuses(&["audit", text(&path)]),
+        &["run.db3", "`messages` is no plain table"],
+    );
+}
+
+#[test]
+fn a_log_of_more_joints_than_any_rig_has_is_refused() {
+    let scratch = Scratch::new();
+    let header: String = (1..=101).map(|joint| format!(",q{joint}")).collect();
+    let row = ",0".repeat(101);
+    let log = format!("time{header}\n0{row}\n1{row}\n");
+    let told = refuses(&["audit", &scratch.file("log.csv", log)]);
+    says(&told, &["log.csv", "has 101 joints; at most 100 are read"]);
+}
+
+#[test]
+fn a_simulation_that_would_not_end_is_refused() {
+    let scratch = Scratch::new();
+    let plant = fs::read_to_string(config("plants/pendulum-sim.toml")).unwrap();
+    let line = |key: &str| plant.lines().find(|line| line.starts_with(key)).unwrap();
+    let slow = plant
+        .replace(line("rate_hz"), "rate_hz = 1e-6")
+        .replace(line("duration_s"), "duration_s = 1e7");
+    let plant = scratch.file("slow.toml", slow);
+    let told = refuses(&["simulate", "--plant", &plant, "--out", &scratch.out()]);
+    says(
+        &told,
+        &["slow.toml", "`recording.duration_s` is at most 1e5 s"],
+    );
+}

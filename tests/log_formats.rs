@@ -36,7 +36,7 @@ fn read(path: &Path) -> Result<Log, String> {
 }
 
 /// A folder with `run.csv` and the same in every format, made once; `None` without the clients that write them.
-fn formats() -> Option<&'static Path> {
+pub fn formats() -> Option<&'static Path> {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();

@@ -12,7 +12,7 @@ use crate::log_formats::trajectory;
 use crate::support::measured;
 
 /// A folder with `run.csv` and recordings of it, made once; `None` without the clients that write them.
-fn recordings() -> Option<&'static Path> {
+pub fn recordings() -> Option<&'static Path> {
     static FOLDER: OnceLock<TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();

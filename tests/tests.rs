@@ -22,6 +22,7 @@ mod export_c;
 mod export_fmu;
 mod front_door;
 mod functions;
+mod fuzz;
 mod gradients;
 mod guide;
 mod hard;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::sensors::Flaws;
-use crate::limits::{LOG_ROWS, RUNS, check_readings};
+use crate::limits::{LOG_ROWS, RUNS, SIMULATED_S, check_readings};
 
 /// How a rig is driven; one number a joint in every list.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -68,16 +68,31 @@ impl Condition {
             && self.quantum >= 0.0
             && !self.drive.is_empty()
             && self.logs >= 2
-            && self.logs <= RUNS
-            && (10.0..LOG_ROWS as f64).contains(&(self.seconds * self.rate_hz));
+            && self.seconds * self.rate_hz >= 10.0;
+        let needs = "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, two logs, ten rows";
         if !sound {
-            return Err(format!(
-                "needs a `loop`, `rate_hz` above zero, `noise` and `quantum` not below, from two to {RUNS} logs, and from ten to \
-                 {LOG_ROWS} rows in each"
-            ));
+            return Err(needs.to_owned());
+        }
+        check_rows(self.rate_hz, &[self.seconds])?;
+        if self.logs > RUNS {
+            return Err(format!("`logs` is at most {RUNS}, found {}", self.logs));
         }
         check_readings("noise and quantum", [self.noise, self.quantum])?;
         self.flaws.check()
+    }
+}
+
+/// Whether logs of so many seconds can be taken at this rate.
+///
+/// # Errors
+/// Logs that are longer than any.
+pub(super) fn check_rows(rate_hz: f64, seconds: &[f64]) -> Result<(), String> {
+    let fits = |seconds: &f64| *seconds <= SIMULATED_S && seconds * rate_hz <= LOG_ROWS as f64;
+    match seconds.iter().find(|seconds| !fits(*seconds)) {
+        None => Ok(()),
+        Some(seconds) => Err(format!(
+            "a log is at most {SIMULATED_S:e} s long and has at most {LOG_ROWS} rows, {rate_hz:?} Hz for {seconds:?} s are more"
+        )),
     }
 }
 

@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::arm::{Arm, Lacks};
-use super::condition::{Condition, Driving};
+use super::condition::{Condition, Driving, check_rows};
 use super::draw::{Recipe, Rules};
 use super::hidden::Hidden;
 use super::machine::Machine;
 use super::mechanics::Mechanics;
 use crate::files::{beside_or_named, from_toml, read_text};
-use crate::limits::check_readings;
+use crate::limits::{CELLS, check_readings};
 
 /// Why a grid cannot be run.
 #[derive(Debug, Error)]
@@ -237,7 +237,39 @@ impl File {
             let checked = condition.check();
             checked.map_err(|message| format!("conditions.{name}: {message}"))?;
         }
-        Ok(())
+        for arms in &self.arms {
+            let checked = check_rows(arms.rate_hz, &arms.seconds);
+            checked.map_err(|message| format!("arms {}: {message}", arms.name))?;
+        }
+        match self.count() {
+            0..=CELLS => Ok(()),
+            found => Err(format!("has {found} cells; at most {CELLS} are run")),
+        }
+    }
+
+    /// How many cells it has.
+    fn count(&self) -> usize {
+        let all = |counts: &[usize]| {
+            counts
+                .iter()
+                .fold(1, |all: usize, n| all.saturating_mul(*n))
+        };
+        let series = self.series.iter().map(|series| {
+            all(&[
+                series.effects.len(),
+                series.conditions.len(),
+                series.seeds.len(),
+            ])
+        });
+        let draws = self.draws.iter().map(|draws| numbered(draws.numbers));
+        let arms = self
+            .arms
+            .iter()
+            .map(|arms| all(&[arms.lacks.len(), numbered(arms.numbers)]));
+        series
+            .chain(draws)
+            .chain(arms)
+            .fold(0, usize::saturating_add)
     }
 
     fn expand(&self, series: &Series, path: &Path) -> Result<Vec<Cell>, String> {
@@ -304,6 +336,14 @@ impl File {
             })
             .collect()
     }
+}
+
+/// How many numbers there are from the first to the last.
+fn numbered([first, last]: [u64; 2]) -> usize {
+    let after = last
+        .checked_sub(first)
+        .map_or(0, |more| more.saturating_add(1));
+    usize::try_from(after).unwrap_or(usize::MAX)
 }
 
 impl Arms {
@@ -430,6 +470,22 @@ mod tests {
             "grid.toml: the cell p/coulomb_friction@1(F_c=0.1)/base/1 occurs twice"
         );
         assert!(wrong("torque = [1.0]", "torque = [1.0, 2.0]").contains("1 numbers, one a joint"));
+        assert!(wrong("seconds = 20", "seconds = 1e9").contains("at most 1e5 s long"));
+        assert!(wrong("logs = 4", "logs = 1000000000").contains("`logs` is at most 100000"));
         assert!(wrong("logs = 4", "logs = 1").contains("conditions.base: needs"));
+    }
+
+    #[test]
+    fn a_grid_of_more_cells_than_are_run_is_refused_before_they_are_made() {
+        let draws =
+            "[[draws]]\nname = \"d\"\ngroup = \"single\"\nplants = [\"p\"]\neffects = [1]\n";
+        for (numbers, found) in [
+            ("[0, 9223372036854775807]", "9223372036854775812"),
+            ("[1, 20001]", "20005"),
+        ] {
+            let told = message(&format!("{GRID}\n{draws}numbers = {numbers}\n"));
+            let expected = format!("has {found} cells; at most 20000 are run");
+            assert!(told.contains(&expected), "{told}");
+        }
     }
 }

@@ -12,7 +12,7 @@ use super::log::Log;
 use super::statistics::median;
 use super::table::{Table, open};
 use crate::expr::listed;
-use crate::limits::{LOG_TIME, is_reading, log_steps};
+use crate::limits::{LOG_JOINTS, LOG_TIME, is_reading, log_steps};
 
 impl Log {
     /// Reads one trajectory of a rig with `joints` joints from a file, or a folder, of any format that is read.
@@ -39,6 +39,7 @@ impl Log {
         let mut table = open(path, &Columns::default())?;
         let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
         let numbered = (1..).take_while(has).count();
+        check_joints(path, numbered.max(joints(table.names()).len()))?;
         let named = joints(table.names()).into_iter();
         let columns = Columns {
             joint_names: named.map(str::to_owned).collect(),
@@ -47,6 +48,19 @@ impl Log {
         // A header of no joint lacks the first.
         let count = numbered.max(columns.joint_names.len()).max(1);
         log(path, table.as_mut(), count, &columns)
+    }
+}
+
+/// Refuses more joints than are looked at without a model that chooses among them.
+fn check_joints(path: &Path, joints: usize) -> Result<(), LogError> {
+    match joints <= LOG_JOINTS {
+        true => Ok(()),
+        false => Err(LogError::Form {
+            path: path.to_owned(),
+            fault: format!(
+                "has {joints} joints; at most {LOG_JOINTS} are read: give a model that names its own under [columns]"
+            ),
+        }),
     }
 }
 

@@ -22,8 +22,8 @@ mod steps;
 mod unit;
 mod units;
 
-pub(crate) use error::listed;
 pub use error::{FormulaError, suggestion};
+pub(crate) use error::{listed, shortened};
 pub use eval::Tape;
 pub use graph::Graph;
 pub use latex::latex_name;

@@ -9,7 +9,7 @@ mod output;
 pub use hash::{content_hash, content_id, sha256, sha256_of};
 pub use input::{open, read_saved, read_text};
 pub use named::{beside, beside_or_named, text_or_embedded};
-pub use numbers::from_toml;
+pub use numbers::{check_parts, from_toml};
 pub use output::{
     OutputError, check_room, end_of_links, folder_of, move_contents, write_whole, write_with,
 };

@@ -2,11 +2,28 @@ use serde::de::{DeserializeOwned, Error as _};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
 
+use crate::limits::TOML_PARTS;
+
+/// Whether a TOML text has no more parts than are read: what separates them is counted, wherever it stands.
+///
+/// # Errors
+/// Too many, and the limit.
+pub fn check_parts(text: &str) -> Result<(), String> {
+    let parts = text.bytes().filter(|byte| b",=[{.\n".contains(byte));
+    match parts.count() <= TOML_PARTS {
+        true => Ok(()),
+        false => Err(format!(
+            "it has more than {TOML_PARTS} values, keys, tables and lines; take out what is not needed"
+        )),
+    }
+}
+
 /// What a TOML text says.
 ///
 /// # Errors
-/// A text that is no TOML or does not say a `T`, and a number in it that is not finite.
+/// A text that is no TOML, has too many parts or does not say a `T`, and a number in it that is not finite.
 pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, Error> {
+    check_parts(text).map_err(Error::custom)?;
     let said = toml::from_str(text)?;
     let table = DeTable::parse(text)?;
     match table.get_ref().values().find_map(not_finite) {
@@ -36,6 +53,17 @@ fn not_finite<'v, 't>(value: &'v Spanned<DeValue<'t>>) -> Option<&'v Spanned<DeV
 #[cfg(test)]
 mod tests {
     use super::from_toml;
+
+    #[test]
+    fn a_text_of_very_many_parts_is_refused() {
+        for part in [", 7", "\n", "[[a]]", "a.", "{a = "] {
+            let told = from_toml::<toml::Table>(&part.repeat(100_001)).unwrap_err();
+            assert!(
+                told.to_string().contains("more than 100000 values"),
+                "{told}"
+            );
+        }
+    }
 
     #[test]
     fn every_number_is_finite() {

@@ -1,5 +1,7 @@
 //! XML whose every error names file, line and column.
 
+mod crowd;
+
 use std::cell::RefCell;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,14 +10,14 @@ use roxmltree::{Document, Error, Node};
 
 use super::robot::element::Element;
 use crate::files::read_text;
-use crate::limits::XML_DEPTH;
 use crate::model::FileError;
 
 /// An XML file, and notes about it.
 pub(in crate::formats) struct Source<'x> {
     path: PathBuf,
     document: Document<'x>,
-    notes: RefCell<Vec<(u32, String)>>,
+    /// By their places, bytes.
+    notes: RefCell<Vec<(usize, String)>>,
 }
 
 /// The text of a file.
@@ -29,29 +31,16 @@ pub(in crate::formats) fn text(path: &Path) -> Result<String, FileError> {
 
 impl<'x> Source<'x> {
     pub fn new(path: &Path, text: &'x str) -> Result<Self, FileError> {
+        crowd::check(path, text)?;
         let document = Document::parse(text).map_err(|error| FileError {
             path: path.to_owned(),
             place: Some(place(&error, text)),
             message: format!("this is not valid XML: {error}"),
         })?;
-        let source = Self {
+        Ok(Self {
             path: path.to_owned(),
             document,
             notes: RefCell::default(),
-        };
-        source.check_depth()?;
-        Ok(source)
-    }
-
-    /// Readers of elements call themselves for those within.
-    fn check_depth(&self) -> Result<(), FileError> {
-        let mut level = vec![self.document_root()];
-        for _ in 0..XML_DEPTH {
-            level = level.into_iter().flat_map(elements).collect();
-        }
-        level.first().map_or(Ok(()), |node| {
-            let message = format!("lies within more than {XML_DEPTH} elements; flatten the file");
-            Err(self.error(*node, message))
         })
     }
 
@@ -62,18 +51,23 @@ impl<'x> Source<'x> {
 
     /// The same about what begins at that position, bytes.
     pub fn note_at(&self, at: usize, message: impl fmt::Display) {
-        let place = self.document.text_pos_at(at);
-        self.notes
-            .borrow_mut()
-            .push((place.row, message.to_string()));
+        self.notes.borrow_mut().push((at, message.to_string()));
     }
 
     /// All notes, in the order of the file.
     pub fn into_notes(self) -> Vec<String> {
         let mut notes = self.notes.into_inner();
         notes.sort();
-        notes.dedup();
-        notes
+        let (text, mut line, mut from) = (self.document.input_text(), 1, 0);
+        let placed = notes.into_iter().map(|(at, note)| {
+            line += text[from..at].matches('\n').count();
+            from = at;
+            (line, note)
+        });
+        let mut placed: Vec<(usize, String)> = placed.collect();
+        placed.sort();
+        placed.dedup();
+        placed
             .into_iter()
             .map(|(line, note)| format!("line {line}: {note}"))
             .collect()

@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::expr::{Formula, FormulaError, parse, suggestion};
-use crate::files::read_text;
+use crate::files::{check_parts, read_text};
 use crate::limits::{MODEL_NAMES, MODEL_TERMS};
 
 /// An error in a model or effect file.
@@ -72,6 +72,7 @@ impl Document {
     }
 
     pub fn parse(&self) -> Result<Section<'_>, FileError> {
+        check_parts(&self.text).map_err(|message| self.error(0, message))?;
         let table = DeTable::parse(&self.text).map_err(|error| {
             let at = error.span().map_or(0, |span| span.start);
             self.error(at, error.message())
@@ -148,6 +149,12 @@ impl<'a> Section<'a> {
     /// Every key, in the order of the file.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
         self.table.keys().map(|key| key.get_ref().as_ref())
+    }
+
+    /// Every key with the place of its value, bytes.
+    pub fn places(&self) -> impl Iterator<Item = (&str, usize)> {
+        let entries = self.table.iter();
+        entries.map(|(key, value)| (key.get_ref().as_ref(), value.span().start))
     }
 
     /// Every key with its table, in the order of the file.

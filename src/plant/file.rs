@@ -9,7 +9,7 @@ use super::Excitation;
 use crate::data::Joint;
 use crate::expr::suggestion;
 use crate::files::{beside_or_named, from_toml, text_or_embedded};
-use crate::limits::{LOG_ROWS, RUNS, SIMULATED, TONES, check_readings};
+use crate::limits::{LOG_ROWS, RUNS, SIMULATED_S, TONES, check_readings};
 use crate::model::{FileError, FittedEffect, Library, Model};
 
 /// Why a plant cannot be simulated.
@@ -225,9 +225,9 @@ impl Plant {
                  {duration:?} s do not"
             ));
         }
-        if duration > SIMULATED {
+        if duration > SIMULATED_S {
             return Err(format!(
-                "`recording.duration_s` is at most {SIMULATED:e}, found {duration:?}"
+                "`recording.duration_s` is at most {SIMULATED_S:e} s, found {duration:?}"
             ));
         }
         Ok(())
@@ -325,6 +325,5 @@ impl Plant {
 
 /// A plant file names a model; a model file has a system.
 fn is_plant(text: &str) -> bool {
-    text.parse::<toml::Table>()
-        .is_ok_and(|table| table.contains_key("model"))
+    from_toml::<toml::Table>(text).is_ok_and(|table| table.contains_key("model"))
 }

@@ -5,6 +5,7 @@ use std::mem;
 use super::npy::Array;
 use super::{Numbers, Numeric, Table};
 use crate::data::error::{CellFault, LogError, Place};
+use crate::limits::LOG_COLUMNS;
 
 /// Columns, those that are shorter than others with empty cells at their ends.
 #[derive(Debug, Default)]
@@ -25,30 +26,18 @@ impl Arrays {
     /// or holds texts, is left out, as columns are that nothing asks for.
     ///
     /// # Errors
-    /// An array that holds something else, or is cut off.
+    /// An array that holds something else, or is cut off; more columns than any log has.
     pub(super) fn add_array(&mut self, name: &str, array: &Array<'_>) -> Result<(), String> {
-        let (rows, columns) = match *array.shape.as_slice() {
-            [rows] => (rows, 1),
-            [rows, columns] => (rows, columns),
-            _ => return Ok(()),
-        };
-        if array.is_text() {
-            return Ok(());
-        }
-        let values = array.numbers(name)?;
-        // Without rows, any number of columns may be claimed.
-        for column in 0..columns.min(values.len()) {
-            let place = |row: usize| match array.by_columns {
-                true => column * rows + row,
-                false => row * columns + column,
-            };
-            let values = (0..rows).map(|row| values[place(row)]).collect();
+        for (number, column) in (1..).zip(array.columns(name)?) {
             match array.shape.len() {
-                1 => self.add(name, values),
-                _ => self.add(format!("{name}{}", column + 1), values),
+                1 => self.add(name, column),
+                _ => self.add(format!("{name}{number}"), column),
             }
         }
-        Ok(())
+        match self.names.len() > LOG_COLUMNS {
+            true => Err(format!("has more than {LOG_COLUMNS} columns")),
+            false => Ok(()),
+        }
     }
 }
 

@@ -3,6 +3,8 @@
 
 #![warn(clippy::indexing_slicing)]
 
+use crate::limits::LOG_COLUMNS;
+
 /// An array whose numbers are still to be read.
 pub(super) struct Array<'a> {
     /// `<f8`
@@ -43,13 +45,20 @@ impl<'a> Array<'a> {
     }
 
     /// Whether it holds texts.
-    pub fn is_text(&self) -> bool {
+    fn is_text(&self) -> bool {
         self.kind.starts_with("<U") || self.kind.starts_with("|S")
     }
 
-    /// In the order of the file. Objects are refused unread: to read them is to run the code that they name.
+    /// Its columns: one of a vector, of a matrix as many as it has, a row a sample; none of what is neither, or of texts. Objects
+    /// are refused unread: to read them is to run the code that they name.
+    ///
+    /// # Errors
+    /// An array that holds something else, has too many columns, or is cut off.
     #[allow(clippy::cast_precision_loss)] // integers of loggers are far below 2^53
-    pub fn numbers(&self, name: &str) -> Result<Vec<f64>, String> {
+    pub fn columns(&self, name: &str) -> Result<Vec<Vec<f64>>, String> {
+        if self.is_text() || !(1..=2).contains(&self.shape.len()) {
+            return Ok(Vec::new());
+        }
         match self.kind {
             "<f8" => self.each(name, f64::from_le_bytes),
             "<f4" => self.each(name, |bytes| f64::from(f32::from_le_bytes(bytes))),
@@ -74,17 +83,33 @@ impl<'a> Array<'a> {
         &self,
         name: &str,
         number: impl Fn([u8; SIZE]) -> f64,
-    ) -> Result<Vec<f64>, String> {
+    ) -> Result<Vec<Vec<f64>>, String> {
         let (cells, _) = self.numbers.as_chunks::<SIZE>();
-        let mut sizes = self.shape.iter();
-        let wanted = sizes.try_fold(1_usize, |size, n| size.checked_mul(*n));
-        match wanted == Some(cells.len()) {
-            true => Ok(cells.iter().map(|cell| number(*cell)).collect()),
-            false => Err(format!(
+        let (rows, columns) = (self.shape[0], self.shape.get(1).copied().unwrap_or(1));
+        if rows.checked_mul(columns) != Some(cells.len()) {
+            return Err(format!(
                 "array {name:?} is cut off at {} numbers; write the file again",
                 cells.len()
-            )),
+            ));
         }
+        if columns > LOG_COLUMNS {
+            return Err(format!(
+                "array {name:?} has {columns} columns; at most {LOG_COLUMNS} are read"
+            ));
+        }
+        let column = |column: usize| {
+            let (first, step) = match self.by_columns {
+                true => (column * rows, 1),
+                false => (column, columns),
+            };
+            let cells = cells.get(first..).unwrap_or_default().iter();
+            cells
+                .step_by(step)
+                .take(rows)
+                .map(|cell| number(*cell))
+                .collect()
+        };
+        Ok((0..columns).map(column).collect())
     }
 }
 

@@ -1,5 +1,6 @@
 //! Parquet: a column of numbers is a column; one of lists of numbers is as many as a list is long, `name1`, `name2` ..
 
+use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -123,14 +124,8 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
     let file = files::open(path)?;
     let most = unpacked_bytes(file.metadata()?.len());
     let reader = SerializedFileReader::new(file)?;
-    let described = reader.metadata().file_metadata();
-    let schema = described.schema().clone();
-    let cells = described
-        .num_rows()
-        .saturating_mul(schema.get_fields().len() as i64);
-    if cells.saturating_mul(8).cast_unsigned() > most {
-        return Err(too_large().into());
-    }
+    check_size(&reader, most)?;
+    let schema = reader.metadata().file_metadata().schema().clone();
     let fields = schema.get_fields().iter();
     let wanted: Vec<Arc<Type>> = fields
         .filter(|field| is_wanted(field.name()))
@@ -155,6 +150,35 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
         }
     }
     Ok(lists)
+}
+
+/// Whether the cells of all columns take no more than so many bytes: those of the pages, since a packed one may hold any number
+/// of them, whatever the description of the file says.
+fn check_size(reader: &SerializedFileReader<File>, most: u64) -> Result<(), ParquetError> {
+    let described = reader.metadata().file_metadata();
+    let columns = described.schema().get_fields().len() as u64;
+    let rows = described.num_rows().cast_unsigned();
+    check_cells(rows.saturating_mul(columns), most)?;
+    let mut of_pages = 0_u64;
+    for group in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(group)?;
+        for column in 0..group.num_columns() {
+            let mut pages = group.get_column_page_reader(column)?;
+            while let Some(page) = pages.peek_next_page()? {
+                of_pages = of_pages.saturating_add(page.num_levels.unwrap_or(0) as u64);
+                check_cells(of_pages, most)?;
+                pages.skip_next_page()?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_cells(cells: u64, most: u64) -> Result<(), ParquetError> {
+    match cells.saturating_mul(8) <= most {
+        true => Ok(()),
+        false => Err(too_large().into()),
+    }
 }
 
 /// The numbers of a cell; none where it holds something else.

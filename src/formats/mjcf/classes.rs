@@ -6,6 +6,7 @@ use roxmltree::Node;
 
 use crate::formats::robot::element::Element;
 use crate::formats::xml::{Source, elements, named};
+use crate::limits::XML_DEFAULTS;
 use crate::model::FileError;
 
 /// The default classes of a file.
@@ -17,7 +18,9 @@ pub(super) struct Classes<'s, 'x> {
 }
 
 impl<'s, 'x> Classes<'s, 'x> {
-    pub fn new(source: &'s Source<'x>, root: Node<'s, 'x>) -> Self {
+    /// # Errors
+    /// A class of more elements than are looked through at each element.
+    pub fn new(source: &'s Source<'x>, root: Node<'s, 'x>) -> Result<Self, FileError> {
         let mut new = Self {
             source,
             classes: HashMap::new(),
@@ -30,19 +33,31 @@ impl<'s, 'x> Classes<'s, 'x> {
             new.outermost = name;
         }
         for node in &top {
-            new.add_below(*node, &top);
+            new.add_below(*node, &top)?;
         }
-        new.classes.insert(new.outermost, top);
-        new
+        new.add(new.outermost, top)?;
+        Ok(new)
     }
 
-    fn add_below(&mut self, node: Node<'s, 'x>, behind: &[Node<'s, 'x>]) {
+    fn add_below(&mut self, node: Node<'s, 'x>, behind: &[Node<'s, 'x>]) -> Result<(), FileError> {
         for inner in named(node, "default") {
             let all = [&[inner], behind].concat();
-            self.add_below(inner, &all);
-            self.classes
-                .insert(inner.attribute("class").unwrap_or_default(), all);
+            self.add_below(inner, &all)?;
+            self.add(inner.attribute("class").unwrap_or_default(), all)?;
         }
+        Ok(())
+    }
+
+    fn add(&mut self, name: &'s str, defaults: Vec<Node<'s, 'x>>) -> Result<(), FileError> {
+        let all = || defaults.iter().flat_map(|default| elements(*default));
+        if let Some(node) = all().nth(XML_DEFAULTS) {
+            let message = format!(
+                "the default class `{name}` has more than {XML_DEFAULTS} elements, those around it included; give attributes where they hold"
+            );
+            return Err(self.source.error(node, message));
+        }
+        self.classes.insert(name, defaults);
+        Ok(())
     }
 
     /// The name of the class that applies where none is named.

@@ -93,7 +93,7 @@ impl<'s, 'x> Reader<'s, 'x> {
             )?;
         }
         compiler.note_others(COMPILER);
-        let classes = Classes::new(source, root);
+        let classes = Classes::new(source, root)?;
         let autolimits = compiler.text("autolimits") != Some("false");
         Ok(Self {
             angles: Angles::new(&compiler)?,

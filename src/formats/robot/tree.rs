@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::expr::suggestion;
+use crate::expr::{listed, suggestion};
 use crate::formats::xml::Source;
 use crate::limits::JOINTS;
 use crate::model::FileError;
@@ -60,7 +60,7 @@ impl Body {
     }
 
     /// Its name and those of all its descendants.
-    fn names(&self) -> Vec<&str> {
+    pub fn names(&self) -> Vec<&str> {
         let below = self.children.iter().flat_map(Self::names);
         std::iter::once(self.name.as_str()).chain(below).collect()
     }
@@ -120,10 +120,7 @@ fn path_to<'b>(source: &Source<'_>, base: &'b Body, tip: &str) -> Result<Vec<&'b
         let Some(next) = last.children.iter().find(|child| child.holds(tip)) else {
             let names = base.names();
             let near = suggestion(tip, names.iter().copied());
-            let message = format!(
-                "there is no body `{tip}`{near}; it has {}",
-                names.join(", ")
-            );
+            let message = format!("there is no body `{tip}`{near}; it has {}", listed(names));
             return Err(source.error_at(base.at, message));
         };
         path.push(next);

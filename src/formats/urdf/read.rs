@@ -1,13 +1,14 @@
 //! Reads a serial mechanism: links, each attached to its parent by one joint.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
-use roxmltree::Node;
+use roxmltree::{Node, NodeId};
 
 use crate::formats::robot::tree::{self, Body, Hinge, Mimics};
 use crate::formats::xml::{self, Source, named};
+use crate::limits::XML_DEPTH;
 use crate::model::FileError;
 use crate::model::chain::{Chain, Drivetrain, Inertia, Pose, turn};
 
@@ -25,7 +26,7 @@ pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
     let source = Source::new(path, &text)?;
     let file = Robot::new(&source)?;
     let base = file.base()?;
-    let tree = file.body(base, None)?;
+    let tree = file.body(base, None, &file.joints_below()?, 0)?;
     file.check_all_hang_on(&tree)?;
     let joints = tree::chain(&source, &tree, tip)?;
     file.note_the_rest();
@@ -45,12 +46,27 @@ pub fn read_urdf(path: &Path, tip: Option<&str>) -> Result<Chain, FileError> {
 pub(super) struct Robot<'s, 'x> {
     pub source: &'s Source<'x>,
     root: Node<'s, 'x>,
+    /// By their names, of several of one name the first.
+    links: HashMap<&'s str, Node<'s, 'x>>,
 }
+
+/// The joints that hang on each link, in the order of the file.
+type JointsBelow<'s, 'x> = HashMap<NodeId, Vec<Node<'s, 'x>>>;
 
 impl<'s, 'x> Robot<'s, 'x> {
     pub fn new(source: &'s Source<'x>) -> Result<Self, FileError> {
         let root = source.root("robot")?;
-        Ok(Self { source, root })
+        let mut links = HashMap::new();
+        for link in named(root, "link") {
+            if let Some(name) = link.attribute("name") {
+                links.entry(name).or_insert(link);
+            }
+        }
+        Ok(Self {
+            source,
+            root,
+            links,
+        })
     }
 
     /// The joint of a name.
@@ -97,27 +113,45 @@ impl<'s, 'x> Robot<'s, 'x> {
                 .error(joint, format!("<{which}> is missing in this joint")));
         };
         let name = self.source.element(end).required_text("link")?;
-        let mut links = named(self.root, "link");
-        links
-            .find(|link| link.attribute("name") == Some(name))
-            .ok_or_else(|| {
-                let message = format!("there is no link `{name}`; correct the name");
-                self.source.attribute_error(end, "link", message)
-            })
+        self.links.get(name).copied().ok_or_else(|| {
+            let message = format!("there is no link `{name}`; correct the name");
+            self.source.attribute_error(end, "link", message)
+        })
     }
 
-    /// A link with all its descendants, attached by `joint`.
-    fn body(&self, link: Node<'s, 'x>, joint: Option<Node<'s, 'x>>) -> Result<Body, FileError> {
+    fn joints_below(&self) -> Result<JointsBelow<'s, 'x>, FileError> {
+        let mut below = JointsBelow::new();
+        for joint in named(self.root, "joint") {
+            let parent = self.end(joint, "parent")?;
+            below.entry(parent.id()).or_default().push(joint);
+        }
+        Ok(below)
+    }
+
+    /// A link with all its descendants, attached by `joint`, behind so many others.
+    fn body(
+        &self,
+        link: Node<'s, 'x>,
+        joint: Option<Node<'s, 'x>>,
+        below: &JointsBelow<'s, 'x>,
+        depth: usize,
+    ) -> Result<Body, FileError> {
+        if depth > XML_DEPTH {
+            let message = format!(
+                "this link is behind more than {XML_DEPTH} joints; merge links that are fixed to each other"
+            );
+            return Err(self.source.error(link, message));
+        }
         let (pose, joints) = match joint {
             Some(joint) => (self.pose(joint)?, self.hinge(joint)?),
             None => (Pose::identity(), None),
         };
-        let mut children = Vec::new();
-        for joint in named(self.root, "joint") {
-            if self.end(joint, "parent")? == link {
-                children.push(self.body(self.end(joint, "child")?, Some(joint))?);
-            }
-        }
+        let joints_below = below.get(&link.id()).into_iter().flatten();
+        let children = joints_below.map(|joint| {
+            let child = self.end(*joint, "child")?;
+            self.body(child, Some(*joint), below, depth + 1)
+        });
+        let children = children.collect::<Result<_, _>>()?;
         Ok(Body {
             name: self.source.element(link).required_text("name")?.to_owned(),
             at: joint.unwrap_or(link).range().start,
@@ -130,7 +164,9 @@ impl<'s, 'x> Robot<'s, 'x> {
 
     /// Refuse links in a loop, which no path from the root reaches.
     fn check_all_hang_on(&self, tree: &Body) -> Result<(), FileError> {
-        let hangs = |link: &Node<'s, 'x>| tree.holds(link.attribute("name").unwrap_or_default());
+        let names: HashSet<&str> = tree.names().into_iter().collect();
+        let hangs =
+            |link: &Node<'s, 'x>| names.contains(link.attribute("name").unwrap_or_default());
         named(self.root, "link")
             .find(|link| !hangs(link))
             .map_or(Ok(()), |link| {

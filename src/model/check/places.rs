@@ -1,49 +1,60 @@
 //! Lines of the file that a model was read from.
 
+use std::collections::HashMap;
 use std::path::Path;
 
-use crate::model::reader::{Document, FileError, Section};
+use crate::model::reader::{Document, Section};
 use crate::model::system::Model;
 
-/// The file's text, read once more as tables.
+/// The file's text, and where in it things are, bytes.
 pub(super) struct Places {
     document: Document,
+    parameters: HashMap<String, usize>,
+    intermediates: HashMap<String, usize>,
+    effects: Vec<usize>,
 }
 
 impl Places {
     pub fn of(model: &Model) -> Self {
-        Self {
+        let mut places = Self {
             document: Document::new(Path::new(&model.name), &model.text),
+            parameters: HashMap::new(),
+            intermediates: HashMap::new(),
+            effects: Vec::new(),
+        };
+        if let Ok(top) = places.document.parse() {
+            let section = |key| top.section(key).ok().flatten();
+            let dynamics = section("dynamics");
+            let lets = dynamics.and_then(|dynamics| dynamics.section("let").ok().flatten());
+            let (parameters, lets) = (all(section("parameters")), all(lets));
+            let effects = top.sections("effect").unwrap_or_default();
+            let effects = effects.iter().map(|effect| effect.at).collect();
+            (places.parameters, places.intermediates, places.effects) = (parameters, lets, effects);
         }
+        places
     }
 
     /// The line of a byte of the text.
     pub fn line(&self, at: usize) -> Option<usize> {
-        line_of(&self.document.error(at, ""))
+        self.document.error(at, "").place.map(|(line, _)| line)
     }
 
     pub fn parameter(&self, name: &str) -> Option<usize> {
-        let top = self.document.parse().ok()?;
-        line_at(&top.section("parameters").ok()??, name)
+        self.line(*self.parameters.get(name)?)
     }
 
     pub fn intermediate(&self, name: &str) -> Option<usize> {
-        let top = self.document.parse().ok()?;
-        let dynamics = top.section("dynamics").ok()??;
-        line_at(&dynamics.section("let").ok()??, name)
+        self.line(*self.intermediates.get(name)?)
     }
 
     /// The k-th effect.
     pub fn effect(&self, k: usize) -> Option<usize> {
-        let effects = self.document.parse().ok()?.sections("effect").ok()?;
-        line_of(&effects.get(k)?.error(""))
+        self.line(*self.effects.get(k)?)
     }
 }
 
-fn line_at(section: &Section<'_>, key: &str) -> Option<usize> {
-    line_of(&section.error_at(key, ""))
-}
-
-fn line_of(error: &FileError) -> Option<usize> {
-    error.place.map(|(line, _)| line)
+/// The places of what a section has, by name.
+fn all(section: Option<Section<'_>>) -> HashMap<String, usize> {
+    let places = section.iter().flat_map(|section| section.places());
+    places.map(|(key, at)| (key.to_owned(), at)).collect()
 }

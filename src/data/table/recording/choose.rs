@@ -1,8 +1,11 @@
 //! Which topic of a recording is the rig's.
 
+use std::collections::{BTreeSet, HashMap};
+
 use super::{Recording, Series, Topic};
 use crate::data::columns::Columns;
 use crate::data::error::LogError;
+use crate::expr::{listed, shortened};
 
 impl Recording {
     /// The joint states of the topic that is named under `[columns]`, or of the one that has the joints.
@@ -50,24 +53,38 @@ impl Recording {
         ))
     }
 
-    /// All topics, their types, numbers of messages, and joints.
+    /// The topics, their types, numbers of messages, and joints; of many the first.
     fn told(&self) -> String {
+        let mut joints: HashMap<usize, BTreeSet<&str>> = HashMap::new();
+        for series in &self.series {
+            joints
+                .entry(series.topic)
+                .or_default()
+                .extend(series.joints());
+        }
         let told = |(index, topic): (usize, &Topic)| {
-            let of_topic = self.series.iter().filter(|series| series.topic == index);
-            let mut joints: Vec<&str> = of_topic.flat_map(Series::joints).collect();
-            joints.sort_unstable();
-            joints.dedup();
-            let joints = match joints.is_empty() {
-                true => String::new(),
-                false => format!(": {}", joints.join(", ")),
+            let joints = match joints.get(&index) {
+                Some(joints) if !joints.is_empty() => {
+                    format!(": {}", listed(joints.iter().copied()))
+                }
+                _ => String::new(),
             };
-            let (name, kind, messages) = (&topic.name, &topic.kind, topic.messages);
+            let [name, kind] = [&topic.name, &topic.kind].map(|text| shortened(text));
+            let messages = topic.messages;
             format!("{name} ({kind}, {messages} messages{joints})")
         };
-        let topics: Vec<String> = self.topics.iter().enumerate().map(told).collect();
+        let topics = self.topics.iter().enumerate().take(MOST_TOLD);
+        let topics: Vec<String> = topics.map(told).collect();
+        let more = match self.topics.len().saturating_sub(MOST_TOLD) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
         match topics.is_empty() {
             true => "no topics".to_owned(),
-            false => topics.join("; "),
+            false => topics.join("; ") + &more,
         }
     }
 }
+
+/// Topics that a message lists.
+const MOST_TOLD: usize = 20;

@@ -57,6 +57,9 @@ fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
             // What follows is an index.
             LinearReadEvent::Record { opcode, .. } if opcode == op::DATA_END => break,
             LinearReadEvent::Record { opcode, data } => {
+                if !is_whole(opcode, data) {
+                    return Err(McapError::UnexpectedEoc);
+                }
                 if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
                     add_record(parse_record(opcode, data)?, &mut channels, recording)?;
                 }
@@ -64,6 +67,35 @@ fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
         }
     }
     Ok(())
+}
+
+/// Whether the texts of a record are no longer than the record, for which memory is taken before they are read.
+fn is_whole(opcode: u8, data: &[u8]) -> bool {
+    let are_whole = |data, count| fields(data).take(count).all(|field| field.is_some());
+    match opcode {
+        // Behind its number: name, encoding, definition.
+        op::SCHEMA => data.get(2..).is_some_and(|data| are_whole(data, 3)),
+        // Behind the numbers of channel and schema: topic, encoding, texts about them.
+        op::CHANNEL => data.get(4..).is_some_and(|data| {
+            let about = fields(data).nth(2).flatten().unwrap_or_default();
+            are_whole(data, 3) && are_whole(about, usize::MAX)
+        }),
+        _ => true,
+    }
+}
+
+/// Fields that have their lengths before them; `None`, and nothing behind it, where one is longer than what is there.
+fn fields(mut data: &[u8]) -> impl Iterator<Item = Option<&[u8]>> {
+    std::iter::from_fn(move || {
+        if data.is_empty() {
+            return None;
+        }
+        let split = data
+            .split_first_chunk()
+            .and_then(|(length, rest)| rest.split_at_checked(u32::from_le_bytes(*length) as usize));
+        data = split.map_or(&[][..], |(_, rest)| rest);
+        Some(split.map(|(field, _)| field))
+    })
 }
 
 fn add_record(

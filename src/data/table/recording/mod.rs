@@ -7,6 +7,7 @@ mod mcap;
 mod message;
 mod rows;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use self::message::{CHANNELS, Decoder, Message};
@@ -52,7 +53,11 @@ pub(super) fn of_folder(path: &Path, columns: &Columns) -> Result<Arrays, LogErr
 struct Recording {
     path: PathBuf,
     topics: Vec<Topic>,
+    /// The indices of the topics by their names.
+    topic_by_name: HashMap<String, usize>,
     series: Vec<Series>,
+    /// The indices of the series by topic and names.
+    series_by_names: HashMap<(usize, Vec<String>), usize>,
     notes: Vec<String>,
 }
 
@@ -106,24 +111,28 @@ impl Recording {
         Self {
             path: path.to_owned(),
             topics: Vec::new(),
+            topic_by_name: HashMap::new(),
             series: Vec::new(),
+            series_by_names: HashMap::new(),
             notes: Vec::new(),
         }
     }
 
     /// The index of a topic, which begins here or in an earlier file.
     fn topic(&mut self, name: &str, kind: &str, encoding: &str) -> usize {
-        let known = self.topics.iter().position(|topic| topic.name == name);
-        known.unwrap_or_else(|| {
-            self.topics.push(Topic {
-                name: name.to_owned(),
-                kind: format!("{kind} in {encoding}"),
-                decoder: message::decoder(kind, encoding),
-                messages: 0,
-                fault: None,
-            });
-            self.topics.len() - 1
-        })
+        if let Some(known) = self.topic_by_name.get(name) {
+            return *known;
+        }
+        let topic = self.topics.len();
+        self.topic_by_name.insert(name.to_owned(), topic);
+        self.topics.push(Topic {
+            name: name.to_owned(),
+            kind: format!("{kind} in {encoding}"),
+            decoder: message::decoder(kind, encoding),
+            messages: 0,
+            fault: None,
+        });
+        topic
     }
 
     fn add(&mut self, topic: usize, logged_ns: i64, data: &[u8]) {
@@ -142,12 +151,11 @@ impl Recording {
     }
 
     fn sort_in(&mut self, topic: usize, logged_ns: i64, message: Message) {
-        let is_its = |series: &Series| series.topic == topic && series.names == message.names;
-        let known = self.series.iter().position(is_its);
-        let series = known.unwrap_or_else(|| {
+        let entry = self.series_by_names.entry((topic, message.names));
+        let series = *entry.or_insert_with_key(|(topic, names)| {
             self.series.push(Series {
-                topic,
-                names: message.names,
+                topic: *topic,
+                names: names.clone(),
                 samples: Vec::new(),
             });
             self.series.len() - 1

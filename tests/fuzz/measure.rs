@@ -1,0 +1,49 @@
+//! What a reader takes for one input, and whether it is too much.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use cpu_time::ThreadTime;
+
+/// The time that an input may take \[s\].
+const MOST_S: f64 = 1.0;
+/// The memory that an input may take, and more for each of its own bytes \[bytes\].
+const MOST_BYTES: u64 = 64 << 20;
+const MOST_RATIO: u64 = 20;
+
+/// What reading an input took: time of the thread, and the most memory that it held at a time.
+#[derive(Clone, Copy, Default)]
+pub struct Cost {
+    pub seconds: f64,
+    pub bytes: u64,
+    /// Whether the input was read, not refused.
+    pub accepted: bool,
+}
+
+/// Reads an input of so many bytes.
+///
+/// # Errors
+/// A panic, or a cost that is too large for the input.
+pub fn cost(length: usize, read: impl FnOnce() -> bool) -> Result<Cost, String> {
+    let mut result = Ok(false);
+    let begun = ThreadTime::now();
+    let memory = allocation_counter::measure(|| result = catch_unwind(AssertUnwindSafe(read)));
+    let cost = Cost {
+        seconds: begun.elapsed().as_secs_f64(),
+        bytes: memory.bytes_max,
+        accepted: result.map_err(|panic| format!("panics: {}", message(&*panic)))?,
+    };
+    if cost.seconds > MOST_S {
+        return Err(format!("takes {:.1} s", cost.seconds));
+    }
+    if cost.bytes > MOST_BYTES + MOST_RATIO * length as u64 {
+        return Err(format!("takes {} MB", cost.bytes >> 20));
+    }
+    Ok(cost)
+}
+
+fn message(panic: &dyn Any) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or(panic.downcast_ref::<&str>().copied())
+        .unwrap_or("of no text")
+}
