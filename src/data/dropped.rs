@@ -1,11 +1,17 @@
 //! Rows that a logger dropped: steps of two or more periods in place of one.
 
+use super::instant::SAME_S;
 use super::jumps::interpolated;
 use super::log::{Interval, Log};
 
 /// A step longer than this many median steps is a gap. Loops on desktop systems overrun by two or
 /// three periods as a matter of course; beyond five the motion between the rows is anyone's guess.
-pub const GAP_STEPS: f64 = 5.0;
+const GAP_STEPS: f64 = 5.0;
+
+/// Whether nobody knows how the rig moved over a step, of a log with this median step \[s\].
+pub(crate) fn is_gap(step_s: f64, median_step_s: f64) -> bool {
+    step_s > GAP_STEPS * median_step_s + SAME_S
+}
 
 /// A step longer than this many median steps lacks a row: midway between one period and two, and beyond what jitter of a
 /// fifth of a period does.
@@ -34,8 +40,9 @@ pub(super) struct Dropped {
 pub(super) fn dropped(log: &Log) -> Vec<Dropped> {
     let step_s = log.median_step();
     let of_step = |(row, pair): (usize, &[f64])| {
-        let steps = (pair[1] - pair[0]) / step_s;
-        let missing = steps > DROPPED_STEPS && steps <= GAP_STEPS;
+        let length_s = pair[1] - pair[0];
+        let steps = length_s / step_s;
+        let missing = steps > DROPPED_STEPS && !is_gap(length_s, step_s);
         missing.then_some(Dropped {
             row,
             count: (steps.round() as usize).max(2) - 1,

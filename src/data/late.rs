@@ -1,5 +1,6 @@
 //! Channels on other clocks: values that were taken so long before the times of their rows.
 
+use super::instant::{row_after, row_from};
 use super::log::Log;
 use super::smooth::resampled;
 
@@ -20,8 +21,8 @@ pub(super) fn cut(mut log: Log, late_s: impl IntoIterator<Item = f64>) -> Log {
         return log;
     };
     let (from, to) = (first - early, last - late);
-    let begin = log.time.partition_point(|time| *time < from);
-    let end = log.time.partition_point(|time| *time <= to).max(begin);
+    let begin = row_from(&log.time, from);
+    let end = row_after(&log.time, to).max(begin);
     let motion = log.q.iter_mut().chain(&mut log.qd);
     let channels = motion.chain(&mut log.tau).chain([&mut log.time]);
     for channel in channels {

@@ -4,6 +4,9 @@
 //! fitted by least squares to the positions on either side has no lag, takes irregular sampling as it
 //! is, and follows accelerations that change over the window.
 
+use std::ops::Range;
+
+use super::instant::{SAME_S, row_after, row_from};
 use super::signal::differences;
 use super::statistics::median_of;
 
@@ -58,6 +61,12 @@ impl LocalCubic {
     }
 }
 
+/// The rows within `half_width_s` on either side of a row.
+pub(crate) fn rows_around(time: &[f64], row: usize, half_width_s: f64) -> Range<usize> {
+    let centre = time[row];
+    row_from(time, centre - half_width_s)..row_after(time, centre + half_width_s)
+}
+
 /// Fits a cubic to the values within `half_width_s` on either side of a row.
 ///
 /// `time` \[s\] increases strictly and is as long as `values`. `None` where the log does not reach
@@ -69,24 +78,21 @@ pub fn local_cubic(
     half_width_s: f64,
 ) -> Option<LocalCubic> {
     let centre = time[row];
-    // Times are rounded decimals: a row that is meant to stand at the window's edge belongs to it.
-    let reach = half_width_s * (1.0 + 1e-6);
-    if centre - time.first()? < half_width_s / (1.0 + 1e-6)
-        || time.last()? - centre < half_width_s / (1.0 + 1e-6)
-    {
+    let least = half_width_s - SAME_S;
+    if centre - time.first()? < least || time.last()? - centre < least {
         return None;
     }
-    let first = time.partition_point(|t| *t < centre - reach);
-    let end = time.partition_point(|t| *t <= centre + reach);
-    if end - first < 5 {
+    let rows = rows_around(time, row, half_width_s);
+    if rows.len() < 5 {
         return None;
     }
     // Scaled to -1..1, and seen from the row's own value, the sums keep their digits.
-    let points = (first..end).map(|i| ((time[i] - centre) / half_width_s, values[i] - values[row]));
+    let point = |i: usize| ((time[i] - centre) / half_width_s, values[i] - values[row]);
+    let points = rows.clone().map(point);
     let [c0, c1, c2, c3] = cubic_coefficients(points.clone())?;
     let left = points.map(|(s, y)| (y - (c0 + s * (c1 + s * (c2 + s * c3)))).powi(2));
     #[allow(clippy::cast_precision_loss)] // few rows
-    let freedom = (end - first - 4) as f64;
+    let freedom = (rows.len() - 4) as f64;
     Some(LocalCubic {
         value: values[row] + c0,
         slope: c1 / half_width_s,

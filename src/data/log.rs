@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::column::Quantity;
 use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
+use super::instant::SAME_S;
 use super::jumps::{bridge, rows_that_jump};
 use super::signal::differences;
 use super::statistics::median_of;
@@ -30,6 +31,11 @@ impl Interval {
     /// Length \[s\].
     pub fn length_s(&self) -> f64 {
         self.end_s - self.start_s
+    }
+
+    /// Whether it has a time in common with another span \[s\].
+    pub fn touches(&self, from_s: f64, to_s: f64) -> bool {
+        self.start_s <= to_s + SAME_S && self.end_s >= from_s - SAME_S
     }
 }
 

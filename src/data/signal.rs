@@ -3,6 +3,7 @@
 //! Medians rather than means throughout: logs of real rigs contain spikes, and a single row must not move a
 //! statistic.
 
+use super::instant::ROUNDING;
 use super::statistics::{SIGMA_PER_MAD, deviation, mad, median, quantile};
 
 /// With fewer rows quantisation cannot be told from chance.
@@ -133,7 +134,7 @@ pub(super) fn resample(time: &[f64], values: &[f64], step_s: f64) -> Vec<f64> {
         return vec![];
     }
     // The small addition keeps rounding from dropping the last row of a uniform series.
-    let count = ((last - first) / step_s + 1e-6) as usize + 1;
+    let count = ((last - first) / step_s + ROUNDING) as usize + 1;
     let at = |index: usize| (first + index as f64 * step_s).min(*last);
     (0..count)
         .filter_map(|index| interpolate(time, values, at(index)))

@@ -1,5 +1,6 @@
 //! The motion of a log as the torque error reads it: even steps, low-pass filtered, differentiated.
 
+use super::instant::{ROUNDING, SAME_S};
 use super::log::Log;
 use super::low_pass::LowPass;
 use crate::limits::log_steps;
@@ -141,7 +142,7 @@ fn even(log: &Log, step_s: f64) -> Vec<f64> {
     };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     // positive, and no larger than a log
-    let steps = (log.duration() / step_s + 1e-9).floor() as usize;
+    let steps = (log.duration() / step_s + ROUNDING).floor() as usize;
     (0..=steps).map(|k| first + k as f64 * step_s).collect()
 }
 
@@ -165,9 +166,9 @@ fn is_used(log: &Log, time: f64) -> bool {
     let (Some(first), Some(last)) = (log.time.first(), log.time.last()) else {
         return false;
     };
-    let left_out = log.leave_out.iter();
-    let mut left_out = left_out.filter(|span| (span.start_s..=span.end_s).contains(&time));
-    time >= first + ENDS_S && time <= last - ENDS_S && left_out.next().is_none()
+    let is_left_out = log.leave_out.iter().any(|span| span.touches(time, time));
+    let from_ends = (time - first).min(last - time);
+    from_ends >= ENDS_S - SAME_S && !is_left_out
 }
 
 #[cfg(test)]

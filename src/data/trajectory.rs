@@ -1,6 +1,6 @@
 //! Trajectories as training reads them: full states, row by row.
 
-use super::{Log, half_width_s, local_cubic};
+use super::{Log, SAME_S, half_width_s, local_cubic};
 
 /// States and torques of one motion, row by row.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -34,11 +34,8 @@ pub fn trajectories(log: &Log, thinning: Thinning) -> Vec<Trajectory> {
     let mut all = vec![Trajectory::default()];
     for first in (0..log.rows().saturating_sub(merged)).step_by(merged) {
         let (from, to) = (log.time[first], log.time[first + merged]);
-        let broken = to - from > 2.0 * step * merged as f64
-            || log
-                .leave_out
-                .iter()
-                .any(|span| span.start_s <= to && span.end_s >= from);
+        let broken = to - from > 2.0 * step * merged as f64 + SAME_S
+            || log.leave_out.iter().any(|span| span.touches(from, to));
         let states: Option<Vec<_>> = log
             .q
             .iter()
@@ -48,7 +45,7 @@ pub fn trajectories(log: &Log, thinning: Thinning) -> Vec<Trajectory> {
         let full = current
             .time
             .first()
-            .is_some_and(|start| from - start >= thinning.length_s);
+            .is_some_and(|start| from - start >= thinning.length_s - SAME_S);
         match states {
             Some(states) if !broken => {
                 current.time.push(from);

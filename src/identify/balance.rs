@@ -4,7 +4,7 @@ use super::normal_equations::{Reduced, WindowTerms};
 use super::sensitivity::{LANES, Lane, Tangent};
 use super::sums::{Sums, loss};
 use super::values::Values;
-use crate::data::{Joint, Log, Smooth, Smoothing};
+use crate::data::{Joint, Log, Smooth, Smoothing, row_from};
 use crate::expr::Tape;
 use crate::lanes::Row;
 use crate::model::Dynamics;
@@ -28,10 +28,7 @@ impl Rows {
 
     /// The rows within a window.
     pub fn within(&self, log: &Log, window: &Window) -> std::ops::Range<usize> {
-        let at = |row: usize| {
-            let time = log.time[row];
-            self.smooth.time.partition_point(|t| *t < time)
-        };
+        let at = |row: usize| row_from(&self.smooth.time, log.time[row]);
         at(window.first)..at(window.last)
     }
 }

@@ -5,6 +5,7 @@ use super::eigen::eigen;
 use super::normal_equations::with_unit_diagonal;
 use super::outcome::Fit;
 use super::shooting::Shooting;
+use crate::data::SAME_S;
 
 /// How well a fit determines its free parameters.
 #[derive(Debug, Clone)]
@@ -38,7 +39,7 @@ pub fn stretches(windows: impl Iterator<Item = (usize, f64)>, length_s: f64) -> 
     let mut current: Option<(usize, f64)> = None;
     let mut count = 0;
     for (log, start) in windows {
-        if current.is_none_or(|(of, since)| of != log || start - since >= length_s * (1.0 - 1e-6)) {
+        if current.is_none_or(|(of, since)| of != log || start - since >= length_s - SAME_S) {
             current = Some((log, start));
             count += 1;
         }

@@ -1,4 +1,4 @@
-use crate::data::{LocalCubic, Log, local_cubic};
+use crate::data::{LocalCubic, Log, local_cubic, rows_around};
 
 /// What a log tells of the state at one of its rows: angles, then velocities.
 pub(super) struct Start {
@@ -18,15 +18,10 @@ impl Start {
     /// joint's position. A window's free start state is held to it, so that a model that is wrong cannot make up for it
     /// by a start state that the rig never had.
     pub fn of(log: &Log, row: usize, half_width: f64, noise: &[f64]) -> Self {
-        let first = log
-            .time
-            .partition_point(|t| *t < log.time[row] - half_width);
-        let end = log
-            .time
-            .partition_point(|t| *t <= log.time[row] + half_width);
-        let is_between = row - first >= FEWEST_ROWS && end - row > FEWEST_ROWS;
+        let around = rows_around(&log.time, row, half_width);
+        let is_between = row - around.start >= FEWEST_ROWS && around.end - row > FEWEST_ROWS;
         #[allow(clippy::cast_precision_loss)] // few rows
-        let rows = (end - first) as f64;
+        let rows = around.len() as f64;
         let gains = [
             LocalCubic::value_noise_gain(rows),
             LocalCubic::slope_noise_gain(half_width, rows),

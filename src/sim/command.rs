@@ -245,7 +245,7 @@ struct History<'l> {
 /// The filtered torque just before an instant.
 #[derive(Debug, Clone, Copy)]
 struct Instant {
-    /// The instant less the delay, in s.
+    /// The instant less the delay, in s since the first row.
     time: f64,
     output: f64,
     /// Integral of the output up to the instant, plus an arbitrary constant.
@@ -291,16 +291,18 @@ impl<'l> History<'l> {
     }
 
     fn at(&self, time: f64) -> Instant {
-        let time = time - self.delay;
-        let row = self.time.partition_point(|t| *t < time);
+        self.after(time - self.time[0])
+    }
+
+    /// Just before so many seconds after the first row. Differences of times keep the digits that large times lack.
+    fn after(&self, since: f64) -> Instant {
+        let time = since - self.delay;
+        let since = |row: usize| self.time[row] - self.time[0];
+        let row = self.time.partition_point(|t| *t - self.time[0] < time);
         let (output, output_by_lag, command_integral) = match row.checked_sub(1) {
-            None => (
-                self.command[0],
-                0.0,
-                self.command[0] * (time - self.time[0]),
-            ),
+            None => (self.command[0], 0.0, self.command[0] * time),
             Some(row) => {
-                let span = time - self.time[row];
+                let span = time - since(row);
                 let (output, output_by_lag) = self.within(row, span);
                 let integral = self.integral[row] + self.command[row] * span;
                 (output, output_by_lag, integral)
@@ -319,14 +321,15 @@ impl<'l> History<'l> {
     #[allow(clippy::cast_precision_loss)] // few parts
     fn means(&self, from: f64, to: f64, parts: usize) -> impl Iterator<Item = Mean> {
         let length = (to - from) / parts as f64;
-        let mut before = self.at(from);
+        let [from, to] = [from, to].map(|time| time - self.time[0]);
+        let mut before = self.after(from);
         (1..=parts).map(move |part| {
             let end = if part == parts {
                 to
             } else {
                 from + length * part as f64
             };
-            let now = self.at(end);
+            let now = self.after(end);
             let mean = before.mean_until(&now);
             before = now;
             mean

@@ -1,4 +1,4 @@
-use crate::data::{Log, half_width_s, local_cubic};
+use crate::data::{Log, half_width_s, is_gap, local_cubic, row_after};
 
 /// A stretch of one log, rows `first..=last`, over which a model is integrated open loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,9 +26,6 @@ impl Window {
         logs[self.log].time[self.first]
     }
 }
-
-/// A pause longer than this many median steps is a gap, which no window spans.
-const GAP_STEPS: f64 = 5.0;
 
 /// Consecutive windows of `length_s` seconds in all logs. No window spans a gap or touches a left-out interval, and
 /// each begins where the state can be estimated from the log.
@@ -64,17 +61,11 @@ fn window_at(log: &Log, step_s: f64, first: usize, length_s: f64) -> Result<usiz
     if last == first || log.time[last] < log.time[first] + length_s - 0.5 * step_s {
         return Err(last + 1);
     }
-    let touched = log
-        .leave_out
-        .iter()
-        .find(|span| span.start_s <= log.time[last] && span.end_s >= log.time[first]);
-    if let Some(span) = touched {
-        return Err(log
-            .time
-            .partition_point(|t| *t <= span.end_s)
-            .max(first + 1));
+    let (from, to) = (log.time[first], log.time[last]);
+    if let Some(span) = log.leave_out.iter().find(|span| span.touches(from, to)) {
+        return Err(row_after(&log.time, span.end_s).max(first + 1));
     }
-    let gap = (first..last).find(|&row| log.time[row + 1] - log.time[row] > GAP_STEPS * step_s);
+    let gap = (first..last).find(|&row| is_gap(log.time[row + 1] - log.time[row], step_s));
     if let Some(row) = gap {
         return Err(row + 1);
     }

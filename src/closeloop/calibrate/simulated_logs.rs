@@ -2,7 +2,7 @@ use rand::{Rng, RngExt};
 
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
-use crate::data::{Log, half_width_s};
+use crate::data::{Log, half_width_s, row_from};
 use crate::identify::{FitError, Values, Window, blocks, fit};
 use crate::model::FittedEffect;
 
@@ -96,8 +96,7 @@ fn apart(study: &Study<'_>) -> Vec<Log> {
             ..log.clone()
         };
         for window in windows.iter().filter(|window| window.log == index) {
-            let edge = log.time[window.first] - reach * (1.0 + 1e-6);
-            let before = log.time.partition_point(|t| *t < edge);
+            let before = row_from(&log.time, log.time[window.first] - reach);
             let later = out
                 .time
                 .last()

@@ -1,7 +1,7 @@
 use super::motion::Motion;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::study::Study;
-use crate::data::{Joint, Quantity};
+use crate::data::{Joint, Quantity, row_after};
 
 /// Rows of a motion at most, where those of the log are denser than any motion needs.
 const MOST_ROWS: f64 = 1e5;
@@ -253,7 +253,7 @@ impl MenuItem {
             if at > end && !matches!(self.drive, Drive::Ramps(_) | Drive::Nothing) {
                 break;
             }
-            let held = log.time.partition_point(|t| *t <= at + 1e-9).max(1) - 1;
+            let held = row_after(&log.time, at).max(1) - 1;
             let logged = log.tau.iter().map(|tau| tau[held]);
             motion.time.push(begin + since);
             motion.tau.push(match self.drive {

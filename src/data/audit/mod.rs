@@ -30,7 +30,7 @@ pub use response::Response;
 use std::ops::Range;
 
 use super::columns::Columns;
-use super::dropped::{GAP_STEPS, dropped};
+use super::dropped::{dropped, is_gap};
 use super::examined::examined;
 use super::log::{Interval, Log};
 use super::signal::differences;
@@ -80,16 +80,13 @@ fn measured(log: &Log, joints: Vec<JointAudit>) -> Audit {
     let median_step_s = median(&steps);
     let min_step_s = steps.iter().copied().reduce(f64::min).unwrap_or(0.0);
     let max_step_s = steps.iter().copied().reduce(f64::max).unwrap_or(0.0);
-    let is_gap = |step: &f64| *step > GAP_STEPS * median_step_s;
+    let is_gap = |step: f64| is_gap(step, median_step_s);
     let gap = |pair: &[f64]| Interval {
         start_s: pair[0],
         end_s: pair[1],
     };
-    let gaps = log
-        .time
-        .windows(2)
-        .filter(|pair| is_gap(&(pair[1] - pair[0])));
-    steps.retain(|step| !is_gap(step));
+    let gaps = log.time.windows(2).filter(|pair| is_gap(pair[1] - pair[0]));
+    steps.retain(|step| !is_gap(*step));
     Audit {
         log: log.name(),
         rows: log.rows(),

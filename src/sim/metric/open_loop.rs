@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::assessment::{Assessment, OpenLoop, WindowError};
 use super::summary::{Summary, summarise};
-use crate::data::{Log, half_width_s};
+use crate::data::{Log, SAME_S, half_width_s, row_after, row_from};
 use crate::lanes::Row;
 use crate::model::Dynamics;
 use crate::sim::{
@@ -106,25 +106,19 @@ pub fn window_count(logs: &[Log], horizon_s: f64) -> usize {
 
 /// The windows of one log: one every half horizon, from the first row at which the state can be estimated.
 pub(crate) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
-    let slack = 1e-6 * horizon_s;
     let half_width = half_width_s(log.median_step());
-    let row_at = |time: f64| log.time.partition_point(|t| *t < time - slack);
-    let first = row_at(log.time[0] + half_width);
+    let first = row_from(&log.time, log.time[0] + half_width);
     let Some(&begin) = log.time.get(first) else {
         return Vec::new();
     };
-    let end_of_log = log.time[log.rows() - 1] + slack;
-    starts(log, begin, horizon_s, slack)
+    let end_of_log = log.time[log.rows() - 1];
+    starts(log, begin, horizon_s)
         .filter_map(|start| {
-            let first = row_at(start);
-            let end = log.time[first] + horizon_s + slack;
-            let last = log.time.partition_point(|t| *t <= end) - 1;
-            let touched = |from: f64, to: f64| {
-                log.leave_out
-                    .iter()
-                    .any(|span| span.start_s <= to && span.end_s >= from)
-            };
-            let whole = end <= end_of_log + slack && last > first && !touched(log.time[first], end);
+            let first = row_from(&log.time, start);
+            let (from, to) = (log.time[first], log.time[first] + horizon_s);
+            let last = row_after(&log.time, to) - 1;
+            let touched = log.leave_out.iter().any(|span| span.touches(from, to));
+            let whole = to <= end_of_log + SAME_S && last > first && !touched;
             (whole && initial_state(log, half_width, first).is_some()).then_some(Window {
                 log: index,
                 first,
@@ -136,15 +130,13 @@ pub(crate) fn windows(index: usize, log: &Log, horizon_s: f64) -> Vec<Window> {
 
 /// The times at which windows start: every half horizon, as long as a horizon fits into the log. Those that no row
 /// follows within a horizon are passed over, so that a clock that jumps by years costs no time.
-fn starts(log: &Log, begin: f64, horizon_s: f64, slack: f64) -> impl Iterator<Item = f64> {
+fn starts(log: &Log, begin: f64, horizon_s: f64) -> impl Iterator<Item = f64> {
     let half = horizon_s / 2.0;
-    let end_of_log = log.time[log.rows() - 1] + slack;
+    let end_of_log = log.time[log.rows() - 1] + SAME_S;
     let mut number = 0.0;
     std::iter::from_fn(move || {
         let mut start = begin + number * half;
-        let next = log
-            .time
-            .get(log.time.partition_point(|t| *t < start - slack))?;
+        let next = log.time.get(row_from(&log.time, start))?;
         if *next > start + horizon_s {
             number = ((next - horizon_s - begin) / half).ceil();
             start = begin + number * half;
