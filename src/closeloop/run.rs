@@ -35,13 +35,14 @@ pub fn close_loop(
     let Request {
         model,
         library,
-        mut split,
+        split,
         against,
         settings,
         space,
         budget,
         learner,
     } = request;
+    let mut split = split.in_order();
     let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
     let mut clock = Clock::start();
     let progress: &mut Observer<'_> = &mut |now: Progress<'_>| {

@@ -1,10 +1,12 @@
 //! Stage 1: set apart the logs that models are scored on.
 
+use std::cmp::Ordering;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::settings::SplitSettings;
-use crate::data::Log;
+use crate::data::{Log, row_after, row_from};
 
 /// Which logs a study learns from and which it is judged by.
 #[derive(Debug, Clone)]
@@ -34,6 +36,14 @@ impl Split {
             test,
             method: SplitMethod::Given,
         }
+    }
+
+    /// The same with the logs in the order of their names and, where these are equal, of what they hold: sums and random
+    /// draws take them one after the other, and what is found is not to depend on the order in which they were given.
+    pub(super) fn in_order(mut self) -> Self {
+        self.train.sort_by(by_name);
+        self.test.sort_by(by_name);
+        self
     }
 
     /// Set whole trajectories apart where there are three or more, else the end of each.
@@ -92,9 +102,21 @@ impl SplitSettings {
     }
 }
 
+fn by_name(a: &Log, b: &Log) -> Ordering {
+    let by_numbers = || by_numbers(a.q.iter().flatten(), b.q.iter().flatten());
+    a.path.cmp(&b.path).then_with(by_numbers)
+}
+
+/// The order of two channels of finite numbers by the first that differ.
+pub(super) fn by_numbers<'a>(
+    a: impl Iterator<Item = &'a f64>,
+    b: impl Iterator<Item = &'a f64>,
+) -> Ordering {
+    a.partial_cmp(b).unwrap_or(Ordering::Equal)
+}
+
 /// The rows of a log from `start_s` to `end_s`.
 pub(crate) fn between(log: &Log, start_s: f64, end_s: f64) -> Log {
-    let rows =
-        log.time.partition_point(|t| *t < start_s)..log.time.partition_point(|t| *t <= end_s);
+    let rows = row_from(&log.time, start_s)..row_after(&log.time, end_s);
     log.at(std::slice::from_ref(&rows))
 }

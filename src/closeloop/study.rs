@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
 use super::space::Space;
+use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
 use crate::model::{Dynamics, FittedEffect, Model, Parameter};
@@ -139,6 +140,15 @@ impl<'a> Study<'a> {
     /// In how many parts models are judged, see [`Space::parts`].
     pub(super) fn parts(&self) -> usize {
         self.space.parts(self.declared.joints)
+    }
+
+    /// The joints in the order of what the logs hold of them: random draws that take them so do not depend on how the
+    /// model numbers them.
+    pub(super) fn joints_by_motion(&self) -> Vec<usize> {
+        let motion = |joint: usize| self.logs.iter().flat_map(move |log| &log.q[joint]);
+        let mut joints: Vec<usize> = (0..self.declared.joints).collect();
+        joints.sort_by(|a, b| by_numbers(motion(*a), motion(*b)));
+        joints
     }
 
     /// A share of the loss of one part, as a share of the whole loss.

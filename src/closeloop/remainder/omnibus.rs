@@ -149,7 +149,8 @@ impl Test {
 
 /// The residual of one window, with the fit and the sensor there.
 struct Window {
-    joints: usize,
+    /// In the order in which noise is drawn.
+    joints: Vec<usize>,
     /// In m or rad, `[row * joints + joint]`.
     residual: DVector<f64>,
     /// Basis of the residual's changes with the start state: orthonormal columns.
@@ -184,6 +185,7 @@ fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> 
     let values = Values::of(&dynamics, study.logs);
     let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
     let sensors = sensors(study);
+    let order = study.joints_by_motion();
     let at = residuals(&fitted.fit.locals);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
         .map(|k| {
@@ -206,7 +208,7 @@ fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> 
             let log = &study.logs[window.log];
             let read = |i: usize| log.q[i % joints][window.first + i / joints];
             Window {
-                joints,
+                joints: order.clone(),
                 positions: DVector::from_fn(size, |i, _| read(i) + residual[i]),
                 residual,
                 absorbed: slopes.qr().q(),
@@ -252,20 +254,24 @@ fn waves(rows: usize, slow: usize) -> DMatrix<f64> {
 impl Window {
     /// A draw of the error that the sensor adds to the model's positions.
     fn noise(&self, rng: &mut impl Rng) -> DVector<f64> {
-        // The zero's place within a step of the encoder is unknown.
-        let phases: Vec<f64> = (0..self.joints).map(|_| rng.random()).collect();
-        DVector::from_fn(self.positions.len(), |i, _| {
-            let [noise, step] = self.sensor[i % self.joints];
-            let added: f64 = StandardNormal.sample(rng);
-            let read = self.positions[i] + noise * added;
-            let shown = if step > 0.0 {
-                let phase = phases[i % self.joints];
-                ((read / step + phase).round() - phase) * step
-            } else {
-                read
-            };
-            shown - self.positions[i]
-        })
+        let mut all = DVector::zeros(self.positions.len());
+        let count = self.joints.len();
+        for &j in &self.joints {
+            let [noise, step] = self.sensor[j];
+            // The zero's place within a step of the encoder is unknown.
+            let phase: f64 = rng.random();
+            for i in (j..all.len()).step_by(count) {
+                let added: f64 = StandardNormal.sample(rng);
+                let read = self.positions[i] + noise * added;
+                let shown = if step > 0.0 {
+                    ((read / step + phase).round() - phase) * step
+                } else {
+                    read
+                };
+                all[i] = shown - self.positions[i];
+            }
+        }
+        all
     }
 
     /// What the fit of the start state leaves of `signal`.

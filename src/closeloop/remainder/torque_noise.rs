@@ -35,8 +35,9 @@ impl<'a> TorqueNoise<'a> {
     /// What a draw of the noise of all sensors changes of them.
     pub fn draw(&self, rng: &mut impl Rng) -> Vec<DVector<f64>> {
         let audits = self.study.audits().iter();
+        let order = self.study.joints_by_motion();
         let logs: Vec<Log> = (self.study.logs.iter().zip(audits))
-            .map(|(log, audit)| noisier(log, &audit.joints, rng))
+            .map(|(log, audit)| noisier(log, &audit.joints, &order, rng))
             .collect();
         let noisy = residuals(self.study, self.model, self.windows, &logs);
         let both = noisy.into_iter().zip(&self.residuals);
@@ -66,8 +67,8 @@ fn residuals(
     all.into_iter().map(in_units).collect()
 }
 
-/// A log whose positions and torques carry as much noise once more as they seem to.
-fn noisier(log: &Log, joints: &[JointAudit], rng: &mut impl Rng) -> Log {
+/// A log whose positions and torques carry as much noise once more as they seem to, drawn for the joints in this order.
+fn noisier(log: &Log, joints: &[JointAudit], order: &[usize], rng: &mut impl Rng) -> Log {
     let mut noisier = log.clone();
     let mut add = |values: &mut [f64], channel: &Channel| {
         let noise = channel.noise_std.max(channel.resolution / 12.0_f64.sqrt());
@@ -76,9 +77,9 @@ fn noisier(log: &Log, joints: &[JointAudit], rng: &mut impl Rng) -> Log {
             *value += noise * drawn;
         }
     };
-    for (j, joint) in joints.iter().enumerate() {
-        add(&mut noisier.q[j], &joint.q);
-        add(&mut noisier.tau[j], &joint.tau);
+    for &j in order {
+        add(&mut noisier.q[j], &joints[j].q);
+        add(&mut noisier.tau[j], &joints[j].tau);
     }
     noisier
 }
