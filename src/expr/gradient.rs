@@ -133,7 +133,7 @@ impl Graph {
         }
     }
 
-    /// d(a^b) = b a^(b-1) da + a^b log(a) db; the second part only where the power is not a constant.
+    /// d(a^b) = b a^(b-1) da + a^b log(a) db; the second part only where the power is not a constant. It tends to 0 with a.
     fn power_parts(&mut self, a: Node, b: Node, node: Node, adjoint: Node) -> Vec<(Node, Node)> {
         let one = self.constant(1.0);
         let less = self.sub(b, one);
@@ -143,9 +143,19 @@ impl Graph {
         if self.constant_value(b).is_none() {
             let log = self.unary(Unary::Log, a);
             let slope = self.mul(node, log);
+            let slope = self.zero_at_zero(a, slope);
             parts.push((b, self.mul(adjoint, slope)));
         }
         parts
+    }
+
+    /// `value`, or 0 where `a` is 0; what is not a number stays so.
+    fn zero_at_zero(&mut self, a: Node, value: Node) -> Node {
+        let sign = self.unary(Unary::Sign, a);
+        let size = self.unary(Unary::Abs, sign);
+        let [zero, one] = [0.0, 1.0].map(|value| self.constant(value));
+        let is_zero = self.sub(one, size);
+        self.select(is_zero, zero, value)
     }
 
     /// The adjoint goes to `a` where `low < high`, else to `b`.

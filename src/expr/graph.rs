@@ -3,8 +3,8 @@ use std::collections::HashMap;
 use super::Program;
 use super::op::{Binary, Node, Op, Unary};
 
-/// A program under construction. Equal operations are stored once (hash-consing), constants are folded, and operands
-/// precede the operations that use them, so that the list is in evaluation order.
+/// A program under construction. Equal operations are stored once (hash-consing), constants are folded to finite ones, the
+/// only ones that can be written, and operands precede the operations that use them, so that the list is in evaluation order.
 #[derive(Debug, Clone, Default)]
 pub struct Graph {
     pub(super) ops: Vec<Op>,
@@ -41,7 +41,7 @@ impl Graph {
 
     pub fn unary(&mut self, op: Unary, a: Node) -> Node {
         match (op, self.ops[a.index()]) {
-            (_, Op::Const(value)) => self.constant(op.apply(value)),
+            (_, Op::Const(value)) if op.apply(value).is_finite() => self.constant(op.apply(value)),
             (Unary::Neg, Op::Unary(Unary::Neg, inner)) => inner,
             _ => self.push(Op::Unary(op, a)),
         }
@@ -49,7 +49,9 @@ impl Graph {
 
     pub fn binary(&mut self, op: Binary, a: Node, b: Node) -> Node {
         let (left, right) = (self.constant_value(a), self.constant_value(b));
-        if let (Some(left), Some(right)) = (left, right) {
+        if let (Some(left), Some(right)) = (left, right)
+            && op.apply(left, right).is_finite()
+        {
             return self.constant(op.apply(left, right));
         }
         match (op, left, right) {

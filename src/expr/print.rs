@@ -130,7 +130,7 @@ impl Program {
     fn part(&self, notation: &dyn Notation, op: Op, parts: &mut Parts) -> Part {
         let mut at = |node: Node| parts.take(node);
         match op {
-            Op::Const(value) if value < 0.0 => Part {
+            Op::Const(value) if value.is_sign_negative() => Part {
                 text: notation.number(value),
                 precedence: SIGN,
             },
