@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 
+use toml_edit::DocumentMut;
+
 use super::network::check_hidden;
 use super::reader::{Document, FileError, Located, Section};
 use super::system::{Energy, Motion};
@@ -216,18 +218,12 @@ pub(super) fn energy(section: Option<Section<'_>>) -> Result<Option<Energy>, Fil
     Ok(Some(Energy { total, power }))
 }
 
-/// Everything before the first `[[effect]]`.
+/// A file that was read without its effects, wherever they stand.
 pub(super) fn declaration(text: &str) -> String {
-    let end = text
-        .match_indices("[[effect]]")
-        .map(|(at, _)| at)
-        .find(|&at| {
-            text[..at]
-                .lines()
-                .next_back()
-                .is_none_or(|line| line.trim().is_empty())
-                || text[..at].ends_with('\n')
-        })
-        .unwrap_or(text.len());
-    text[..end].trim_end().to_owned() + "\n"
+    let mut document: DocumentMut = text.parse().expect("the text was read as TOML before");
+    let declared = match document.remove("effect") {
+        Some(_) => document.to_string(),
+        None => text.to_owned(),
+    };
+    declared.trim_end().to_owned() + "\n"
 }

@@ -69,7 +69,7 @@ pub struct Model {
     pub hidden: Vec<usize>,
     /// The text of the file.
     pub text: String,
-    /// The text of the declared part of the file: everything before the first effect.
+    /// The text of the declared part of the file: everything but the effects.
     pub declaration: String,
     pub(super) equations: Arc<Equations>,
 }
