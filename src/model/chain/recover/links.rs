@@ -107,8 +107,11 @@ pub(super) fn on_a_slide(found: &[f64], gravity: f64) -> Result<Links, String> {
     };
     let moment = clean(Planar::new(c, -s));
     let pull = Planar::new(sin, cos);
-    let downward = if moment.norm() > ROUNDING * (mass * inertia).sqrt() {
+    let rounding = ROUNDING * (mass * inertia).sqrt();
+    let downward = if moment.norm() > rounding {
         near(-gravity, (pull / moment).conj())
+    } else if pull.norm() > rounding * gravity {
+        return Err("the pendulum has a weight that does not move the slide".into());
     } else {
         inclined(mass, force, gravity)
     };
