@@ -45,6 +45,7 @@ mod per_log;
 mod physics;
 mod prescribed;
 mod printers;
+mod properties;
 mod recipes;
 mod recordings;
 mod rigs;
