@@ -5,11 +5,13 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::support::{answers, refuses, residyn, residyn_within, says, succeeds, text};
+use crate::support::{
+    answers, refuses, residyn, residyn_within, says, succeeds, text, until_there,
+};
 use crate::train::config;
 
 const PENDULUM: &str = include_str!("../models/pendulum.toml");
@@ -542,9 +544,7 @@ fn two_runs_do_not_share_a_folder() {
         .stderr(Stdio::null())
         .spawn();
     let mut first = first.unwrap();
-    while !scratch.path("out/report.json").exists() {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    until_there(&scratch.path("out/report.json"), &mut first);
     let process = format!("process {},", first.id());
     let train = ["train", "--config", &config("smoke/train-pendulum.toml")];
     for second in [&["closeloop"][..], &train] {
@@ -553,40 +553,6 @@ fn two_runs_do_not_share_a_folder() {
     }
     first.kill().unwrap();
     first.wait().unwrap();
-}
-
-/// What the program says that can write no file of more than a kilobyte, as on a full disk.
-#[cfg(unix)]
-fn on_a_full_disk(arguments: &[&str]) -> Output {
-    Command::new("bash")
-        .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\""])
-        .arg(env!("CARGO_BIN_EXE_residyn"))
-        .args(arguments)
-        .output()
-        .unwrap()
-}
-
-#[test]
-#[cfg(unix)]
-fn a_full_disk_is_told_before_the_work() {
-    let scratch = Scratch::new();
-    let out = scratch.out();
-    let train = ["train", "--config", &config("smoke/train-pendulum.toml")];
-    for command in [
-        &["closeloop", "--verbose"][..],
-        &train,
-        &["simulate", "--plant", "pendulum"],
-    ] {
-        let output = on_a_full_disk(&[command, &["--out", &out]].concat());
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{told}");
-        says(
-            &told,
-            &[&format!("error: {out}: cannot be written: "), "--out"],
-        );
-        assert!(!told.contains("fitting"), "{told}");
-        assert_eq!(fs::read_dir(scratch.0.path()).unwrap().count(), 0);
-    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::support::text;
+use crate::support::{text, until_there};
 
 fn begin(arguments: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_residyn"))
@@ -18,14 +18,6 @@ fn begin(arguments: &[&str]) -> Child {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap()
-}
-
-/// Wait until a run has made this.
-fn until_there(path: &Path, run: &mut Child) {
-    while !path.exists() {
-        assert!(run.try_wait().unwrap().is_none(), "the run has ended");
-        sleep(Duration::from_millis(10));
-    }
 }
 
 /// Type Ctrl-C; the exit status and what the run said.

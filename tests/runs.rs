@@ -4,12 +4,10 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::thread::sleep;
-use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::support::{refuses, succeeds, text};
+use crate::support::{refuses, succeeds, text, until_there};
 use crate::train::{config, json, refused, residyn, run};
 
 #[test]
@@ -19,14 +17,12 @@ fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {
     let config = config("train-pendulum.toml");
     let save_often = ["--save-every", "20", "--out", "c"];
     let command = [&["train", "--config", &config][..], &save_often].concat();
-    let first = residyn(dir, &[&command[..], &["--json"]].concat())
+    let mut first = residyn(dir, &[&command[..], &["--json"]].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    while !dir.join("c/checkpoint.json").exists() {
-        sleep(Duration::from_millis(2));
-    }
+    until_there(&dir.join("c/checkpoint.json"), &mut first);
     for again in [&command[..], &["closeloop", "--out", "./c"]] {
         let message = refused(dir, again);
         let told = format!(

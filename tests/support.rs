@@ -1,7 +1,9 @@
 //! Shared by several tests: the real binary, scratch folders, measured data.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::thread::sleep;
+use std::time::Duration;
 
 /// Run the program and return what it printed and its exit status.
 pub fn residyn(arguments: &[&str]) -> Output {
@@ -65,6 +67,14 @@ pub fn evaluated(model: &[&str], log: &str) -> f64 {
     let all = [&["evaluate", "--json", "--test", log], model].concat();
     let value: serde_json::Value = serde_json::from_str(&succeeds(&all)).unwrap();
     value["position_rmse"][1][0].as_f64().unwrap()
+}
+
+/// Wait until a run, which must not end before, has made a file.
+pub fn until_there(path: &Path, run: &mut Child) {
+    while !path.exists() {
+        assert!(run.try_wait().unwrap().is_none(), "the run has ended");
+        sleep(Duration::from_millis(2));
+    }
 }
 
 /// A path as text.

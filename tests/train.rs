@@ -12,6 +12,8 @@ use residyn::train::recipe::{Job, Recipe, TrainingResults};
 use residyn::train::{Backend, Penalty};
 use serde_json::Value;
 
+use crate::support::until_there;
+
 pub fn configs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")
 }
@@ -75,9 +77,7 @@ fn worst(outcome: &TrainingResults) -> f64 {
 pub fn kill_after(command: &mut Command, file: &Path, later: Duration) {
     let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = quiet.spawn().unwrap();
-    while !file.exists() {
-        sleep(Duration::from_millis(2));
-    }
+    until_there(file, &mut child);
     sleep(later);
     child.kill().unwrap();
     let status = child.wait().unwrap();

@@ -139,9 +139,9 @@ struct Store {
 
 impl Store {
     fn open(folder: &RunFolder) -> Result<Self> {
-        let file = Lines::new(folder, "cells.jsonl");
+        let (file, known) = Lines::open(folder, "cells.jsonl")?;
         Ok(Self {
-            known: file.read()?,
+            known,
             file,
             program: program_id()?,
         })

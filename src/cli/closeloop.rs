@@ -1,8 +1,10 @@
+mod calibrate;
+
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
@@ -12,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use super::call::{Begun, files};
 use super::{Answer, Common, inputs, interrupt, progress, voice};
 use crate::closeloop::{
-    Outcome, Reference, Request, Settings, Space, Split, Verdict, calibrate, close_loop,
+    Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, close_loop,
 };
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Model, Origin};
@@ -48,7 +50,8 @@ pub(super) struct Arguments {
     #[arg(long, num_args = 1.., value_name = "LOG@T0-T1")]
     leave_out: Vec<LeaveOut>,
     /// Afterwards repeat the search on this many simulations of the accepted model: how often does it name an effect
-    /// where there is none, and how small an effect would it name? Takes about as long as so many runs
+    /// where there is none, and how small an effect would it name? Takes about as long as so many runs; the same command
+    /// goes on with those of an interrupted run
     #[arg(long, num_args = 0..=1, default_missing_value = "20", value_name = "RUNS", value_parser = inputs::count)]
     calibrate: Option<NonZeroUsize>,
     /// Time after which the search for effects stops where it stands, and the report says so: 90s, 10min, 2h
@@ -127,25 +130,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut report = voice::stage("writing the report", || write(&outcome))?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
-        let bar = progress::bar(runs.get());
         let study = outcome.study(&declared);
-        let begun = Instant::now();
-        let calibration = calibrate(
-            &study,
-            &outcome.models.after,
-            &library,
-            runs.get(),
-            &mut rng,
-            &mut |step| {
-                bar.set_length(step.of as u64);
-                bar.set_position(step.number as u64);
-                bar.set_message(step.text.to_owned());
-            },
-        )?;
+        let accepted = &outcome.models.after;
+        let calibrator = Calibrator::new(&study, accepted, &library, runs.get(), &mut rng)?;
+        let run = calibrate::run_id(&origin(), &accepted.model, &inputs)?;
+        let (calibration, kept) = calibrate::carry_out(calibrator, &folder, &run)?;
         outcome.calibration = Some(calibration);
-        bar.finish_and_clear();
-        voice::took("simulating the accepted model", begun);
         report = write(&outcome)?;
+        kept.remove()?;
     }
     if arguments.common.json {
         voice::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;

@@ -25,23 +25,25 @@ static RUN: Mutex<Option<Run>> = Mutex::new(None);
 static HANDLER: Once = Once::new();
 static HIT: AtomicBool = AtomicBool::new(false);
 
-/// While it exists, Ctrl-C ends the run in a folder in an orderly way.
-pub(super) struct Orderly;
+/// While it exists, Ctrl-C ends the run in a folder in an orderly way. Then it does what it did before.
+pub(super) struct Orderly {
+    before: Option<Run>,
+}
 
 /// From now on Ctrl-C prints what `says` returns and ends the program; a second one ends it at once.
 pub(super) fn orderly(folder: &RunFolder, says: impl Fn() -> String + Send + 'static) -> Orderly {
-    *run() = Some(Run {
+    let before = run().replace(Run {
         folder: folder.clone(),
         says: Box::new(says),
     });
     // Without a handler Ctrl-C ends the program all the same, and says nothing.
     HANDLER.call_once(|| _ = ctrlc::set_handler(hit));
-    Orderly
+    Orderly { before }
 }
 
 impl Drop for Orderly {
     fn drop(&mut self) {
-        *run() = None;
+        *run() = self.before.take();
     }
 }
 

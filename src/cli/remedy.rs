@@ -21,11 +21,14 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().and_then(of_rigs))
 }
 
+/// What to do where nothing more fits on a disk.
+const FULL: &str = "free some space, or give another folder with --out";
+
 fn of_output(error: &OutputError) -> Option<&'static str> {
     Some(match error.source.kind() {
         ErrorKind::InvalidInput => "move it away, or give another name with --out",
         ErrorKind::NotFound => "make the folder first, or give another with --out",
-        ErrorKind::StorageFull => "free some space, or give another folder with --out",
+        ErrorKind::StorageFull => FULL,
         _ => "give another folder with --out",
     })
 }
@@ -38,6 +41,7 @@ fn of_folder(error: &RunFolderError) -> Option<&'static str> {
         RunFolderError::OtherRun { .. } | RunFolderError::Damaged { .. } => {
             Some("give another folder with --out, or remove this one to start anew")
         }
+        RunFolderError::Io { source, .. } if source.kind() == ErrorKind::StorageFull => Some(FULL),
         RunFolderError::NotAFolder { .. } | RunFolderError::Io { .. } => {
             Some("give a folder that can be written with --out")
         }

@@ -5,6 +5,7 @@ use clap::Args;
 
 use super::{Answer, voice};
 use crate::report::Report;
+use crate::runs::RunFolder;
 
 /// Make report.html and report.md again from report.json
 #[derive(Debug, Args)]
@@ -17,6 +18,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let report = Report::read(&arguments.folder)?;
+    let _folder = RunFolder::open(&arguments.folder)?;
     for path in report.write_readable(&arguments.folder)? {
         voice::print(&format!("{}\n", path.display()))?;
     }

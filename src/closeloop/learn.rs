@@ -17,6 +17,7 @@ use super::split::between;
 use super::stage::{Observer, Progress, Stage};
 use super::study::Study;
 use crate::data::{Log, Thinning, Trajectory, trajectories};
+use crate::files::OutputError;
 use crate::model::{Dynamics, Origin};
 use crate::sim::as_modelled;
 use crate::sim::metric::assess;
@@ -60,10 +61,10 @@ pub trait LearnedResidual: Send {
     ///
     /// # Errors
     /// A folder that cannot be written, or that holds something other than a checkpoint.
-    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), LearnError>;
+    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), OutputError>;
 }
 
-/// Why a residual network could not be trained or saved.
+/// Why a residual network could not be trained.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct LearnError(#[source] Box<dyn Error + Send + Sync>);

@@ -38,7 +38,9 @@ mod tests;
 mod verdict;
 
 pub use by_log::OfLog;
-pub use calibrate::{Calibration, DetectionLimit, Repetition, Smallest, calibrate};
+pub use calibrate::{
+    Calibration, Calibrator, DetectionLimit, Named, Searched, Simulation, Smallest,
+};
 pub use discriminate::{Alternative, NotSimulated, Separation};
 pub use error::StudyError;
 pub use establish::Standing;

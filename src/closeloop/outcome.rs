@@ -33,7 +33,7 @@ pub struct Outcome {
     pub learned: Option<Learned>,
     /// The chosen model fitted to each training log alone; empty for a single log and for very many.
     pub by_log: Vec<OfLog>,
-    /// What the training logs could show, where that was asked for: see [`calibrate`](super::calibrate()).
+    /// What the training logs could show, where that was asked for: see [`Calibrator`](super::Calibrator).
     pub calibration: Option<Calibration>,
     /// How long each stage took in s.
     pub seconds: Vec<(Stage, f64)>,

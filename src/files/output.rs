@@ -2,6 +2,7 @@ use std::fs;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use super::fresh::{Fresh, hidden_beside, remove_folder};
 use super::input::kind;
 
 /// As many as Linux follows.
@@ -33,12 +34,15 @@ const ROOM: usize = 4 << 20;
 pub fn check_room(path: &Path) -> Result<(), OutputError> {
     let folder = path.ancestors().find(|folder| folder.is_dir());
     let folder = folder.unwrap_or(Path::new("."));
-    let room = || tempfile::tempfile_in(folder)?.write_all(&vec![0; ROOM]);
+    let room = || {
+        let mut probe = Fresh::beside(&folder.join("room"))?;
+        probe.file.write_all(&vec![0; ROOM])
+    };
     room().map_err(OutputError::of(path))
 }
 
-/// Write a file whole or not at all: under a temporary name in the same folder, which is then renamed. Symbolic links
-/// are followed, so that the file that a link points to is written and the link stays.
+/// Write a file whole or not at all: under a temporary name in the same folder, `.NAME.tmp`, which is then renamed. Symbolic
+/// links are followed, so that the file that a link points to is written and the link stays.
 ///
 /// # Errors
 /// A folder that does not exist or cannot be written, a full disk, or a `path` that is no regular file (a folder, a
@@ -62,25 +66,28 @@ pub fn write_with(
             let missing = "its folder does not exist";
             return Err(io::Error::new(ErrorKind::NotFound, missing));
         }
-        let file = with_usual_permissions().tempfile_in(folder)?;
-        let mut buffer = BufWriter::new(file);
+        let fresh = Fresh::beside(&target)?;
+        let mut buffer = BufWriter::new(&fresh.file);
         write(&mut buffer)?;
-        let file = buffer.into_inner()?;
-        file.as_file().sync_all()?;
-        file.persist(&target).map_err(|error| error.error)?;
-        Ok(())
+        buffer.flush()?;
+        drop(buffer);
+        fresh.become_file(&target)
     };
     written().map_err(OutputError::of(path))
 }
 
 /// Move all files and folders in the folder `from` into the folder `to`: each file as [`write_whole`] would write it
-/// there, each folder in place of the one of its name. Either all of them have somewhere to go, or none is moved.
+/// there, each folder in place of the one of its name. Either all of them have somewhere to go, or none is moved. Where `to`
+/// does not exist yet, `from` becomes it, all at once.
 ///
 /// # Errors
 /// A file whose place is taken by what is no regular file, a folder whose place is taken by a file, or as
 /// [`write_whole`].
 pub fn move_contents(from: &Path, to: &Path) -> Result<(), OutputError> {
-    fs::create_dir_all(to).map_err(OutputError::of(to))?;
+    let to = &end_of_links(to);
+    if !to.exists() {
+        return fs::rename(from, to).map_err(OutputError::of(to));
+    }
     let entries = fs::read_dir(from).map_err(OutputError::of(from))?;
     let pair = |entry: io::Result<fs::DirEntry>| {
         let entry = entry.map_err(OutputError::of(from))?;
@@ -112,11 +119,18 @@ fn check_target(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
+/// A folder is moved away before another takes its place, so that none has its name of which a part is removed.
 fn replace_folder(from: &Path, to: &Path) -> io::Result<()> {
+    let older = hidden_beside(from, ".old");
     if to.is_dir() {
-        fs::remove_dir_all(to)?;
+        fs::rename(to, &older)?;
     }
-    fs::rename(from, to)
+    if let Err(error) = fs::rename(from, to) {
+        // There is nothing better to do where this fails, too.
+        let _ = fs::rename(&older, to);
+        return Err(error);
+    }
+    remove_folder(&older)
 }
 
 fn move_file(from: &Path, to: &Path) -> Result<(), OutputError> {
@@ -161,15 +175,6 @@ pub fn end_of_links(path: &Path) -> PathBuf {
         }
     }
     at
-}
-
-/// Temporary files are private by default; results have the permissions of any new file.
-fn with_usual_permissions() -> tempfile::Builder<'static, 'static> {
-    #[cfg_attr(not(unix), allow(unused_mut))]
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
 }
 
 #[cfg(test)]
@@ -255,5 +260,20 @@ mod tests {
         move_contents(from.path(), to.path()).unwrap();
         assert_eq!(fs::read_dir(to.path()).unwrap().count(), 3);
         assert_eq!(fs::read_dir(from.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_folder_that_is_missing_is_there_all_at_once() {
+        let parent = tempfile::tempdir().unwrap();
+        let [from, link] = ["from", "link"].map(|name| parent.path().join(name));
+        std::os::unix::fs::symlink("real", &link).unwrap();
+        fs::create_dir(&from).unwrap();
+        fs::write(from.join("a"), "whole").unwrap();
+        move_contents(&from, &link).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        let moved = parent.path().join("real/a");
+        assert_eq!(fs::read(moved).unwrap(), b"whole");
+        assert!(!from.exists());
     }
 }

@@ -7,9 +7,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::wording::{listed, small, with_unit};
-use crate::closeloop::{Calibration, DetectionLimit, Smallest};
+use crate::closeloop::{Calibration, DetectionLimit, Named, Smallest};
 use crate::data::Joint;
-use crate::model::{EffectParameter, FittedEffect};
+use crate::model::EffectParameter;
 
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
 pub(super) struct CalibrationEntry {
@@ -97,7 +97,7 @@ impl CalibrationEntry {
 fn false_names(calibration: &Calibration) -> Vec<AlarmEntry> {
     let mut runs: BTreeMap<(&str, Joint), usize> = BTreeMap::new();
     for effect in calibration.named.iter().flatten() {
-        *runs.entry((&effect.effect.name, effect.joint)).or_default() += 1;
+        *runs.entry((&effect.name, effect.joint)).or_default() += 1;
     }
     runs.into_iter()
         .map(|((name, joint), runs)| AlarmEntry {
@@ -147,7 +147,7 @@ fn smallest(limit: &DetectionLimit, top_torque: &[f64]) -> SmallestEntry {
         verified: limit.verified(),
         named_besides: besides(limit)
             .map(|other| EffectEntry {
-                name: other.effect.name.clone(),
+                name: other.name.clone(),
                 joint: other.joint,
             })
             .collect(),
@@ -166,9 +166,10 @@ fn reason(size: &Smallest) -> Option<&'static str> {
 }
 
 /// What was named beside the hidden effect, or in its place.
-fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &FittedEffect> {
+fn besides(limit: &DetectionLimit) -> impl Iterator<Item = &Named> {
+    let hidden = Named::of(&limit.effect);
     let named = limit.named.iter().flatten();
-    named.filter(|named| named.label() != limit.effect.label())
+    named.filter(move |named| **named != hidden)
 }
 
 /// The section of `report.md`.

@@ -7,8 +7,10 @@ use super::json::{CHECKPOINT, MODEL, PAGE, PLOTS, RANGES, REPORT, TEXT};
 use super::plot::PlotError;
 use super::schema::Report;
 use super::{model_file, page, picture, text};
-use crate::closeloop::{LearnError, Outcome, Stage};
-use crate::files::{OutputError, folder_of, move_contents, read_saved, write_whole};
+use crate::closeloop::{Outcome, Stage};
+use crate::files::{
+    OutputError, end_of_links, folder_of, fresh_folder, move_contents, read_saved, write_whole,
+};
 use crate::model::Origin;
 
 /// Why results could not be written.
@@ -18,8 +20,6 @@ pub enum WriteError {
     File(#[from] OutputError),
     #[error(transparent)]
     Plot(#[from] PlotError),
-    #[error(transparent)]
-    Checkpoint(#[from] LearnError),
 }
 
 impl WriteError {
@@ -95,7 +95,7 @@ pub fn write(
     let folder = folder.as_ref();
     let parent = folder_of(folder);
     std::fs::create_dir_all(parent).map_err(OutputError::of(parent))?;
-    let staging = tempfile::TempDir::new_in(parent).map_err(OutputError::of(folder))?;
+    let staging = fresh_folder(&end_of_links(folder)).map_err(OutputError::of(folder))?;
     let report = Report::new(outcome, origin);
     put_all(staging.path(), &report, outcome, origin)
         .map_err(|error| error.of(staging.path(), folder))?;

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::Identity;
 use super::lock::{Lock, owner};
-use crate::files::{OutputError, check_room, end_of_links, folder_of, write_whole};
+use crate::files::{OutputError, check_room, end_of_links, folder_of, hidden_beside, write_whole};
 
 /// What a folder belongs to: the identity of its run and the version that began it.
 const RECORD: &str = "run.json";
@@ -229,10 +229,7 @@ fn lock_of(path: &Path) -> io::Result<PathBuf> {
         Ok(real) => real,
         Err(_) => fs::canonicalize(folder_of(&path))?.join(path.file_name().unwrap_or_default()),
     };
-    let mut name = std::ffi::OsString::from(".");
-    name.push(real.file_name().unwrap_or_default());
-    name.push(".lock");
-    Ok(real.with_file_name(name))
+    Ok(hidden_beside(&real, ".lock"))
 }
 
 fn failed(action: &'static str, path: &Path) -> impl Fn(io::Error) -> RunFolderError {

@@ -1,5 +1,6 @@
-use std::fs::OpenOptions;
-use std::io::Write;
+use std::fs::{self, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -14,37 +15,106 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// The file of this name, which need not exist yet.
-    pub fn new(folder: &RunFolder, name: &'static str) -> Self {
-        Self {
-            folder: folder.clone(),
-            name,
-        }
-    }
-
-    /// The results that are there. A truncated line, or one of another version, is none.
+    /// The file of this name, which need not exist yet, and the results that are there. What a killed run left of a line is
+    /// cut off; a line of another version is no result.
     ///
     /// # Errors
-    /// A file that cannot be read.
-    pub fn read<T: DeserializeOwned>(&self) -> Result<Vec<T>, RunFolderError> {
-        let bytes = self.folder.bytes(self.name)?.unwrap_or_default();
+    /// A file that cannot be read, or not be cut.
+    pub fn open<T: DeserializeOwned>(
+        folder: &RunFolder,
+        name: &'static str,
+    ) -> Result<(Self, Vec<T>), RunFolderError> {
+        let file = Self {
+            folder: folder.clone(),
+            name,
+        };
+        let mut bytes = folder.bytes(name)?.unwrap_or_default();
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n');
+        let whole = whole.map_or(0, |last| last + 1);
+        if whole < bytes.len() {
+            bytes.truncate(whole);
+            file.cut(whole)?;
+        }
         let lines = bytes.split(|byte| *byte == b'\n');
-        Ok(lines
-            .filter_map(|line| serde_json::from_slice(line).ok())
-            .collect())
+        let results = lines.filter_map(|line| serde_json::from_slice(line).ok());
+        Ok((file, results.collect()))
     }
 
-    /// Add a result; the folder is made where it is missing.
+    /// Add a result, all of it or nothing; the folder is made where it is missing.
     ///
     /// # Errors
     /// A file that cannot be written.
     pub fn add(&self, result: &impl Serialize) -> Result<(), RunFolderError> {
         self.folder.make()?;
-        let path = self.folder.path().join(self.name);
+        let path = self.path();
         let json = serde_json::to_string(result).expect("numbers, texts and names");
-        let opened = OpenOptions::new().create(true).append(true).open(&path);
-        // Begin with a line break too: the line before may be truncated.
-        let written = opened.and_then(|mut file| file.write_all(format!("\n{json}\n").as_bytes()));
-        Ok(written.map_err(OutputError::of(&path))?)
+        Ok(append(&path, &(json + "\n")).map_err(OutputError::of(&path))?)
+    }
+
+    /// Remove the file, whose results are part of others now.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub fn remove(self) -> Result<(), RunFolderError> {
+        let path = self.path();
+        fs::remove_file(&path).map_err(|source| RunFolderError::Io {
+            action: "removed",
+            path,
+            source,
+        })
+    }
+
+    fn cut(&self, length: usize) -> Result<(), RunFolderError> {
+        let path = self.path();
+        let opened = OpenOptions::new().write(true).open(&path);
+        let cut = opened.and_then(|file| file.set_len(length as u64));
+        Ok(cut.map_err(OutputError::of(&path))?)
+    }
+
+    fn path(&self) -> PathBuf {
+        self.folder.path().join(self.name)
+    }
+}
+
+fn append(path: &Path, line: &str) -> io::Result<()> {
+    let mut file = OpenOptions::new().create(true).append(true).open(path)?;
+    let before = file.metadata()?.len();
+    // Some file systems tell of a full disk only when what was written is on it.
+    let written = file.write_all(line.as_bytes());
+    let written = written.and_then(|()| file.sync_data());
+    if written.is_err() {
+        // Where this fails as well, the line is cut off when the file is opened again.
+        let _ = file.set_len(before);
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Lines, RunFolder, fs};
+
+    #[test]
+    fn what_is_left_of_a_line_is_cut_off() {
+        let parent = tempfile::tempdir().unwrap();
+        let folder = RunFolder::open(&parent.path().join("run")).unwrap();
+        let open = || Lines::open::<u32>(&folder, "a.jsonl").unwrap();
+        let (lines, found) = open();
+        assert_eq!(found, []);
+        lines.add(&1).unwrap();
+        lines.add(&20).unwrap();
+        let path = folder.path().join("a.jsonl");
+        for (left, found, kept) in [
+            ("1\n20\n3", vec![1, 20], "1\n20\n"),
+            // A line of another version stays.
+            ("1\n{}\n20\n", vec![1, 20], "1\n{}\n20\n"),
+            ("2", vec![], ""),
+        ] {
+            fs::write(&path, left).unwrap();
+            let (lines, results) = open();
+            assert_eq!(results, found);
+            assert_eq!(fs::read_to_string(&path).unwrap(), kept);
+            lines.add(&4).unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), format!("{kept}4\n"));
+        }
     }
 }

@@ -1,6 +1,8 @@
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use crate::files::is_at;
 
 /// An advisory lock, held until it is dropped or the process ends. Its file is removed when it is dropped.
 #[derive(Debug)]
@@ -52,22 +54,4 @@ impl Drop for Lock {
     fn drop(&mut self) {
         self.remove();
     }
-}
-
-/// Whether `path` is still the name of `file`.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> io::Result<bool> {
-    use std::os::unix::fs::MetadataExt;
-    let identity = |found: fs::Metadata| (found.dev(), found.ino());
-    match fs::metadata(path) {
-        Ok(found) => Ok(identity(found) == identity(file.metadata()?)),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-        Err(error) => Err(error),
-    }
-}
-
-/// Elsewhere a file that is open keeps its name.
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> io::Result<bool> {
-    Ok(true)
 }

@@ -1,4 +1,5 @@
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use burn::tensor::Device;
@@ -6,7 +7,10 @@ use burn::tensor::Device;
 use super::manifest::{FORMAT, Manifest};
 use super::optimizer::Moments;
 use super::{Backend, Best, CheckpointError, HybridModel, Training, moments};
-use crate::files::{content_id, end_of_links, folder_of, read_saved, write_whole};
+use crate::files::{
+    OutputError, content_id, end_of_links, folder_of, fresh_folder, hidden_beside, read_saved,
+    remove_folder, write_whole,
+};
 use crate::model::{Dynamics, Library, Model, ModelWeights, Origin, SavedModelError, weights};
 
 const MANIFEST: &str = "checkpoint.json";
@@ -33,8 +37,8 @@ pub struct Checkpoint {
 /// Writes a run to `dir`, completely or not at all, in place of any checkpoint that is there.
 ///
 /// The files are written to a new directory beside `dir`, which then takes its name. The old one is
-/// meanwhile called `dir.previous`; should the program die between the two renamings, [`Checkpoint::load`]
-/// finds it there.
+/// meanwhile called `.NAME.previous`; should the program die between the two renamings, [`Checkpoint::load`]
+/// finds it there, and [`Checkpoint::find`] puts it back.
 ///
 /// # Errors
 /// A directory that cannot be written, or that holds something else than a checkpoint.
@@ -56,30 +60,14 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
         (MANIFEST, &json),
     ];
     let parent = folder_of(dir);
-    fs::create_dir_all(parent).map_err(io("create the directory", parent))?;
-    let fresh = fresh_beside(dir, parent).map_err(io("create a directory in", parent))?;
+    fs::create_dir_all(parent).map_err(OutputError::of(parent))?;
+    let fresh = fresh_folder(dir).map_err(OutputError::of(dir))?;
     for (name, bytes) in files {
-        let path = fresh.path().join(name);
+        let written = write_whole(&fresh.path().join(name), bytes);
         // Where it is to be, since the temporary name is gone.
-        write_whole(&path, bytes).map_err(|error| io("write", &dir.join(name))(error.source))?;
+        written.map_err(|error| OutputError::of(&dir.join(name))(error.source))?;
     }
-    replace(dir, fresh)
-}
-
-/// A temporary directory, deleted unless it is kept; with the usual permissions, where temporary ones are private. Its
-/// name depends on `dir` alone, so that the remains of a killed program are found and removed.
-fn fresh_beside(dir: &Path, parent: &Path) -> std::io::Result<tempfile::TempDir> {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(dir.file_name().unwrap_or_default());
-    name.push(".new");
-    let left = parent.join(&name);
-    if left.exists() {
-        fs::remove_dir_all(left)?;
-    }
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-    builder.prefix(&name).rand_bytes(0).tempdir_in(parent)
+    Ok(replace(dir, fresh).map_err(OutputError::of(dir))?)
 }
 
 fn refuse_other_contents(dir: &Path) -> Result<(), CheckpointError> {
@@ -95,33 +83,38 @@ fn refuse_other_contents(dir: &Path) -> Result<(), CheckpointError> {
     }
 }
 
-fn replace(dir: &Path, fresh: tempfile::TempDir) -> Result<(), CheckpointError> {
+fn replace(dir: &Path, fresh: tempfile::TempDir) -> std::io::Result<()> {
     let previous = previous(dir);
     if dir.exists() {
-        if previous.exists() {
-            fs::remove_dir_all(&previous).map_err(io("remove", &previous))?;
-        }
-        fs::rename(dir, &previous).map_err(io("set aside", dir))?;
+        remove_folder(&previous)?;
+        fs::rename(dir, &previous)?;
     }
     if let Err(error) = fs::rename(fresh.path(), dir) {
         if previous.exists() {
-            fs::rename(&previous, dir).map_err(io("put back", dir))?;
+            fs::rename(&previous, dir)?;
         }
-        return Err(io("move the checkpoint to", dir)(error));
+        return Err(error);
     }
     // The directory has been renamed: nothing is left to delete under its temporary name.
     let _ = fresh.keep();
-    if previous.exists() {
-        fs::remove_dir_all(&previous).map_err(io("remove", &previous))?;
+    remove_folder(&previous)
+}
+
+/// End a replacement that a killed program began: whatever it came to, one checkpoint is there and has its name.
+fn settle(dir: &Path) -> std::io::Result<()> {
+    let previous = previous(dir);
+    if dir.join(MANIFEST).is_file() {
+        return remove_folder(&previous);
     }
-    Ok(())
+    match fs::rename(&previous, dir) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Where the older checkpoint is while a new one takes its place.
 fn previous(dir: &Path) -> PathBuf {
-    let mut name = dir.as_os_str().to_owned();
-    name.push(".previous");
-    PathBuf::from(name)
+    hidden_beside(dir, ".previous")
 }
 
 fn io<'a>(action: &'static str, path: &'a Path) -> impl Fn(std::io::Error) -> CheckpointError + 'a {
@@ -180,17 +173,16 @@ impl Checkpoint {
         Ok((checkpoint, declared, trained))
     }
 
-    /// The checkpoint in `dir`, or none where `dir` does not exist or is empty.
+    /// The checkpoint in `dir`, which the caller owns, or none where `dir` does not exist or is empty.
     ///
     /// # Errors
     /// As [`Checkpoint::load`], or a directory that holds something else.
     pub fn find(dir: &Path) -> Result<Option<Self>, CheckpointError> {
         let dir = &end_of_links(dir);
+        settle(dir).map_err(OutputError::of(dir))?;
         refuse_other_contents(dir)?;
-        if dir.join(MANIFEST).is_file() || (!dir.exists() && previous(dir).exists()) {
-            return Self::load(dir).map(Some);
-        }
-        Ok(None)
+        let is_there = dir.join(MANIFEST).is_file();
+        is_there.then(|| Self::load(dir)).transpose()
     }
 
     /// A hash of the trained model's numbers.
@@ -280,12 +272,10 @@ fn read(dir: &Path, file: &str) -> Result<Vec<u8>, CheckpointError> {
     let path = dir.join(file);
     match read_saved(&path) {
         Ok(bytes) => Ok(bytes),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            Err(CheckpointError::Missing {
-                missing: file.to_owned(),
-                dir: dir.to_owned(),
-            })
-        }
+        Err(error) if error.kind() == ErrorKind::NotFound => Err(CheckpointError::Missing {
+            missing: file.to_owned(),
+            dir: dir.to_owned(),
+        }),
         Err(error) => Err(io("read", &path)(error)),
     }
 }

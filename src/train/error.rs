@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use super::hybrid::HybridError;
+use crate::files::OutputError;
 use crate::limits::EPOCHS;
 use crate::model::{FileError, SavedModelError};
 
@@ -104,6 +105,8 @@ pub enum CheckpointError {
         source: std::io::Error,
         path: PathBuf,
     },
+    #[error("{0}")]
+    Output(#[from] OutputError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]

@@ -1,3 +1,4 @@
+use std::io;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -5,10 +6,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::{
-    Backend, FitSettings, HybridModel, LearningRates, Penalty, Segments, TrainError, Training, save,
+    Backend, CheckpointError, FitSettings, HybridModel, LearningRates, Penalty, Segments,
+    TrainError, Training, save,
 };
 use crate::closeloop::{LearnError, LearnSettings, LearnedResidual, ResidualLearner, ResidualTask};
 use crate::data::Trajectory;
+use crate::files::OutputError;
 use crate::model::{Dynamics, LastLayer, MlpSettings, Origin, ResidualOn};
 use crate::sim::Integrator;
 
@@ -41,8 +44,11 @@ impl LearnedResidual for TrainedResidual {
         &self.hybrid
     }
 
-    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), LearnError> {
-        save(folder, &self.run, origin).map_err(LearnError::new)
+    fn save(&self, folder: &Path, origin: &Origin) -> Result<(), OutputError> {
+        save(folder, &self.run, origin).map_err(|error| match error {
+            CheckpointError::Output(error) => error,
+            other => OutputError::of(folder)(io::Error::other(other)),
+        })
     }
 }
 

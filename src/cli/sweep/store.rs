@@ -31,8 +31,7 @@ pub struct Stored {
 
 impl Store {
     pub fn open(folder: &RunFolder, job: &Job) -> Result<Self> {
-        let file = Lines::new(folder, "models.jsonl");
-        let stored: Vec<Stored> = file.read()?;
+        let (file, stored) = Lines::open::<Stored>(folder, "models.jsonl")?;
         let by_name = |stored: Stored| (stored.configuration.clone(), stored);
         Ok(Self {
             folder: folder.clone(),

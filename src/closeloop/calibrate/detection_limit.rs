@@ -1,5 +1,6 @@
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::Named;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::select::{candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
@@ -14,14 +15,14 @@ pub struct DetectionLimit {
     pub effect: FittedEffect,
     pub smallest: Smallest,
     /// What was named with the effect at a multiple of that size; `None` where it was not tried.
-    pub named: Option<Vec<FittedEffect>>,
+    pub named: Option<Vec<Named>>,
 }
 
 impl DetectionLimit {
     /// Whether the hidden effect was named; `None` where it was not tried.
     pub fn verified(&self) -> Option<bool> {
-        let is_this = |named: &FittedEffect| named.label() == self.effect.label();
-        self.named.as_ref().map(|named| named.iter().any(is_this))
+        let this = Named::of(&self.effect);
+        self.named.as_ref().map(|named| named.contains(&this))
     }
 }
 

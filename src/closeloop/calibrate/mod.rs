@@ -8,24 +8,26 @@ mod tests;
 
 pub use self::detection_limit::{DetectionLimit, Smallest};
 
-use rand::Rng;
+use rand::{Rng, RngExt};
+use serde::{Deserialize, Serialize};
 
 use self::detection_limit::detection_limits;
 use self::simulated_logs::SimulatedLogs;
 use super::error::StudyError;
-use super::find::{Found, find};
+use super::find::find;
 use super::fitted::Fitted;
 use super::space::Space;
 use super::study::Study;
-use crate::data::Log;
+use crate::data::Joint;
 use crate::data::statistics::wilson;
 use crate::model::{FittedEffect, Library, Model, Status};
+use crate::runs::{Purpose, stream};
 
 /// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
     /// What was named in each simulation of the accepted model: every one a false alarm.
-    pub named: Vec<Vec<FittedEffect>>,
+    pub named: Vec<Vec<Named>>,
     /// Number of them with a significant unexplained remainder.
     pub unexplained: usize,
     pub limits: Vec<DetectionLimit>,
@@ -74,108 +76,163 @@ fn hidden(limit: &DetectionLimit, multiple: f64) -> Option<FittedEffect> {
         .then_some(hidden)
 }
 
-/// Progress of the work, for a display.
-#[derive(Debug, Clone, Copy)]
-pub struct Repetition<'s> {
-    pub number: usize,
-    pub of: usize,
-    pub text: &'s str,
+/// An effect that the search established.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Named {
+    pub name: String,
+    pub joint: Joint,
 }
 
-/// Simulate `runs` sets of training logs from a model that [`find`] accepted, and sets with common effects hidden
-/// in them, and search each as the user's own.
-///
-/// # Errors
-/// A study of torques; and as [`Study::fit_declared`].
-pub fn calibrate(
-    study: &Study<'_>,
-    accepted: &Fitted,
-    library: &Library,
-    runs: usize,
-    rng: &mut impl Rng,
-    progress: &mut (dyn FnMut(Repetition<'_>) + Send),
-) -> Result<Calibration, StudyError> {
-    if study.space == Space::Torque {
-        return Err(StudyError::NotOfMotion);
-    }
-    let simulated = SimulatedLogs::new(study, accepted)?;
-    let mut limits = detection_limits(study, accepted, library.effects())?;
-    let multiple = study.settings.calibrate.hidden;
-    let tried = limits
-        .iter()
-        .filter(|limit| hidden(limit, multiple).is_some());
-    let mut repeat = Repeat {
-        study,
-        library,
-        // Whatever is named beyond the accepted model is a false alarm.
-        declared: accepted.model.clone(),
-        done: 0,
-        of: runs + tried.count(),
-        progress,
-    };
-    let (mut named, mut unexplained) = (Vec::new(), 0);
-    for run in 1..=runs {
-        let logs = simulated
-            .draw(&[], rng)
-            .expect("the accepted model was fitted to these windows");
-        let found = repeat.find(
-            &logs,
-            rng,
-            &format!("simulation {run} of the accepted model"),
-        )?;
-        unexplained += usize::from(found.unexplained.is_significant());
-        named.push(Repeat::named(&found));
-    }
-    for limit in &mut limits {
-        if let Some(effect) = hidden(limit, multiple)
-            && let Some(logs) = simulated.draw(&[effect], rng)
-        {
-            let text = format!("simulation with {}", limit.effect.label());
-            let found = repeat.find(&logs, rng, &text)?;
-            limit.named = Some(Repeat::named(&found));
+impl Named {
+    /// An effect by its name.
+    pub fn of(effect: &FittedEffect) -> Self {
+        Self {
+            name: effect.effect.name.clone(),
+            joint: effect.joint,
         }
     }
-    Ok(Calibration {
-        named,
-        unexplained,
-        limits,
-        hidden: multiple,
-        top_torque: study.top_torque.clone(),
-    })
 }
 
-/// Repeats the whole search.
-struct Repeat<'a> {
-    study: &'a Study<'a>,
-    library: &'a Library,
-    declared: Model,
-    done: usize,
-    of: usize,
-    progress: &'a mut (dyn FnMut(Repetition<'_>) + Send),
+/// One set of simulated logs to be searched. What is drawn for it depends on the calibration's seed and its number alone, so
+/// that simulations may be searched in any order, and in several sessions.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    number: usize,
+    seed: u64,
+    /// What is hidden in it; nothing in a simulation of the accepted model itself.
+    hidden: Option<FittedEffect>,
 }
 
-impl Repeat<'_> {
-    fn find(&mut self, logs: &[Log], rng: &mut impl Rng, text: &str) -> Result<Found, StudyError> {
-        let mut study = Study {
-            declared: &self.declared,
-            ..self.study.on(logs)
-        };
-        let (number, of) = (self.done, self.of);
-        let found = find(&mut study, &[], self.library, rng, &mut |within| {
-            let text = format!("{text}: {}", within.text);
-            (self.progress)(Repetition {
-                number,
-                of,
-                text: &text,
-            });
-        });
-        self.done += 1;
-        found
+impl Simulation {
+    /// Tells it from the others of all calibrations of one model on one set of logs.
+    pub fn key(&self) -> String {
+        format!("{:016x} {}: {}", self.seed, self.number, self.about())
     }
 
-    fn named(found: &Found) -> Vec<FittedEffect> {
+    /// For people.
+    pub fn about(&self) -> String {
+        match &self.hidden {
+            None => format!("simulation {} of the accepted model", self.number + 1),
+            Some(effect) => format!("simulation with {}", effect.label()),
+        }
+    }
+}
+
+/// What the search said of a simulation.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Searched {
+    pub named: Vec<Named>,
+    /// Whether a significant remainder was left.
+    pub unexplained: bool,
+}
+
+/// Simulations of a model that [`find`] accepted, each to be searched as the user's own logs, and what is concluded.
+pub struct Calibrator<'a> {
+    study: &'a Study<'a>,
+    library: &'a Library,
+    /// Whatever is named beyond the accepted model is a false alarm.
+    declared: Model,
+    simulated: SimulatedLogs<'a>,
+    limits: Vec<DetectionLimit>,
+    simulations: Vec<Simulation>,
+}
+
+impl<'a> Calibrator<'a> {
+    /// Plan `runs` simulations of the accepted model, and one for each common effect that is hidden.
+    ///
+    /// # Errors
+    /// A study of torques; and as [`Study::fit_declared`].
+    pub fn new(
+        study: &'a Study<'a>,
+        accepted: &'a Fitted,
+        library: &'a Library,
+        runs: usize,
+        rng: &mut impl Rng,
+    ) -> Result<Self, StudyError> {
+        if study.space == Space::Torque {
+            return Err(StudyError::NotOfMotion);
+        }
+        let limits = detection_limits(study, accepted, library.effects())?;
+        let multiple = study.settings.calibrate.hidden;
+        let common = limits.iter().filter_map(|limit| hidden(limit, multiple));
+        let all = std::iter::repeat_n(None, runs).chain(common.map(Some));
+        let seed = rng.random();
+        Ok(Self {
+            study,
+            library,
+            declared: accepted.model.clone(),
+            simulated: SimulatedLogs::new(study, accepted)?,
+            simulations: (all.enumerate())
+                .map(|(number, hidden)| Simulation {
+                    number,
+                    seed,
+                    hidden,
+                })
+                .collect(),
+            limits,
+        })
+    }
+
+    /// All simulations, in order.
+    pub fn simulations(&self) -> &[Simulation] {
+        &self.simulations
+    }
+
+    /// Simulate, and search what comes out; nothing where the motion diverges with the hidden effect. `progress` is told
+    /// what is done.
+    ///
+    /// # Errors
+    /// As [`Study::fit_declared`].
+    pub fn search(
+        &self,
+        simulation: &Simulation,
+        progress: &mut (dyn FnMut(&str) + Send),
+    ) -> Result<Option<Searched>, StudyError> {
+        let mut rng = stream(simulation.seed, Purpose::Other(simulation.number));
+        let hidden = simulation.hidden.as_slice();
+        let Some(logs) = self.simulated.draw(hidden, &mut rng) else {
+            let is_accepted = simulation.hidden.is_none();
+            assert!(!is_accepted, "it was fitted to these windows");
+            return Ok(None);
+        };
+        let mut study = Study {
+            declared: &self.declared,
+            ..self.study.on(&logs)
+        };
+        let found = find(&mut study, &[], self.library, &mut rng, &mut |within| {
+            progress(&format!("{}: {}", simulation.about(), within.text));
+        })?;
         let established = found.chosen.standings.iter();
         let established = established.filter(|s| s.status == Status::Established);
-        established.map(|s| s.effect.clone()).collect()
+        Ok(Some(Searched {
+            named: established.map(|s| Named::of(&s.effect)).collect(),
+            unexplained: found.unexplained.is_significant(),
+        }))
+    }
+
+    /// What follows from the searches of all simulations, in their order.
+    pub fn conclude(mut self, searched: Vec<Option<Searched>>) -> Calibration {
+        let (mut named, mut unexplained) = (Vec::new(), 0);
+        for (simulation, searched) in self.simulations.iter().zip(searched) {
+            match (&simulation.hidden, searched) {
+                (None, Some(searched)) => {
+                    unexplained += usize::from(searched.unexplained);
+                    named.push(searched.named);
+                }
+                (Some(effect), Some(searched)) => {
+                    let mut limits = self.limits.iter_mut();
+                    let limit = limits.find(|limit| limit.effect.label() == effect.label());
+                    limit.expect("each comes from a limit").named = Some(searched.named);
+                }
+                (_, None) => {}
+            }
+        }
+        Calibration {
+            named,
+            unexplained,
+            limits: self.limits,
+            hidden: self.study.settings.calibrate.hidden,
+            top_torque: self.study.top_torque.clone(),
+        }
     }
 }

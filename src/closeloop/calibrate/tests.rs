@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::closeloop::settings::Settings;
 use crate::closeloop::tests::{pendulum, recorded};
+use crate::data::Log;
 
 const RIG: &str = r#"
 model = "pendulum"
@@ -88,7 +89,10 @@ fn complete_models_raise_no_false_alarm_and_hidden_effects_are_named() {
     let accepted = study.fit_declared(&[]).unwrap();
     let repeat = |runs: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        calibrate(&study, &accepted, &library, runs, &mut rng, &mut |_| {}).unwrap()
+        let calibrator = Calibrator::new(&study, &accepted, &library, runs, &mut rng).unwrap();
+        let search = |simulation| calibrator.search(simulation, &mut |_| {}).unwrap();
+        let searched = calibrator.simulations().iter().map(search).collect();
+        calibrator.conclude(searched)
     };
     let found = repeat(8);
     // At the nominal 5 % two of eight have a chance of 6 %, three one of 0.6 %.

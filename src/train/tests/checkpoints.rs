@@ -79,14 +79,14 @@ fn an_older_checkpoint_is_replaced_and_found_after_an_interrupted_replacement() 
     let newer = Checkpoint::load(&dir).unwrap();
     assert_eq!(newer.weights, trained(9.0).model().weights());
     // The state after a kill between the two renamings.
-    fs::rename(&dir, dir.with_file_name("run.previous")).unwrap();
+    fs::rename(&dir, dir.with_file_name(".run.previous")).unwrap();
     assert_eq!(Checkpoint::load(&dir).unwrap().weights, newer.weights);
     save(&dir, &trained(8.0), &origin()).unwrap();
     assert_eq!(
         Checkpoint::load(&dir).unwrap().weights,
         trained(8.0).model().weights()
     );
-    assert!(!dir.with_file_name("run.previous").exists());
+    assert!(!dir.with_file_name(".run.previous").exists());
 }
 
 #[test]

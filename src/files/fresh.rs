@@ -1,0 +1,194 @@
+//! Files and folders that are not whole yet. Their names depend on those of what they become alone, so that whoever writes
+//! it again after a kill finds and removes what is left.
+
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+use tempfile::{TempDir, TempPath};
+
+use super::folder_of;
+
+/// A file that becomes another once it is whole. It is called `.NAME.tmp` until then, and locked, so that two processes
+/// write it one after the other; and it is removed where that does not come.
+pub(super) struct Fresh {
+    pub file: File,
+    path: TempPath,
+}
+
+impl Fresh {
+    /// An empty file beside `target`.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn beside(target: &Path) -> io::Result<Self> {
+        let path = hidden_beside(target, ".tmp");
+        loop {
+            // Made anew: where a link has the name, it is not followed.
+            let made = OpenOptions::new().write(true).create_new(true).open(&path);
+            let file = match made {
+                Ok(file) => file,
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                    remove_left(&path)?;
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            if let Err(error) = file.lock() {
+                let _ = fs::remove_file(&path);
+                return Err(error);
+            }
+            // Between the two, another process may have taken it for what a killed one left.
+            if is_at(&file, &path)? {
+                let path = TempPath::try_from_path(path)?;
+                return Ok(Self { file, path });
+            }
+        }
+    }
+
+    /// Give it the name of the file that it is to be.
+    ///
+    /// # Errors
+    /// A file system that fails; the file is removed then.
+    pub fn become_file(self, target: &Path) -> io::Result<()> {
+        self.file.sync_all()?;
+        fs::rename(&self.path, target)?;
+        let _renamed = self.path.keep();
+        Ok(())
+    }
+}
+
+/// Remove a file that a killed process left. One that is being written is waited for.
+fn remove_left(path: &Path) -> io::Result<()> {
+    match File::open(path) {
+        Ok(left) => {
+            left.lock()?;
+            match is_at(&left, path)? {
+                true => fs::remove_file(path),
+                false => Ok(()),
+            }
+        }
+        // A link that leads nowhere, or a file that has just been renamed.
+        Err(error) if error.kind() == ErrorKind::NotFound => match path.is_symlink() {
+            true => fs::remove_file(path),
+            false => Ok(()),
+        },
+        Err(error) => Err(error),
+    }
+}
+
+/// An empty folder, `.NAME.new` beside `target`, which is removed with all that is in it unless it is kept. Whoever makes
+/// it owns `target`: what is there of that name was left by a killed program.
+///
+/// # Errors
+/// A folder that cannot be written.
+pub fn fresh_folder(target: &Path) -> io::Result<TempDir> {
+    let path = hidden_beside(target, ".new");
+    remove_folder(&path)?;
+    let mut builder = tempfile::Builder::new();
+    // Temporary folders are private by default; results have the permissions of any new folder.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+    let name = path.file_name().unwrap_or_default();
+    builder
+        .prefix(name)
+        .rand_bytes(0)
+        .tempdir_in(folder_of(target))
+}
+
+/// Remove a folder where there is one.
+///
+/// # Errors
+/// A folder that cannot be removed.
+pub fn remove_folder(path: &Path) -> io::Result<()> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        removed => removed,
+    }
+}
+
+/// The hidden name of what belongs to `path`, in the same folder: `.NAME` and the ending.
+pub fn hidden_beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(ending);
+    path.with_file_name(name)
+}
+
+/// Whether `path` is still the name of `file`.
+///
+/// # Errors
+/// What the system reports.
+#[cfg(unix)]
+pub fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |found: fs::Metadata| (found.dev(), found.ino());
+    match fs::metadata(path) {
+        Ok(found) => Ok(identity(found) == identity(file.metadata()?)),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Elsewhere a file that is open keeps its name.
+#[cfg(not(unix))]
+pub fn is_at(_: &File, _: &Path) -> io::Result<bool> {
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::{Fresh, fresh_folder};
+    use crate::files::write_whole;
+
+    #[test]
+    fn what_a_killed_process_left_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (target, left) = (
+            folder.path().join("a.txt"),
+            folder.path().join(".a.txt.tmp"),
+        );
+        fs::write(&left, "half").unwrap();
+        write_whole(&target, b"whole").unwrap();
+        assert_eq!(fs::read(&target).unwrap(), b"whole");
+        #[cfg(unix)]
+        for end in ["other", "none"] {
+            fs::write(folder.path().join("other"), "mine").unwrap();
+            std::os::unix::fs::symlink(end, &left).unwrap();
+            write_whole(&target, b"again").unwrap();
+            assert_eq!(fs::read(folder.path().join("other")).unwrap(), b"mine");
+            fs::remove_file(folder.path().join("other")).unwrap();
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let left = folder.path().join(".run.new");
+        fs::create_dir(&left).unwrap();
+        fs::write(left.join("half"), "").unwrap();
+        let fresh = fresh_folder(&folder.path().join("run")).unwrap();
+        assert_eq!(fs::read_dir(fresh.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn threads_write_a_file_one_after_the_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.txt");
+        let writers = AtomicUsize::new(0);
+        let work = || {
+            for _ in 0..200 {
+                let fresh = Fresh::beside(&target).unwrap();
+                assert_eq!(writers.fetch_add(1, Ordering::SeqCst), 0);
+                writers.fetch_sub(1, Ordering::SeqCst);
+                fresh.become_file(&target).unwrap();
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(work);
+            }
+        });
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

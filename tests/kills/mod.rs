@@ -1,0 +1,326 @@
+//! Long commands that are killed, that find the disk full and whose writes come short, at instants drawn at random, half of them
+//! the very changes of files. What they leave is whole, and the same command then ends with the bytes of an undisturbed run.
+//!
+//! `RESIDYN_KILLS` is the number of disturbances of each command, 4 where it is not set. `--nocapture` shows the table of
+//! docs/robustness.md.
+
+#![cfg(target_os = "linux")]
+
+mod commands;
+mod faults;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rand::seq::IteratorRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use tempfile::TempDir;
+
+use self::commands::Long;
+use self::faults::{Ended, Fault, Layer};
+
+/// Kinds of faults: at changes of files of these letters (any, where there are none), or, in capitals, signals at a time.
+const KINDS: [(&str, &str); 12] = [
+    ("kill", ""),
+    ("full", "omw"),
+    ("KILL", ""),
+    ("short", "w"),
+    ("term", ""),
+    ("torn", "w"),
+    ("int", ""),
+    ("rename", "r"),
+    ("TERM", ""),
+    ("sync", "s"),
+    ("INT", ""),
+    ("denied", "omru"),
+];
+
+/// Every fourth disturbed run is disturbed once more before it may end.
+const TWICE: usize = 4;
+
+type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// All files below a folder.
+fn files(folder: &Path) -> Files {
+    let mut found = Files::new();
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let name = PathBuf::from(entry.file_name());
+        if entry.path().is_dir() {
+            let inside = files(&entry.path()).into_iter();
+            found.extend(inside.map(|(path, bytes)| (name.join(path), bytes)));
+        } else {
+            found.insert(name, fs::read(entry.path()).unwrap());
+        }
+    }
+    found
+}
+
+fn is_hidden(path: &Path) -> bool {
+    path.iter()
+        .any(|part| part.as_encoded_bytes().starts_with(b"."))
+}
+
+fn copy(from: &Path, to: &Path) {
+    for (path, bytes) in files(from) {
+        let path = to.join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+}
+
+/// A command and what it does undisturbed.
+struct Harness {
+    scratch: TempDir,
+    layer: Layer,
+    long: Long,
+    /// What it leaves.
+    end: Files,
+    /// Each file as it ever was once it had its name.
+    ever: Vec<(String, Vec<u8>)>,
+    /// A letter for each change of files.
+    trace: String,
+    took: Duration,
+}
+
+impl Harness {
+    fn new(long: Long) -> Self {
+        let scratch = tempfile::tempdir().unwrap();
+        let at = |name: &str| {
+            let path = scratch.path().join(name);
+            fs::create_dir(&path).unwrap();
+            path
+        };
+        let layer = Layer::in_folder(scratch.path());
+        let given = at("given");
+        (long.prepare)(&given);
+        let root = at("undisturbed");
+        copy(&given, &root);
+        let arguments: Vec<&str> = long.arguments.iter().map(String::as_str).collect();
+        let begun = Instant::now();
+        let (trace, mut ever) = layer.traced(&root, &arguments, scratch.path());
+        let took = begun.elapsed();
+        let end = files(&root);
+        let last = end.iter().map(|(path, bytes)| (name(path), bytes.clone()));
+        ever.extend(last);
+        Self {
+            end,
+            ever,
+            trace,
+            took,
+            layer,
+            long,
+            scratch,
+        }
+    }
+
+    fn run(&self, root: &Path, fault: Option<Fault>) -> Ended {
+        let arguments: Vec<&str> = self.long.arguments.iter().map(String::as_str).collect();
+        self.layer.run(root, &arguments, fault)
+    }
+
+    fn draw(&self, number: usize, rng: &mut ChaCha8Rng) -> Fault {
+        let (kind, letters) = KINDS[number % KINDS.len()];
+        if kind.starts_with(char::is_uppercase) {
+            let after = self.took.mul_f64(rng.random());
+            return Fault::Signal { name: kind, after };
+        }
+        let calls = self.trace.chars().zip(1..);
+        let of_kind = calls.filter(|(call, _)| letters.is_empty() || letters.contains(*call));
+        let (_, at) = of_kind.choose(rng).unwrap();
+        Fault::Call { kind, at }
+    }
+
+    /// Disturb the command in a new folder, and let it end; what is wrong with what it leaves.
+    fn disturb(&self, number: usize) -> Result<(), String> {
+        let mut rng = ChaCha8Rng::seed_from_u64(number as u64);
+        let root = self.scratch.path().join(number.to_string());
+        fs::create_dir(&root).unwrap();
+        copy(&self.scratch.path().join("given"), &root);
+        let times = 1 + usize::from(number % TWICE == TWICE - 1);
+        let mut faults = Vec::new();
+        for time in 0..times {
+            let fault = self.draw(number + 5 * time, &mut rng);
+            faults.push(fault);
+            let ended = self.run(&root, Some(fault));
+            self.check(&root, &fault, &ended)
+                .map_err(|wrong| format!("{faults:?}: {wrong}\n{}", ended.said))?;
+        }
+        self.go_on(&root)
+            .map_err(|wrong| format!("{faults:?}, and then: {wrong}"))?;
+        fs::remove_dir_all(&root).unwrap();
+        Ok(())
+    }
+
+    /// What is wrong with the end of a disturbed run.
+    fn check(&self, root: &Path, fault: &Fault, ended: &Ended) -> Result<(), String> {
+        let found = files(root);
+        for (path, bytes) in &found {
+            if !is_hidden(path) {
+                self.is_whole(path, bytes, fault)?;
+            }
+        }
+        if ended.status.success() {
+            return self.compare(found, |path| !is_hidden(path));
+        }
+        let as_it_should = match fault.kind() {
+            "kill" | "KILL" | "torn" => ended.by(9),
+            "term" | "TERM" => ended.by(15),
+            // Before there is a handler it is the signal that ends a program.
+            "int" | "INT" => ended.by(2) || ended.status.code() == Some(130),
+            "full" | "sync" | "rename" | "denied" => {
+                tells(&ended.said, fault)?;
+                ended.status.code() == Some(2)
+            }
+            _ => false,
+        };
+        match as_it_should {
+            true => Ok(()),
+            false => Err(format!("it ends with {}", ended.status)),
+        }
+    }
+
+    /// Whether a file is one that an undisturbed run has, too, if only for a while.
+    fn is_whole(&self, path: &Path, bytes: &[u8], fault: &Fault) -> Result<(), String> {
+        let name = name(path);
+        let mut versions = self.ever.iter().filter(|(other, _)| *other == name);
+        let is_there = match name.ends_with(".jsonl") {
+            // Lines are added to it. The last may be cut by a kill alone.
+            true => {
+                let whole = bytes.iter().rposition(|byte| *byte == b'\n');
+                let whole = &bytes[..whole.map_or(0, |last| last + 1)];
+                let is_cut = whole.len() < bytes.len() && fault.kind() != "torn";
+                !is_cut && versions.any(|(_, version)| version.starts_with(whole))
+            }
+            false => versions.any(|(_, version)| version == bytes),
+        };
+        match is_there {
+            true => Ok(()),
+            false => Err(format!("{} is not whole", path.display())),
+        }
+    }
+
+    /// Let the command end: with the bytes of the undisturbed run, and without doing again what is done.
+    fn go_on(&self, root: &Path) -> Result<(), String> {
+        let said = (self.long.goes_on)(root);
+        let done = stretches(root);
+        let ended = self.run(root, None);
+        if !ended.status.success() {
+            return Err(format!("{}\n{}", ended.status, ended.said));
+        }
+        if let Some(said) = said.filter(|said| !ended.said.contains(said)) {
+            return Err(format!("{said:?} is not said:\n{}", ended.said));
+        }
+        let again = stretches(root);
+        if let Some((path, _)) = done.iter().find(|(path, node)| again[*path] != **node) {
+            return Err(format!("{} was written again", path.display()));
+        }
+        self.compare(files(root), |_| true)
+    }
+
+    fn compare(&self, found: Files, counts: impl Fn(&Path) -> bool) -> Result<(), String> {
+        let of = |files: &Files| -> Vec<PathBuf> {
+            let names = files.keys().filter(|path| counts(path));
+            names.cloned().collect()
+        };
+        let names = of(&self.end);
+        if of(&found) != names {
+            return Err(format!("there are {:?}, not {names:?}", of(&found)));
+        }
+        match names.iter().find(|name| found[*name] != self.end[*name]) {
+            Some(name) => Err(format!("{} differs", name.display())),
+            None => Ok(()),
+        }
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap().to_str().unwrap().to_owned()
+}
+
+/// The error names the user's folder, no temporary one, and what to do.
+fn tells(said: &str, fault: &Fault) -> Result<(), String> {
+    let last = said.lines().last().unwrap_or_default();
+    let remedy = match fault.kind() {
+        "full" => "free some space",
+        _ => "--out",
+    };
+    let is_good = last.starts_with("error: out") || last.contains(" out");
+    let temporary = [".tmp", ".new", ".previous", "room"];
+    match is_good && last.contains(remedy) && !temporary.iter().any(|name| last.contains(name)) {
+        true => Ok(()),
+        false => Err("its message does not help".to_owned()),
+    }
+}
+
+/// The recorded motion of all rounds that are done, and the file on the disk that each is.
+fn stretches(root: &Path) -> BTreeMap<PathBuf, u64> {
+    let all = files(root);
+    let rounds = all
+        .iter()
+        .filter(|(path, _)| path.ends_with("rounds.jsonl"));
+    let done = rounds.flat_map(|(path, bytes)| {
+        let rounds = bytes.iter().filter(|byte| **byte == b'\n').count();
+        (0..=rounds).map(|k| path.with_file_name(format!("stretch-{k:03}.csv")))
+    });
+    done.map(|path| {
+        let node = fs::metadata(root.join(&path)).unwrap().ino();
+        (path, node)
+    })
+    .collect()
+}
+
+/// Disturb a command, `first` being the first of the kinds.
+fn survives(long: Long, first: usize) {
+    let harness = Harness::new(long);
+    let count = std::env::var("RESIDYN_KILLS").map_or(4, |count| count.parse().unwrap());
+    let failures: Vec<String> = (first..first + count)
+        .filter_map(|number| harness.disturb(number).err())
+        .collect();
+    println!(
+        "| `{}` | {count} | {} | {:.2} s, {} changes |",
+        harness.long.name,
+        count - failures.len(),
+        harness.took.as_secs_f64(),
+        harness.trace.len()
+    );
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+#[test]
+fn a_training_survives() {
+    survives(commands::train(), 0);
+}
+
+#[test]
+fn a_tuning_survives() {
+    survives(commands::tune(), 4);
+}
+
+#[test]
+fn a_sweep_survives() {
+    survives(commands::sweep(), 8);
+}
+
+#[test]
+fn a_loop_of_episodes_survives() {
+    survives(commands::mbrl(), 12);
+}
+
+#[test]
+fn an_experiment_survives() {
+    survives(commands::experiment(), 16);
+}
+
+#[test]
+fn a_bench_survives() {
+    survives(commands::bench(), 20);
+}
+
+#[test]
+fn a_calibration_survives() {
+    survives(commands::closeloop(), 24);
+}
