@@ -99,7 +99,7 @@ mod tests {
         let folder = RunFolder::open(&parent.path().join("run")).unwrap();
         let open = || Lines::open::<u32>(&folder, "a.jsonl").unwrap();
         let (lines, found) = open();
-        assert_eq!(found, []);
+        assert!(found.is_empty());
         lines.add(&1).unwrap();
         lines.add(&20).unwrap();
         let path = folder.path().join("a.jsonl");
