@@ -157,7 +157,7 @@ fn shortened(logs: Vec<Log>, audits: &mut [Audit]) -> Vec<Log> {
         let is_long = log.is_long();
         let log = log.shortened();
         if let Some(note) = log.notes.last().filter(|_| is_long) {
-            audit.add(Finding::new(Severity::Info, note.clone()));
+            audit.add(Finding::new(Severity::Warning, note.clone()));
         }
         log
     };
@@ -177,7 +177,7 @@ fn tell_too_many(study: &Study<'_>, library: &Library, audits: &mut [Audit]) {
             study.logs.len(),
             study.settings.select.most_by_log
         );
-        audit.add(Finding::new(Severity::Info, text));
+        audit.add(Finding::new(Severity::Warning, text));
     }
 }
 

@@ -49,12 +49,13 @@ impl Log {
         }
         let stretches = examined(self.rows());
         let half_width_s = half_width_s(self.median_step());
+        let rounded = |time_s: f64| (time_s * 1e6).round() / 1e6;
         let mut log = self.at(&stretches);
-        log.leave_out
-            .extend(stretches.windows(2).map(|pair| Interval {
-                start_s: self.time[pair[0].end - 1] - half_width_s,
-                end_s: self.time[pair[1].start] + half_width_s,
-            }));
+        let between = |pair: &[Range<usize>]| Interval {
+            start_s: rounded(self.time[pair[0].end - 1] - half_width_s),
+            end_s: rounded(self.time[pair[1].start] + half_width_s),
+        };
+        log.leave_out.extend(stretches.windows(2).map(between));
         log.notes.push(format!(
             "fits and errors are of {EXAMINED_ROWS} of its {} rows, in {STRETCHES} stretches that are spread evenly over it",
             self.rows()
