@@ -106,7 +106,7 @@ impl Scope {
 
     fn term(&self, graph: &mut Graph, term: &Term) -> Result<Node, Fault> {
         let node = self.unchecked(graph, term)?;
-        match graph.constant_value(node) {
+        match graph.value_of_constants(node) {
             Some(value) if self.is_checked && !value.is_finite() => Err((
                 term.span.clone(),
                 format!("this is {value}, no finite number"),
