@@ -53,20 +53,32 @@ pub enum ReadError {
         path: PathBuf,
         error: serde_json::Error,
     },
+    #[error(
+        "{}: it contradicts itself: {fault}; make the report again by the command in its `configuration`",
+        path.display()
+    )]
+    Contradiction { path: PathBuf, fault: String },
 }
 
 impl Report {
     /// The report of a folder.
     ///
     /// # Errors
-    /// A folder without report.json, or one of another form.
+    /// A folder without report.json, or one of another form or that contradicts itself.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self, ReadError> {
         let path = folder.as_ref().join(REPORT);
         let json = match read_saved(&path) {
             Ok(json) => json,
             Err(error) => return Err(ReadError::File { path, error }),
         };
-        serde_json::from_slice(&json).map_err(|error| ReadError::Shape { path, error })
+        let report: Self = match serde_json::from_slice(&json) {
+            Ok(report) => report,
+            Err(error) => return Err(ReadError::Shape { path, error }),
+        };
+        match report.contradiction() {
+            Some(fault) => Err(ReadError::Contradiction { path, fault }),
+            None => Ok(report),
+        }
     }
 
     /// Write report.html and report.md into a folder, and return their paths.

@@ -9,6 +9,7 @@ mod film;
 mod folder;
 mod headline;
 mod json;
+mod lengths;
 mod model_file;
 mod motion;
 mod page;

@@ -1,0 +1,104 @@
+//! Whether the lists of a report that was read are as long as the others say: what makes pages of it takes that for granted.
+
+use super::motion::MotionEntry;
+use super::schema::{ErrorEntry, ModelError, Report};
+
+/// How many entries a list has to have, and how many it has.
+type Length = [usize; 2];
+
+impl Report {
+    /// What is wrong, in a clause; `None` of a report as the program writes it.
+    pub(super) fn contradiction(&self) -> Option<String> {
+        let (joints, horizons) = (self.joints, self.error.horizons_s.len());
+        if joints == 0 || horizons == 0 {
+            return Some("it has no joint or no horizon".to_owned());
+        }
+        let names = [self.joint_names.len(), self.prismatic.len()].map(|found| [joints, found]);
+        let mut lengths = names.to_vec();
+        for model in self.error.models() {
+            lengths.extend(model.lengths(joints, horizons));
+        }
+        for log in &self.error.by_log {
+            lengths.extend([log.before.len(), log.after.len()].map(|found| [joints, found]));
+        }
+        for torque in &self.torque {
+            let fitted = [&torque.as_declared, &torque.before, &torque.after];
+            let models = fitted.into_iter().chain(&torque.with_friction);
+            lengths.extend(models.map(|model| [joints, model.rms.len()]));
+        }
+        for motion in &self.shown.motion {
+            lengths.extend(motion.lengths());
+        }
+        let off = lengths.into_iter().find(|[wanted, found]| wanted != found);
+        if let Some([wanted, found]) = off {
+            return Some(format!("a list has {found} entries where {wanted} belong"));
+        }
+        let mut clouds = self.shown.residuals.iter();
+        let strange = clouds.find(|cloud| !cloud.joint.is_of(joints))?;
+        Some(format!("it has no joint {}", strange.joint))
+    }
+}
+
+impl ErrorEntry {
+    fn models(&self) -> impl Iterator<Item = &ModelError> {
+        let always = [&self.declared, &self.before, &self.after];
+        let some = [&self.with_friction, &self.zeroed, &self.hybrid];
+        let others = self.against.iter().map(|contender| &contender.error);
+        always
+            .into_iter()
+            .chain(some.into_iter().flatten())
+            .chain(others)
+    }
+}
+
+impl ModelError {
+    fn lengths(&self, joints: usize, horizons: usize) -> Vec<Length> {
+        let errors = [
+            &self.position_rmse,
+            &self.position_median,
+            &self.velocity_rmse,
+        ];
+        let outer = errors.map(Vec::len).into_iter();
+        let outer = outer.chain([self.windows.len(), self.diverged.len()]);
+        let inner = errors
+            .into_iter()
+            .flatten()
+            .map(|list| [joints, list.len()]);
+        outer.map(|found| [horizons, found]).chain(inner).collect()
+    }
+}
+
+impl MotionEntry {
+    /// A line for each frame, of which one stands still.
+    fn lengths(&self) -> Vec<Length> {
+        let frames = self.time.len();
+        let moving = self.pictures.iter().flat_map(|picture| {
+            let lines = [&picture.measured, &picture.before, &picture.after];
+            lines.map(|line| [frames, line.len()])
+        });
+        let still = [frames, frames.max(self.still.saturating_add(1))];
+        moving.chain([still]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::MotionEntry;
+
+    #[test]
+    fn the_frame_that_stands_still_is_one_of_the_frames() {
+        let motion = |frames: usize, still| MotionEntry {
+            log: String::new(),
+            horizon_s: 1.0,
+            time: vec![0.0; frames],
+            still,
+            drawn: String::new(),
+            pictures: vec![],
+        };
+        let fits = |frames, still| {
+            let lengths = motion(frames, still).lengths();
+            lengths.iter().all(|[wanted, found]| wanted == found)
+        };
+        assert!(fits(3, 2) && !fits(3, 3) && !fits(0, 0) && !fits(1, usize::MAX));
+    }
+}
