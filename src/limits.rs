@@ -20,7 +20,7 @@ pub const XML_DEFAULTS: usize = 200;
 /// A text that people write: a model, an effect, a recipe, a robot description \[bytes\].
 pub const TEXT_BYTES: u64 = 4 << 20;
 /// Values, keys, tables and lines of a text in TOML: each takes hundreds of bytes when it is read.
-pub const TOML_PARTS: usize = 100_000;
+pub const TOML_PARTS: usize = 150_000;
 /// A file that the program wrote itself: weights, a description of a model, a report \[bytes\].
 pub const SAVED_BYTES: u64 = 1 << 30;
 /// A message of a recording, or a part of one that is packed as a whole \[bytes\].

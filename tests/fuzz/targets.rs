@@ -50,7 +50,11 @@ fn use_model(model: &Model) {
     assert!(found.to_string().len() < 1 << 22, "a short answer");
     if model.text.len() < SHORT {
         let exported = ExportModel::of_system(model, Integrator::RK4, 0.01, Value::Null);
-        for format in FORMATS {
+        // An FMU is compiled, which takes a second.
+        for format in FORMATS
+            .iter()
+            .filter(|format| !format.name.starts_with("fm"))
+        {
             let _ = (format.files)(&exported, Path::new("model"));
         }
     }
