@@ -13,15 +13,15 @@ pub const PREDICTION_S: f64 = 1e-3;
 /// In simulated rigs: far below what any fit uses, so that no model of theirs is right by sharing their error.
 pub const RIG_S: f64 = 1e-4;
 
-/// Rounding of times may make a step longer than a whole number of longest substeps by this share of one: stamps of Unix time
-/// are a quarter of a microsecond apart.
-const ROUNDING: f64 = 1e-2;
+/// Rounding of times may make a step longer than a whole number of longest substeps by this: stamps of Unix time are a quarter
+/// of a microsecond apart.
+const ROUNDING_S: f64 = 2.5e-7;
 
 /// How many equal substeps of at most `longest_s` each of these steps needs, one number for all lanes.
 pub fn substeps<const W: usize>(lengths: &Row<f64, W>, longest_s: f64) -> usize {
     let longest = lengths.iter().fold(0.0_f64, |a, b| a.max(*b));
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a small positive number
-    let count = (longest / longest_s - ROUNDING).ceil() as usize;
+    let count = ((longest - ROUNDING_S) / longest_s).ceil() as usize;
     count.max(1)
 }
 
