@@ -27,8 +27,6 @@ pub enum ExperimentError {
         seed: u64,
         source: StudyError,
     },
-    #[error("{0}")]
-    Learner(#[from] RunError),
     #[error(transparent)]
     Task(#[from] TaskError),
     #[error(transparent)]

@@ -92,10 +92,15 @@ impl Method {
         })
     }
 
-    /// The model it plans with before training; none without a prior.
-    pub(super) fn prior(&self, integrator: Integrator) -> Result<Option<Predictor>, RunError> {
+    /// Whether it begins with a model.
+    pub(super) fn has_prior(&self) -> bool {
+        !matches!(self.learner.prior, Prior::Nothing)
+    }
+
+    /// The model it plans with before training, which it must have.
+    pub(super) fn prior(&self, integrator: Integrator) -> Result<Predictor, RunError> {
         let model = self.learner.untrained()?;
-        Ok(model.map(|model| model.predictor(integrator)))
+        Ok(model.expect("it has a prior").predictor(integrator))
     }
 
     /// The model it plans with after training.

@@ -7,6 +7,7 @@ mod learning;
 mod offline_prior;
 mod physics_prior;
 mod picture;
+mod pieces;
 mod published;
 mod receding_horizon;
 mod results;

@@ -1,4 +1,3 @@
-use super::learning::TrainedMethod;
 use super::results::{Course, Results};
 use super::{ExperimentError, Observer, Session, offline_prior, physics_prior, receding_horizon};
 use crate::runs::{Identity, RunFolder, Shard};
@@ -18,6 +17,14 @@ impl Experiment {
             Self::PhysicsPrior => physics_prior::NAME,
             Self::OfflinePrior => offline_prior::NAME,
             Self::RecedingHorizon => receding_horizon::NAME,
+        }
+    }
+
+    /// The receding horizons to compare; none where amounts of data are.
+    fn horizons(self, session: &Session) -> Option<&[usize]> {
+        match self {
+            Self::PhysicsPrior | Self::OfflinePrior => None,
+            Self::RecedingHorizon => Some(&session.config.replan),
         }
     }
 
@@ -43,20 +50,19 @@ impl Session {
         observer: Observer<'_>,
     ) -> Result<Results, ExperimentError> {
         let run = self.claim(experiment, folder)?;
-        let learnt = self.learn(folder, observer)?;
+        let horizons = experiment.horizons(self);
+        let done = self.do_shard(Shard::WHOLE, horizons, folder, observer)?;
         let (name, task) = (experiment.name(), self.task.name());
         let mut results = Results::new(name, &task, self.seeds(), run.config);
-        match experiment {
-            Experiment::PhysicsPrior | Experiment::OfflinePrior => {
-                self.learning_curves(&learnt, &mut results)?;
-            }
-            Experiment::RecedingHorizon => receding_horizon::compare(self, &learnt, &mut results)?,
-        }
+        results.receding_horizon = horizons.map(<[usize]>::to_vec);
+        let courses = done.into_iter();
+        results.methods = courses
+            .map(|(name, seeds)| (name, Course::from(seeds)))
+            .collect();
         Ok(results)
     }
 
-    /// Carries out a shard of the runs of an experiment in its folder, or the rest of them. What is evaluated without
-    /// learning is left to [`Session::carry_out`].
+    /// Carries out a shard of an experiment in its folder, or the rest of it.
     ///
     /// # Errors
     /// As [`Session::carry_out`].
@@ -68,7 +74,8 @@ impl Session {
         observer: Observer<'_>,
     ) -> Result<(), ExperimentError> {
         self.claim(experiment, folder)?;
-        self.learn_shard(shard, folder, observer).map(drop)
+        self.do_shard(shard, experiment.horizons(self), folder, observer)
+            .map(drop)
     }
 
     /// What decides the numbers of an experiment.
@@ -88,33 +95,5 @@ impl Session {
         let run = self.run_of_experiment(experiment);
         folder.claim(&run)?;
         Ok(run)
-    }
-
-    /// Evaluates the return of every method against the number of real transitions.
-    fn learning_curves(
-        &self,
-        learnt: &[Vec<TrainedMethod>],
-        results: &mut Results,
-    ) -> Result<(), ExperimentError> {
-        for (method, runs) in self.methods.iter().zip(learnt) {
-            let rounds = (0..method.config.rounds).map(|round| {
-                let score = runs
-                    .iter()
-                    .map(|run| run.rounds[round].score.clone())
-                    .collect();
-                (runs[0].rounds[round].transitions, score)
-            });
-            results
-                .methods
-                .insert(method.config.name.clone(), rounds.collect());
-        }
-        let replan = self.task.replan;
-        for (name, predictor) in self.fixed()? {
-            let score = self.score_all(|_| predictor.clone(), replan, name)?;
-            results
-                .methods
-                .insert(name.to_owned(), Course::from_iter([(0, score)]));
-        }
-        Ok(())
     }
 }

@@ -1,14 +1,12 @@
 use std::path::PathBuf;
 
-use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::learning::{Method, Observer, TrainedMethod};
-use super::results::{PERFECT, PRIOR};
+use super::learning::{Method, Observer};
 use super::{Config, ExperimentError};
-use crate::control::{Predictor, Task};
+use crate::control::Task;
 use crate::files::beside_or_named;
-use crate::mbrl::{EpisodeScore, Evaluator, Prior, Run, Schedule};
+use crate::mbrl::{Prior, Run, Schedule};
 use crate::model::{FittedEffect, Library};
 use crate::plant::Plant;
 use crate::runs::{Identity, RunFolder, Shard};
@@ -66,10 +64,10 @@ impl Session {
         })
     }
 
-    /// Number of trainings in a shard of the runs of all methods and seeds.
+    /// Number of trainings in a shard of an experiment.
     pub fn rounds(&self, shard: Shard) -> usize {
-        let runs = shard.share(self.runs());
-        runs.map(|(method, _)| method.config.rounds).sum()
+        let pieces = shard.share(self.pieces());
+        pieces.map(|piece| piece.rounds()).sum()
     }
 
     /// Number of trainings of one run of a method; 0 for an unknown method.
@@ -102,8 +100,14 @@ impl Session {
         let mut resolved = self.resolved();
         resolved["method"] = json!(method.config.name);
         folder.claim(&self.identity("mbrl", resolved))?;
-        let learnt = self.learn_one(method, self.first_seed, folder.clone(), observer)?;
-        Ok(learnt.checkpoint)
+        let run = self.run_of(method, self.first_seed);
+        let learnt = method.learn(&run, folder.clone(), observer);
+        let failed = |source| ExperimentError::Run {
+            method: method.config.name.clone(),
+            seed: self.first_seed,
+            source,
+        };
+        Ok(learnt.map_err(failed)?.checkpoint)
     }
 
     fn method(&self, name: &str) -> Option<&Method> {
@@ -144,108 +148,12 @@ impl Session {
         })
     }
 
-    /// The runs of the loop: every method with every seed.
-    fn runs(&self) -> impl Iterator<Item = (&Method, u64)> {
-        let seeds = self.seeds().into_iter();
-        seeds.flat_map(|seed| self.methods.iter().map(move |method| (method, seed)))
-    }
-
-    /// Trains every method with every seed: `[method][seed]`.
-    pub(super) fn learn(
-        &self,
-        folder: &RunFolder,
-        observer: Observer<'_>,
-    ) -> Result<Vec<Vec<TrainedMethod>>, ExperimentError> {
-        let learnt = self.learn_shard(Shard::WHOLE, folder, observer)?;
-        let mut by_method: Vec<Vec<TrainedMethod>> =
-            self.methods.iter().map(|_| Vec::new()).collect();
-        for (number, run) in learnt.into_iter().enumerate() {
-            by_method[number % self.methods.len()].push(run);
-        }
-        Ok(by_method)
-    }
-
-    /// Carries out a shard of the runs.
-    pub(super) fn learn_shard(
-        &self,
-        shard: Shard,
-        folder: &RunFolder,
-        observer: Observer<'_>,
-    ) -> Result<Vec<TrainedMethod>, ExperimentError> {
-        let learn = |(method, seed): (&Method, u64)| {
-            let own = folder.within(format!("runs/{}-{seed:02}", method.config.name));
-            self.learn_one(method, seed, own, observer)
-        };
-        let runs: Vec<(&Method, u64)> = shard.share(self.runs()).collect();
-        runs.into_par_iter().with_max_len(1).map(learn).collect()
-    }
-
-    fn learn_one(
-        &self,
-        method: &Method,
-        seed: u64,
-        folder: RunFolder,
-        observer: Observer<'_>,
-    ) -> Result<TrainedMethod, ExperimentError> {
-        let learnt = method.learn(&self.run_of(method, seed), folder, observer);
-        learnt.map_err(|source| ExperimentError::Run {
-            method: method.config.name.clone(),
-            seed,
-            source,
-        })
-    }
-
-    /// Evaluates a model for each seed; `predictor` is given the seed's position, from 0.
-    pub(super) fn score_all(
-        &self,
-        predictor: impl Fn(usize) -> Predictor + Sync,
-        replan: usize,
-        method: &str,
-    ) -> Result<Vec<EpisodeScore>, ExperimentError> {
-        let score = |(k, seed): (usize, u64)| {
-            let evaluator = Evaluator {
-                task: &self.task,
-                plant: &self.plant,
-                seed,
-            };
-            let score = evaluator.score(&predictor(k), replan);
-            score.map_err(|source| ExperimentError::Run {
-                method: method.to_owned(),
-                seed,
-                source,
-            })
-        };
-        self.seeds()
-            .into_par_iter()
-            .enumerate()
-            .with_max_len(1)
-            .map(score)
-            .collect()
-    }
-
-    /// The methods that do not learn.
-    pub(super) fn fixed(&self) -> Result<Vec<(&'static str, Predictor)>, ExperimentError> {
-        let mut fixed = vec![(PERFECT, self.perfect())];
-        for method in &self.methods {
-            if let Some(prior) = method.prior(self.task.integrator)? {
-                fixed.push((PRIOR, prior));
-                break;
-            }
-        }
-        Ok(fixed)
-    }
-
-    /// The plant's own equations, integrated as those of models are.
-    fn perfect(&self) -> Predictor {
-        Predictor::of_equations(self.plant.dynamics(), self.task.integrator)
-    }
-
     pub(super) fn seeds(&self) -> Vec<u64> {
         let numbers = 0..self.config.seeds;
         numbers.map(|k| self.first_seed.wrapping_add(k)).collect()
     }
 
-    fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {
+    pub(super) fn run_of<'a>(&'a self, method: &'a Method, seed: u64) -> Run<'a> {
         Run {
             task: &self.task,
             plant: &self.plant,
