@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use crate::support::{measured, text};
 use crate::train::{config, json, kill_after, refused, residyn, run};
 
 /// Do `command` in shards, one after the other, put them together in `merged`, and do what is left.
@@ -65,6 +66,40 @@ fn a_bench_in_shards_has_the_summary_of_one_machine() {
 }
 
 #[test]
+fn measured_rigs_in_shards_have_the_results_of_one_machine() {
+    let Some(logs) = measured("dfki_simple_pendulum") else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let (rigs, data) = (config("bench/rigs.toml"), text(logs.parent().unwrap()));
+    let only = ["--only", "simple pendulum/as_they", "simple pendulum/plain"];
+    let from = ["bench", "rigs", "--rigs", &rigs, "--data", data];
+    let command = [&from[..], &only].concat();
+    in_shards(dir, &command, 3);
+    json(dir, &[&command[..], &["--out", "whole"]].concat());
+    let [merged, whole] = ["merged", "whole"].map(|out| {
+        let mut found = files(&dir.join(out));
+        // It says when it was made.
+        found.remove("report.html").unwrap();
+        let timeless = found
+            .into_iter()
+            .map(|(name, bytes)| (name, timeless(&bytes)));
+        timeless.collect::<BTreeMap<String, String>>()
+    });
+    assert_eq!(merged, whole);
+    // Two methods on five folds, and two summaries.
+    assert_eq!(merged.len(), 12, "{:?}", merged.keys());
+}
+
+/// A file without the lines that say how long something took.
+fn timeless(bytes: &[u8]) -> String {
+    let lines = str::from_utf8(bytes).unwrap().lines();
+    let others = lines.filter(|line| !line.contains("\"seconds\""));
+    others.collect::<Vec<_>>().join("\n")
+}
+
+#[test]
 fn a_sweep_in_shards_has_the_models_of_one_machine() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -97,6 +132,16 @@ fn a_sweep_in_shards_has_the_models_of_one_machine() {
     let told = String::from_utf8(lacking.stderr).unwrap();
     assert_eq!(lacking.status.code(), Some(1), "{told}");
     assert!(told.contains("shard 2/3 is not among the parts"), "{told}");
+    #[cfg(unix)]
+    {
+        let few_files = "ulimit -n 5; exec \"$0\" merge part-* --out few";
+        let mut shell = std::process::Command::new("bash");
+        let shell = shell.args(["-c", few_files, env!("CARGO_BIN_EXE_residyn")]);
+        let told = shell.current_dir(dir).output().unwrap();
+        assert_eq!(told.status.code(), Some(2));
+        let told = String::from_utf8(told.stderr).unwrap();
+        assert!(told.contains("allow more with `ulimit -n`"), "{told}");
+    }
 }
 
 #[test]
@@ -126,17 +171,21 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
     }
     let parts: Vec<String> = (1..=8).map(|k| format!("part-{k}")).collect();
     merge(dir, &parts);
+    let runs = |out: &str| files(&dir.join(out).join("runs"));
+    let found = runs("merged");
     for out in ["merged", "whole"] {
         json(dir, &[&command[..], &["--out", out]].concat());
     }
-    let results = |out: &str| {
-        read(
-            &dir.join(out).join("results.json"),
-            &["/wall_s", "/command"],
-        )
-    };
-    assert_eq!(results("merged"), results("whole"));
-    let [mut merged, mut whole] = ["merged", "whole"].map(|out| files(&dir.join(out)));
+    assert!(found == runs("merged"), "the shards had done all work");
+    ended_alike(&dir.join("merged"), &dir.join("whole"));
+}
+
+/// The folders of two runs of an experiment hold the same, but for what tells the time.
+pub fn ended_alike(merged: &Path, whole: &Path) {
+    let clock = ["/wall_s", "/command"];
+    let results = |out: &Path| read(&out.join("results.json"), &clock);
+    assert_eq!(results(merged), results(whole));
+    let [mut merged, mut whole] = [merged, whole].map(files);
     // Both say when and for how long they were computed.
     for found in [&mut merged, &mut whole] {
         found.remove("results.json").unwrap();
@@ -147,4 +196,20 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
     for (name, bytes) in &merged {
         assert!(whole[name] == *bytes, "{name} differs");
     }
+}
+
+/// What is evaluated after the learning is work of the shards, too.
+#[test]
+fn receding_horizons_in_shards_are_those_of_one_machine() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let config = config("smoke/receding-horizon-pendulum.toml");
+    let command = ["experiment", "receding-horizon", "--config", &config];
+    in_shards(dir, &command, 3);
+    let scores = files(&dir.join("merged/runs"));
+    let scores = scores.keys().filter(|name| name.contains("/score-"));
+    // Two horizons of two that learn and two that do not, with two seeds.
+    assert_eq!(scores.count(), 16);
+    json(dir, &[&command[..], &["--out", "whole"]].concat());
+    ended_alike(&dir.join("merged"), &dir.join("whole"));
 }

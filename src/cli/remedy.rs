@@ -1,5 +1,7 @@
 use std::error::Error;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
+
+use anyhow::Chain;
 
 use crate::bench::GridError;
 use crate::bench::rigs::RigsError;
@@ -9,9 +11,13 @@ use crate::files::OutputError;
 use crate::runs::{MergeError, RunFolderError};
 use crate::train::recipe::RecipeError;
 
+/// The error number of too many open files, the same on all Unix systems.
+const EMFILE: i32 = 24;
+
 /// What to do about an error, in terms of the command line, of which the library knows nothing.
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    None.or_else(|| error.downcast_ref().and_then(of_output))
+    None.or_else(|| of_open_files(error))
+        .or_else(|| error.downcast_ref().and_then(of_output))
         .or_else(|| error.downcast_ref().and_then(of_folder))
         .or_else(|| error.downcast_ref().and_then(of_merge))
         .or_else(|| error.downcast_ref().and_then(of_task))
@@ -23,6 +29,17 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
 
 /// What to do where nothing more fits on a disk.
 const FULL: &str = "free some space, or give another folder with --out";
+
+/// Of a process that has as many files open as it may: a merge has one open in each part.
+fn of_open_files(error: &(dyn Error + 'static)) -> Option<&'static str> {
+    let is_it = |cause: &(dyn Error + 'static)| {
+        let cause: Option<&io::Error> = cause.downcast_ref();
+        cfg!(unix) && cause.and_then(io::Error::raw_os_error) == Some(EMFILE)
+    };
+    Chain::new(error)
+        .any(is_it)
+        .then_some("allow more with `ulimit -n`, or merge some of the parts at a time")
+}
 
 fn of_output(error: &OutputError) -> Option<&'static str> {
     Some(match error.source.kind() {
