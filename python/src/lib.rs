@@ -14,6 +14,7 @@ mod work;
 #[pyo3::pymodule]
 mod _residyn {
     use std::ffi::OsString;
+    use std::path::PathBuf;
 
     use pyo3::prelude::*;
 
@@ -39,10 +40,11 @@ mod _residyn {
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 
-    /// Run the command line `arguments`, the name of the program first, and return its exit status.
+    /// Run the command line `arguments`, the name of the program first, and return its exit status. `file` is that of this
+    /// module.
     #[pyfunction]
-    fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-        py.detach(|| residyn::cli::run(arguments))
+    fn main(py: Python<'_>, file: PathBuf, arguments: Vec<OsString>) -> u8 {
+        py.detach(|| residyn::cli::run_from(file, arguments))
     }
 
     /// Names of what is built in: "systems", "plants", "tasks", "effects", "drives" or "formats".

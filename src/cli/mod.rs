@@ -31,6 +31,7 @@ mod tune;
 mod voice;
 
 use std::ffi::OsString;
+use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use clap::{Args, Parser, Subcommand};
@@ -99,6 +100,15 @@ enum Answer {
 
 /// The command line that the program runs on.
 static ARGUMENTS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// The file that the program's code is in, where that is not the executable of the process.
+static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+
+/// [`run`], by another program that has loaded this one as the library `file`.
+pub fn run_from(file: PathBuf, arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    LIBRARY.get_or_init(|| file);
+    run(arguments)
+}
 
 /// Run the program on a command line, the name of the program first: exit status 0 done, 1 ran and the answer is no, 2 could
 /// not run. Once in a process.

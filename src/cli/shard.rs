@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use serde_json::json;
 
-use super::{Answer, Common, voice};
+use super::{Answer, Common, LIBRARY, voice};
 use crate::files::content_id;
 use crate::runs::{Identity, Part, RunFolder, Shard};
 
@@ -43,6 +43,10 @@ pub(super) fn finish(part: Part, common: &Common) -> Result<Answer> {
 
 /// Hash of this build of the program.
 pub(super) fn program_id() -> Result<String> {
-    let program = fs::read(std::env::current_exe()?).context("the program cannot read itself")?;
+    let file = match LIBRARY.get() {
+        Some(library) => library.clone(),
+        None => std::env::current_exe()?,
+    };
+    let program = fs::read(file).context("the program cannot read itself")?;
     Ok(content_id(&program))
 }
