@@ -56,6 +56,7 @@ mod shards;
 mod shell;
 mod shift;
 mod simulators;
+mod slurm;
 mod summary;
 mod supply;
 mod support;
