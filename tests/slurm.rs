@@ -62,13 +62,13 @@ fn printed(command: &mut Command) -> String {
     String::from_utf8(stdout).unwrap().trim().to_owned()
 }
 
-/// Wait until something is so, for at most two minutes.
+/// Wait until something is so, for at most five minutes.
 #[track_caller]
 fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !is_so() {
         assert!(
-            begun.elapsed() < Duration::from_secs(120),
+            begun.elapsed() < Duration::from_secs(300),
             "waited too long until {what}"
         );
         sleep(Duration::from_millis(50));
