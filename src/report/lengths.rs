@@ -21,12 +21,12 @@ impl Report {
         for log in &self.error.by_log {
             lengths.extend([log.before.len(), log.after.len()].map(|found| [joints, found]));
         }
-        for torque in &self.torque {
+        if let Some(torque) = &self.torque {
             let fitted = [&torque.as_declared, &torque.before, &torque.after];
             let models = fitted.into_iter().chain(&torque.with_friction);
             lengths.extend(models.map(|model| [joints, model.rms.len()]));
         }
-        for motion in &self.shown.motion {
+        if let Some(motion) = &self.shown.motion {
             lengths.extend(motion.lengths());
         }
         let off = lengths.into_iter().find(|[wanted, found]| wanted != found);
