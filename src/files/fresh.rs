@@ -6,9 +6,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use tempfile::{TempDir, TempPath};
-
-use super::folder_of;
+use tempfile::TempPath;
 
 /// A file that becomes another once it is whole. It is called `.NAME.tmp` until then, and locked, so that two processes
 /// write it one after the other; and it is removed where that does not come.
@@ -78,23 +76,33 @@ fn remove_left(path: &Path) -> io::Result<()> {
     }
 }
 
-/// An empty folder, `.NAME.new` beside `target`, which is removed with all that is in it unless it is kept. Whoever makes
-/// it owns `target`: what is there of that name was left by a killed program.
-///
-/// # Errors
-/// A folder that cannot be written.
-pub fn fresh_folder(target: &Path) -> io::Result<TempDir> {
-    let path = hidden_beside(target, ".new");
-    remove_folder(&path)?;
-    let mut builder = tempfile::Builder::new();
-    // Temporary folders are private by default; results have the permissions of any new folder.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-    let name = path.file_name().unwrap_or_default();
-    builder
-        .prefix(name)
-        .rand_bytes(0)
-        .tempdir_in(folder_of(target))
+/// A folder that becomes another once it is whole: `.NAME.new` beside it until then. It is removed with all that is in it
+/// where that does not come.
+pub struct FreshFolder(PathBuf);
+
+impl FreshFolder {
+    /// An empty folder. Whoever makes it owns `target`: what is there of its name was left by a killed program.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn beside(target: &Path) -> io::Result<Self> {
+        let path = hidden_beside(target, ".new");
+        remove_folder(&path)?;
+        fs::create_dir(&path)?;
+        Ok(Self(path))
+    }
+
+    /// Where it is, until it is renamed.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for FreshFolder {
+    fn drop(&mut self) {
+        // What stays is removed by whoever makes it next.
+        let _ = remove_folder(&self.0);
+    }
 }
 
 /// Remove a folder where there is one.
@@ -142,7 +150,7 @@ mod tests {
     use std::fs;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    use super::{Fresh, fresh_folder};
+    use super::{Fresh, FreshFolder};
     use crate::files::write_whole;
 
     #[test]
@@ -167,7 +175,7 @@ mod tests {
         let left = folder.path().join(".run.new");
         fs::create_dir(&left).unwrap();
         fs::write(left.join("half"), "").unwrap();
-        let fresh = fresh_folder(&folder.path().join("run")).unwrap();
+        let fresh = FreshFolder::beside(&folder.path().join("run")).unwrap();
         assert_eq!(fs::read_dir(fresh.path()).unwrap().count(), 0);
     }
 

@@ -7,7 +7,7 @@ mod named;
 mod numbers;
 mod output;
 
-pub use fresh::{fresh_folder, hidden_beside, is_at, remove_folder};
+pub use fresh::{FreshFolder, hidden_beside, is_at, remove_folder};
 pub use hash::{content_hash, content_id, sha256, sha256_of};
 pub use input::{open, read_saved, read_text};
 pub use named::{beside, beside_or_named, text_or_embedded};

@@ -9,7 +9,7 @@ use super::schema::Report;
 use super::{model_file, page, picture, text};
 use crate::closeloop::{Outcome, Stage};
 use crate::files::{
-    OutputError, end_of_links, folder_of, fresh_folder, move_contents, read_saved, write_whole,
+    FreshFolder, OutputError, end_of_links, folder_of, move_contents, read_saved, write_whole,
 };
 use crate::model::Origin;
 
@@ -107,7 +107,7 @@ pub fn write(
     let folder = folder.as_ref();
     let parent = folder_of(folder);
     std::fs::create_dir_all(parent).map_err(OutputError::of(parent))?;
-    let staging = fresh_folder(&end_of_links(folder)).map_err(OutputError::of(folder))?;
+    let staging = FreshFolder::beside(&end_of_links(folder)).map_err(OutputError::of(folder))?;
     let report = Report::new(outcome, origin);
     put_all(staging.path(), &report, outcome, origin)
         .map_err(|error| error.of(staging.path(), folder))?;

@@ -8,7 +8,7 @@ use super::manifest::{FORMAT, Manifest};
 use super::optimizer::Moments;
 use super::{Backend, Best, CheckpointError, HybridModel, Training, moments};
 use crate::files::{
-    OutputError, content_id, end_of_links, folder_of, fresh_folder, hidden_beside, read_saved,
+    FreshFolder, OutputError, content_id, end_of_links, folder_of, hidden_beside, read_saved,
     remove_folder, write_whole,
 };
 use crate::model::{Dynamics, Library, Model, ModelWeights, Origin, SavedModelError, weights};
@@ -61,13 +61,13 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     ];
     let parent = folder_of(dir);
     fs::create_dir_all(parent).map_err(OutputError::of(parent))?;
-    let fresh = fresh_folder(dir).map_err(OutputError::of(dir))?;
+    let fresh = FreshFolder::beside(dir).map_err(OutputError::of(dir))?;
     for (name, bytes) in files {
         let written = write_whole(&fresh.path().join(name), bytes);
         // Where it is to be, since the temporary name is gone.
         written.map_err(|error| OutputError::of(&dir.join(name))(error.source))?;
     }
-    Ok(replace(dir, fresh).map_err(OutputError::of(dir))?)
+    Ok(replace(dir, fresh.path()).map_err(OutputError::of(dir))?)
 }
 
 fn refuse_other_contents(dir: &Path) -> Result<(), CheckpointError> {
@@ -83,20 +83,18 @@ fn refuse_other_contents(dir: &Path) -> Result<(), CheckpointError> {
     }
 }
 
-fn replace(dir: &Path, fresh: tempfile::TempDir) -> std::io::Result<()> {
+fn replace(dir: &Path, fresh: &Path) -> std::io::Result<()> {
     let previous = previous(dir);
     if dir.exists() {
         remove_folder(&previous)?;
         fs::rename(dir, &previous)?;
     }
-    if let Err(error) = fs::rename(fresh.path(), dir) {
+    if let Err(error) = fs::rename(fresh, dir) {
         if previous.exists() {
             fs::rename(&previous, dir)?;
         }
         return Err(error);
     }
-    // The directory has been renamed: nothing is left to delete under its temporary name.
-    let _ = fresh.keep();
     remove_folder(&previous)
 }
 
