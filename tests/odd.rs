@@ -376,6 +376,25 @@ fn rigs_and_tasks_beyond_any_sensor_are_refused() {
 }
 
 #[test]
+fn effects_are_taken_out_of_a_model_wherever_they_stand() {
+    let scratch = Scratch::new();
+    let log = scratch.log("log.csv", swinging);
+    let effect = "name = \"coulomb_friction\"\njoint = 1\nF_c = 0.1\n";
+    let inline = effect.trim_end().replace('\n', ", ");
+    let about = "name = \"rod\"\nabout = \"\"\"\n[[effect]]\n\"\"\"";
+    for described in [
+        PENDULUM_OF_TORQUES.replace("name = \"rod\"", about),
+        format!("effect = [{{ {inline} }}]\n{PENDULUM_OF_TORQUES}"),
+        format!("[[effect]]\n{effect}{PENDULUM_OF_TORQUES}"),
+    ] {
+        let model = scratch.file("model.toml", described);
+        closed(&scratch, &["--model", &model, "--train", &log]);
+        let written = scratch.path("out/model.toml");
+        succeeds(&["evaluate", "--model", text(&written), "--test", &log]);
+    }
+}
+
+#[test]
 fn effects_without_parameters_have_none_to_set() {
     let scratch = Scratch::new();
     fs::create_dir(scratch.path("own")).unwrap();

@@ -64,7 +64,7 @@ impl Model {
             effects: effects_in_file::read(&top, joints, library)?,
             hidden: sections::hidden(top.section("residual")?, joints)?,
             text: document.text.clone(),
-            declaration: sections::declaration(&document.text),
+            declaration: sections::declaration(document)?,
             equations: Arc::new(Equations {
                 lets: sections::lets(document, &top)?,
                 motion: motion(document, &top, &prismatic)?,

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use toml_edit::DocumentMut;
+use toml_edit::{DocumentMut, TomlError};
 
 use super::network::check_hidden;
 use super::reader::{Document, FileError, Located, Section};
@@ -219,11 +219,14 @@ pub(super) fn energy(section: Option<Section<'_>>) -> Result<Option<Energy>, Fil
 }
 
 /// A file that was read without its effects, wherever they stand.
-pub(super) fn declaration(text: &str) -> String {
-    let mut document: DocumentMut = text.parse().expect("the text was read as TOML before");
-    let declared = match document.remove("effect") {
-        Some(_) => document.to_string(),
-        None => text.to_owned(),
+pub(super) fn declaration(document: &Document) -> Result<String, FileError> {
+    let mut parsed: DocumentMut = document.text.parse().map_err(|error: TomlError| {
+        let at = error.span().map_or(0, |span| span.start);
+        document.error(at, error.message())
+    })?;
+    let declared = match parsed.remove("effect") {
+        Some(_) => parsed.to_string(),
+        None => document.text.clone(),
     };
-    declared.trim_end().to_owned() + "\n"
+    Ok(declared.trim_end().to_owned() + "\n")
 }

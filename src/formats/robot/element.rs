@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use roxmltree::Node;
 
 use crate::formats::xml::{Source, named};
+use crate::limits::is_reading;
 use crate::model::FileError;
 
 /// An element: its own attributes, then those of its defaults where the format has such.
@@ -64,7 +65,7 @@ impl<'s, 'x> Element<'s, 'x> {
             return Ok(None);
         };
         let number = |word: &str| match word.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(number),
+            Ok(number) if is_reading(number) => Ok(number),
             _ => {
                 let remedy = if word.contains('$') {
                     "; expand the file with `xacro` first"
