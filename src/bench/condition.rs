@@ -88,7 +88,7 @@ impl Condition {
 /// Logs that are longer than any.
 pub(super) fn check_rows(rate_hz: f64, seconds: &[f64]) -> Result<(), String> {
     let fits = |seconds: &f64| *seconds <= SIMULATED_S && seconds * rate_hz <= LOG_ROWS as f64;
-    match seconds.iter().find(|seconds| !fits(*seconds)) {
+    match seconds.iter().find(|seconds| !fits(seconds)) {
         None => Ok(()),
         Some(seconds) => Err(format!(
             "a log is at most {SIMULATED_S:e} s long and has at most {LOG_ROWS} rows, {rate_hz:?} Hz for {seconds:?} s are more"

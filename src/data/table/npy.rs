@@ -85,7 +85,8 @@ impl<'a> Array<'a> {
         number: impl Fn([u8; SIZE]) -> f64,
     ) -> Result<Vec<Vec<f64>>, String> {
         let (cells, _) = self.numbers.as_chunks::<SIZE>();
-        let (rows, columns) = (self.shape[0], self.shape.get(1).copied().unwrap_or(1));
+        let length = |axis: usize| self.shape.get(axis).copied().unwrap_or(1);
+        let (rows, columns) = (length(0), length(1));
         if rows.checked_mul(columns) != Some(cells.len()) {
             return Err(format!(
                 "array {name:?} is cut off at {} numbers; write the file again",
