@@ -29,7 +29,7 @@ pub use graph::Graph;
 pub use latex::latex_name;
 pub use notation::{Notation, Part};
 pub use op::{Binary, Node, Op, Unary, is_function};
-pub use parse::{Formula, parse};
+pub use parse::{Formula, parse, parse_finite};
 
 pub use program::Program;
 pub use scope::{Scope, SignForm};

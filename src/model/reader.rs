@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use crate::expr::{Formula, FormulaError, parse, suggestion};
+use crate::expr::{Formula, FormulaError, parse_finite, suggestion};
 use crate::files::{check_parts, read_text};
 use crate::limits::{MODEL_NAMES, MODEL_TERMS};
 
@@ -101,7 +101,8 @@ impl Document {
     }
 
     pub fn formula(&self, text: &Located<String>) -> Result<Located<Formula>, FileError> {
-        let value = parse(&text.value).map_err(|error| self.formula_error(text.at, &error))?;
+        let value =
+            parse_finite(&text.value).map_err(|error| self.formula_error(text.at, &error))?;
         self.terms.update(|terms| terms + value.terms());
         if self.terms.get() > MODEL_TERMS {
             let message = format!(

@@ -1,4 +1,4 @@
-use crate::expr::{FormulaError, Graph, Program, Scope, SignForm, parse};
+use crate::expr::{FormulaError, Graph, Program, Scope, SignForm, parse_finite};
 
 /// A formula of the state at the end of a step (`q1`, `qd1`, ...), the torque or command held over it (`tau1` or
 /// `cmd1`, ...) and time (`t`):
@@ -26,7 +26,7 @@ impl Objective {
                 scope.bind(&format!("cmd{joint}"), node);
             }
         }
-        let reward = scope.lower(&mut graph, &parse(formula)?)?;
+        let reward = scope.lower(&mut graph, &parse_finite(formula)?)?;
         Ok(Self {
             program: graph.finish(&[reward]),
         })
