@@ -21,8 +21,12 @@ pub const XML_DEFAULTS: usize = 200;
 pub const TEXT_BYTES: u64 = 4 << 20;
 /// Values, keys, tables and lines of a text in TOML: each takes hundreds of bytes when it is read.
 pub const TOML_PARTS: usize = 150_000;
+/// Arrays and tables of such a text within each other; its parser's own limit.
+pub const TOML_NESTING: usize = 80;
 /// A file that the program wrote itself: weights, a description of a model, a report \[bytes\].
 pub const SAVED_BYTES: u64 = 1 << 30;
+/// A message of a recording that is decoded \[bytes\].
+pub const MESSAGE_BYTES: usize = 1 << 20;
 /// A message of a recording, or a part of one that is packed as a whole \[bytes\].
 pub const RECORD_BYTES: usize = 1 << 28;
 /// What a packed file may hold, however small it is \[bytes\].

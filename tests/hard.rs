@@ -499,34 +499,62 @@ fn what_never_begins_or_never_ends_is_no_input() {
     );
 }
 
+/// A file that holds so many times this, packed with gzip behind a header.
+fn packed(scratch: &Scratch, name: &str, header: &str, part: &str, times: usize) -> String {
+    let level = flate2::Compression::fast();
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), level);
+    packer.write_all(header.as_bytes()).unwrap();
+    let block = part.repeat((1 << 20) / part.len());
+    (0..times).for_each(|_| packer.write_all(block.as_bytes()).unwrap());
+    scratch.file(name, packer.finish().unwrap())
+}
+
+/// An archive with arrays of this many bytes, each a number.
+fn archive_of_bytes(scratch: &Scratch, name: &str, megabytes: usize) -> String {
+    let path = scratch.path(name);
+    let mut archive = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    let zeros = vec![0; 1 << 20];
+    for name in ["q.npy", "time.npy"] {
+        let described = format!(
+            "{{'descr': '|u1', 'fortran_order': False, 'shape': ({},), }}",
+            megabytes << 20
+        );
+        let options = zip::write::SimpleFileOptions::default();
+        archive.start_file(name, options).unwrap();
+        archive.write_all(b"\x93NUMPY\x01\0").unwrap();
+        let length = u16::try_from(described.len()).unwrap().to_le_bytes();
+        archive.write_all(&length).unwrap();
+        archive.write_all(described.as_bytes()).unwrap();
+        (0..megabytes).for_each(|_| archive.write_all(&zeros).unwrap());
+    }
+    archive.finish().unwrap();
+    text(&path).to_owned()
+}
+
 #[test]
 #[cfg(unix)]
 fn packed_files_hold_no_more_than_is_read() {
     let scratch = Scratch::new();
-    let zeros = vec![b'0'; 1 << 20];
-    let packed = |header: &[u8]| {
-        let level = flate2::Compression::fast();
-        let mut packer = flate2::write::GzEncoder::new(Vec::new(), level);
-        packer.write_all(header).unwrap();
-        (0..100).for_each(|_| packer.write_all(&zeros).unwrap());
-        packer.finish().unwrap()
-    };
-    let gzip = scratch.file("bomb.csv.gz", packed(b"time,q1,qd1,tau1\n"));
-    let npz = scratch.path("bomb.npz");
-    let mut archive = zip::ZipWriter::new(fs::File::create(&npz).unwrap());
-    for name in ["q.npy", "time.npy"] {
-        archive
-            .start_file(name, zip::write::SimpleFileOptions::default())
-            .unwrap();
-        (0..100).for_each(|_| archive.write_all(&zeros).unwrap());
-    }
-    archive.finish().unwrap();
-    for file in [gzip.as_str(), text(&npz)] {
-        let told = refuses_in_little_memory(&["audit", file]);
+    let joints: String = (1..=12).map(|joint| format!(",q{joint}")).collect();
+    let files = [
+        packed(&scratch, "line.csv.gz", "time,q1,qd1,tau1\n", "0", 100),
+        packed(&scratch, "short.csv.gz", "time,q1\n", "0,0\n", 15),
+        packed(
+            &scratch,
+            "wide.csv.gz",
+            &format!("time{joints}\n"),
+            "1,2,3,4,5,6,7,8,9,8,7,6,5\n",
+            15,
+        ),
+        archive_of_bytes(&scratch, "large.npz", 100),
+        archive_of_bytes(&scratch, "short.npz", 2),
+    ];
+    for file in files {
+        let told = refuses_in_little_memory(&["audit", &file]);
         says(
             &told,
             &[
-                file,
+                &file,
                 "more than 16 MB and 20 times its size",
                 "unpack it first",
             ],

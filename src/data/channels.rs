@@ -28,7 +28,8 @@ impl Channels {
     pub fn log(self, name: &Path) -> Result<Log, LogError> {
         let joints = self.q.len();
         let driven_by = (self.driven.as_ref()).map_or(Quantity::Torque, |(quantity, _)| *quantity);
-        let mut table = Arrays::default();
+        // What is in memory already needs no limit.
+        let mut table = Arrays::of(u64::MAX);
         table.add("time", self.time);
         let driven = self.driven.map(|(_, driven)| driven);
         let channels = [

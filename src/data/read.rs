@@ -10,7 +10,7 @@ use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
 use super::statistics::median;
-use super::table::{Table, open};
+use super::table::{Table, open, too_large};
 use crate::expr::listed;
 use crate::limits::{LOG_JOINTS, LOG_TIME, is_reading, log_steps};
 
@@ -91,6 +91,12 @@ pub(super) fn log(
             found,
             expected: header.names.len(),
         });
+    }
+    // What a log of many joints lacks is made: a short text may become many numbers.
+    let bytes = (8 * (1 + 3 * joints) as u64).saturating_mul(numbers.rows as u64);
+    if bytes > table.most_bytes() {
+        let fault = too_large().to_string();
+        return Err(LogError::Form { path, fault });
     }
     let table: &dyn Table = table;
     let fault = |row: usize, column: usize, fault: CellFault| match table.place(row) {

@@ -25,6 +25,14 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
+/// How long a regular file is \[bytes\].
+///
+/// # Errors
+/// As [`open`].
+pub fn size(path: &Path) -> io::Result<u64> {
+    Ok(open(path)?.metadata()?.len())
+}
+
 /// The text of a file that people write.
 ///
 /// # Errors

@@ -4,14 +4,14 @@ mod fresh;
 mod hash;
 mod input;
 mod named;
-mod numbers;
 mod output;
+mod toml_text;
 
 pub use fresh::{FreshFolder, hidden_beside, is_at, remove_folder};
 pub use hash::{content_hash, content_id, sha256, sha256_of};
-pub use input::{open, read_saved, read_text};
+pub use input::{open, read_saved, read_text, size};
 pub use named::{beside, beside_or_named, text_or_embedded};
-pub use numbers::{check_parts, from_toml};
 pub use output::{
     OutputError, check_room, end_of_links, folder_of, move_contents, write_whole, write_with,
 };
+pub use toml_text::{check_size, from_toml};

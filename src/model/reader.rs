@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::expr::{Formula, FormulaError, parse_finite, suggestion};
-use crate::files::{check_parts, read_text};
+use crate::files::{check_size, read_text};
 use crate::limits::{MODEL_NAMES, MODEL_TERMS};
 
 /// An error in a model or effect file.
@@ -72,7 +72,7 @@ impl Document {
     }
 
     pub fn parse(&self) -> Result<Section<'_>, FileError> {
-        check_parts(&self.text).map_err(|message| self.error(0, message))?;
+        check_size(&self.text).map_err(|(at, message)| self.error(at, message))?;
         let table = DeTable::parse(&self.text).map_err(|error| {
             let at = error.span().map_or(0, |span| span.start);
             self.error(at, error.message())

@@ -10,10 +10,11 @@ use std::path::{Path, PathBuf};
 
 use csv::{Reader, ReaderBuilder, StringRecord};
 
+use super::room::too_large;
 use super::source::{BLOCK, Source};
 use super::{Numbers, Table};
 use crate::data::error::{CellFault, LogError, Place};
-use crate::limits::TEXT_BYTES;
+use crate::limits::{TEXT_BYTES, unpacked_bytes};
 
 /// A text that is cut into cells.
 pub struct Csv {
@@ -164,11 +165,23 @@ impl Table for Csv {
         self.head
     }
 
+    fn most_bytes(&self) -> u64 {
+        match self.source.is_packed() {
+            true => unpacked_bytes(self.source.size()),
+            false => u64::MAX,
+        }
+    }
+
     fn numbers(&mut self, wanted: &[usize]) -> Result<Numbers, LogError> {
+        // A column takes up to twice its bytes while it grows.
+        let most_rows = self.most_bytes() / (16 * wanted.len() as u64).max(1);
         let mut rows = self.rows()?;
         rows.next()?;
         let mut numbers = Numbers::of(wanted.len());
         while let Some(row) = rows.next()? {
+            if numbers.rows as u64 == most_rows {
+                return Err(self.unreadable(too_large()));
+            }
             if row.len() != self.names.len() {
                 numbers.ragged.get_or_insert((numbers.rows, row.len()));
             }

@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::arrays::Arrays;
 use super::parquet::{List, lists};
 use crate::data::error::LogError;
-use crate::files::read_saved;
+use crate::files::{self, read_saved};
 
 /// One episode of a data set, as a path names it.
 pub(super) struct Episode {
@@ -71,7 +71,9 @@ impl Episode {
             let list = frames.remove(name);
             list.map_or(Ok(Vec::new()), |list| list.columns(&self.path))
         };
-        let mut table = Arrays::default();
+        let files = self.files().map_err(|why| self.unreadable(why))?;
+        let packed: io::Result<u64> = files.iter().map(|file| files::size(file)).sum();
+        let mut table = Arrays::of(packed.map_err(|why| self.unreadable(why))?);
         for time in of(TIME)? {
             table.add("time", time);
         }
@@ -101,8 +103,7 @@ impl Episode {
         let episodes = episodes.as_ref().map_or(&[][..], List::numbers);
         let episode = self.number(episodes)?;
         for list in frames.values_mut() {
-            let mut of_rows = episodes.iter();
-            list.retain(|| of_rows.next() == Some(&episode));
+            list.retain(|row| episodes.get(row) == Some(&episode));
         }
         Ok(frames)
     }

@@ -3,13 +3,14 @@
 
 #![warn(clippy::indexing_slicing)]
 
+use std::io::{self, BufRead, BufReader, Cursor, ErrorKind, Read};
 use std::path::Path;
 
 use flate2::read::ZlibDecoder;
 
 use super::arrays::Arrays;
 use super::npy::Array;
-use super::unpack::Unpacking;
+use super::source::{BLOCK, Source};
 use crate::data::error::LogError;
 
 /// How these files begin; those of version 7.3 are HDF5.
@@ -17,43 +18,49 @@ pub(super) const MAGIC: &[u8] = b"MATLAB 5.0";
 
 /// # Errors
 /// A file that is cut off or damaged.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Arrays, LogError> {
-    table(bytes).map_err(|fault| LogError::Form {
-        path: path.to_owned(),
-        fault: format!("{fault}; save it again: save('run.mat', 'time', 'q', 'qd', 'tau', '-v7')"),
-    })
+pub(super) fn read(path: &Path, source: &Source) -> Result<Arrays, LogError> {
+    let bytes = source.open().map_err(|why| source.fault(path, why))?;
+    let mut table = Arrays::of(source.size());
+    let bytes = BufReader::with_capacity(BLOCK, bytes);
+    match add_all(&mut table, bytes) {
+        Ok(()) => Ok(table),
+        Err(fault) => Err(LogError::Form {
+            path: path.to_owned(),
+            fault: format!(
+                "{fault}; save it again: save('run.mat', 'time', 'q', 'qd', 'tau', '-v7')"
+            ),
+        }),
+    }
 }
 
 /// A text, an offset, a version and the order of bytes.
 const HEADER: usize = 128;
 
-fn table(bytes: &[u8]) -> Result<Arrays, String> {
-    let Some((header, mut rest)) = bytes.split_at_checked(HEADER) else {
-        return Err(cut_off());
-    };
+fn add_all(table: &mut Arrays, mut bytes: impl BufRead) -> Result<(), String> {
+    let mut header = [0; HEADER];
+    bytes.read_exact(&mut header).map_err(fault)?;
     if !header.ends_with(b"IM") {
         return Err("its numbers are not in little-endian order".to_owned());
     }
-    let mut table = Arrays::default();
-    let mut unpacking = Unpacking::of(bytes.len() as u64);
-    while !rest.is_empty() {
-        let (element, behind) = element(rest).ok_or_else(cut_off)?;
+    while !bytes.fill_buf().map_err(fault)?.is_empty() {
+        let mut element = Element::of(&mut bytes).map_err(fault)?;
         match element.kind {
             PACKED => {
-                let unpacked = unpacking.read(ZlibDecoder::new(element.bytes));
-                let unpacked = unpacked.map_err(|why| format!("is damaged: {why}"))?;
-                let (element, _) = self::element(&unpacked).ok_or_else(cut_off)?;
-                add(&mut table, &element)?;
+                let mut unpacked = ZlibDecoder::new(&mut element.bytes);
+                add(table, &mut Element::of(&mut unpacked).map_err(fault)?)?;
             }
-            _ => add(&mut table, &element)?,
+            _ => add(table, &mut element)?,
         }
-        rest = behind;
+        element.pass().map_err(fault)?;
     }
-    Ok(table)
+    Ok(())
 }
 
-fn cut_off() -> String {
-    "is cut off".to_owned()
+fn fault(why: io::Error) -> String {
+    match why.kind() {
+        ErrorKind::UnexpectedEof => "is cut off".to_owned(),
+        _ => format!("is damaged: {why}"),
+    }
 }
 
 /// What the bytes of an element are: one of [`NUMBERS`], or these.
@@ -74,87 +81,99 @@ const NUMBERS: [(u32, &str); 10] = [
     (13, "<u8"),
 ];
 
+/// An element, whose bytes are read one after the other.
 struct Element<'a> {
     kind: u32,
-    bytes: &'a [u8],
+    /// Up to four that stand beside their type and size, or those that follow.
+    bytes: io::Chain<io::Take<Cursor<[u8; 4]>>, io::Take<&'a mut dyn Read>>,
+    /// Bytes between it and the next.
+    padding: u64,
 }
 
-/// The first element, and what follows it.
-fn element(bytes: &[u8]) -> Option<(Element<'_>, &[u8])> {
-    let (word, rest) = bytes.split_first_chunk()?;
-    let word = u32::from_le_bytes(*word);
-    // Up to four bytes stand beside their type and size.
-    if word >> 16 != 0 {
-        let (bytes, rest) = rest.split_at_checked(4)?;
-        let bytes = bytes.get(..(word >> 16) as usize)?;
-        let kind = word & 0xffff;
-        return Some((Element { kind, bytes }, rest));
+impl<'a> Element<'a> {
+    /// The next one.
+    fn of(bytes: &'a mut dyn Read) -> io::Result<Self> {
+        let (word, next) = (u32::from_le_bytes(word(bytes)?), word(bytes)?);
+        let (kind, beside, size) = match word >> 16 {
+            0 => (word, 0, u64::from(u32::from_le_bytes(next))),
+            beside => (word & 0xffff, u64::from(beside), 0),
+        };
+        Ok(Self {
+            kind,
+            bytes: Cursor::new(next).take(beside).chain(bytes.take(size)),
+            // All but packed elements are filled up to eight bytes.
+            padding: match kind {
+                PACKED => 0,
+                _ => size.next_multiple_of(8) - size,
+            },
+        })
     }
-    let (size, rest) = rest.split_first_chunk()?;
-    let (bytes, rest) = rest.split_at_checked(u32::from_le_bytes(*size) as usize)?;
-    // All but packed elements are filled up to eight bytes, but for the last.
-    let padding = match word {
-        PACKED => 0,
-        _ => bytes.len().next_multiple_of(8) - bytes.len(),
-    };
-    let rest = rest.get(padding..).unwrap_or_default();
-    Some((Element { kind: word, bytes }, rest))
+
+    /// All bytes of one that is short, up to the next.
+    fn whole(mut self) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.bytes.by_ref().take(SHORT).read_to_end(&mut bytes)?;
+        self.pass()?;
+        Ok(bytes)
+    }
+
+    /// Passes over what is not read yet.
+    fn pass(mut self) -> io::Result<()> {
+        io::copy(&mut self.bytes, &mut io::sink())?;
+        let (_, rest) = self.bytes.into_inner();
+        if rest.limit() > 0 {
+            return Err(ErrorKind::UnexpectedEof.into());
+        }
+        // The last element is not always filled up.
+        io::copy(&mut rest.into_inner().take(self.padding), &mut io::sink())?;
+        Ok(())
+    }
 }
+
+fn word(bytes: &mut dyn Read) -> io::Result<[u8; 4]> {
+    let mut word = [0; 4];
+    bytes.read_exact(&mut word)?;
+    Ok(word)
+}
+
+/// Bytes of names, sizes and flags that are read.
+const SHORT: u64 = 1 << 12;
 
 /// The columns of a matrix of real numbers; structures, cells and texts are left out.
-fn add(table: &mut Arrays, element: &Element<'_>) -> Result<(), String> {
-    if element.kind != MATRIX || element.bytes.is_empty() {
+fn add(table: &mut Arrays, element: &mut Element<'_>) -> Result<(), String> {
+    if element.kind != MATRIX {
         return Ok(());
     }
-    let matrix = Matrix::of(element.bytes).ok_or_else(cut_off)?;
-    let name = String::from_utf8_lossy(matrix.name);
-    match matrix.array() {
-        Some(array) => table.add_array(&name, &array),
-        None => Ok(()),
-    }
+    let Some((name, array)) = array(&mut element.bytes).map_err(fault)? else {
+        return Ok(());
+    };
+    table.add_array(&name, array)
 }
 
-struct Matrix<'a> {
-    /// Of all numbers 6 (double) to 15.
-    class: u8,
-    sizes: &'a [u8],
-    name: &'a [u8],
-    /// Everything behind the name.
-    data: &'a [u8],
-}
-
-impl<'a> Matrix<'a> {
-    fn of(bytes: &'a [u8]) -> Option<Self> {
-        let (flags, rest) = element(bytes)?;
-        let (sizes, rest) = element(rest)?;
-        let (name, data) = element(rest)?;
-        Some(Self {
-            class: *flags.bytes.first()?,
-            sizes: sizes.bytes,
-            name: name.bytes,
-            data,
-        })
+/// The array of a matrix, and its name; `None` for what is no matrix of numbers. One row or one column is a vector.
+fn array(matrix: &mut dyn Read) -> io::Result<Option<(String, Array<impl Read>)>> {
+    let flags = Element::of(matrix)?.whole()?;
+    let sizes = Element::of(matrix)?.whole()?;
+    let name = Element::of(matrix)?.whole()?;
+    let (sizes, _) = sizes.as_chunks();
+    let sizes = sizes.iter().map(|size| u32::from_le_bytes(*size) as usize);
+    let shape = match *sizes.collect::<Vec<_>>().as_slice() {
+        [1, length] | [length, 1] => vec![length],
+        [rows, columns] => vec![rows, columns],
+        _ => return Ok(None),
+    };
+    // The class is of all numbers 6 (double) to 15.
+    if !flags.first().is_some_and(|class| (6..=15).contains(class)) {
+        return Ok(None);
     }
-
-    /// `None` for what is no matrix of numbers. One row or one column is a vector.
-    fn array(&self) -> Option<Array<'a>> {
-        let (sizes, _) = self.sizes.as_chunks();
-        let sizes = sizes.iter().map(|size| u32::from_le_bytes(*size) as usize);
-        let shape = match *sizes.collect::<Vec<_>>().as_slice() {
-            [1, length] | [length, 1] => vec![length],
-            [rows, columns] => vec![rows, columns],
-            _ => return None,
-        };
-        if !(6..=15).contains(&self.class) {
-            return None;
-        }
-        let (numbers, _) = element(self.data)?;
-        let (_, kind) = NUMBERS.iter().find(|(kind, _)| *kind == numbers.kind)?;
-        Some(Array {
-            kind,
-            by_columns: true,
-            shape,
-            numbers: numbers.bytes,
-        })
-    }
+    let numbers = Element::of(matrix)?;
+    let kind = NUMBERS.iter().find(|(kind, _)| *kind == numbers.kind);
+    let array = |(_, kind): &(u32, &str)| Array {
+        kind: (*kind).to_owned(),
+        by_columns: true,
+        shape,
+        numbers: numbers.bytes,
+    };
+    let name = String::from_utf8_lossy(&name).into_owned();
+    Ok(kind.map(|kind| (name, array(kind))))
 }

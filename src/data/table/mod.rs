@@ -10,13 +10,14 @@ mod npz;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod recording;
+mod room;
 mod source;
-mod unpack;
 
 use std::path::Path;
 
 pub(super) use self::arrays::Arrays;
 pub(super) use self::csv::Csv;
+pub(super) use self::room::too_large;
 pub(super) use self::source::Source;
 use super::columns::Columns;
 use super::error::{CellFault, LogError, Place};
@@ -29,6 +30,9 @@ pub(super) trait Table {
 
     /// Where the names are.
     fn head(&self) -> Place;
+
+    /// What the numbers of a log of it may take \[bytes\].
+    fn most_bytes(&self) -> u64;
 
     /// The numbers of these columns, in this order. They may be asked for once.
     ///
@@ -92,7 +96,7 @@ const ZIP: &[u8] = b"PK\x03\x04";
 const PARQUET: &[u8] = b"PAR1";
 
 /// Files that are known and not read: how they begin, and the line that converts them.
-const FOREIGN: [(&[u8], &str); 6] = [
+const FOREIGN: [(&[u8], &str); 7] = [
     (
         b"#ROSBAG",
         "a ROS 1 bag is not read; convert it: `pip install rosbags && rosbags-convert --src run.bag --dst run`, and read the \
@@ -105,6 +109,10 @@ const FOREIGN: [(&[u8], &str); 6] = [
     (
         recording::SQLITE,
         "a packed recording is not read; unpack it: `gunzip run.db3.gz`",
+    ),
+    (
+        ZIP,
+        "an .npz that is packed once more is not read; unpack it: `gunzip run.npz.gz`",
     ),
     (
         b"\x89HDF",
@@ -162,6 +170,9 @@ fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
         if begin.starts_with(recording::MCAP) {
             return Ok(Box::new(recording::of_mcap(path, columns)?));
         }
+        if begin.starts_with(ZIP) {
+            return Ok(Box::new(npz::read(path)?));
+        }
         #[cfg(feature = "parquet")]
         if begin.starts_with(PARQUET) {
             return Ok(Box::new(parquet::read(path)?));
@@ -173,12 +184,8 @@ fn read(path: &Path, columns: &Columns) -> Result<Box<dyn Table>, LogError> {
             fault: (*remedy).to_owned(),
         });
     }
-    if begin.starts_with(ZIP) {
-        let archive = source.archive()?;
-        return Ok(Box::new(npz::read(path, archive)?));
-    }
     if begin.starts_with(mat::MAGIC) {
-        return Ok(Box::new(mat::read(path, &source.contents()?)?));
+        return Ok(Box::new(mat::read(path, &source)?));
     }
     Ok(Box::new(Csv::of(path, source)?))
 }

@@ -3,32 +3,39 @@
 
 #![warn(clippy::indexing_slicing)]
 
+use std::io::{self, BufReader, ErrorKind, Read};
+
+use super::room::Room;
 use crate::limits::LOG_COLUMNS;
 
 /// An array whose numbers are still to be read.
-pub(super) struct Array<'a> {
+pub(super) struct Array<R> {
     /// `<f8`
-    pub kind: &'a str,
+    pub kind: String,
     /// Whether a column follows the other, rather than a row.
     pub by_columns: bool,
     pub shape: Vec<usize>,
-    pub numbers: &'a [u8],
+    pub numbers: R,
 }
 
-const MAGIC: &[u8] = b"\x93NUMPY";
+const MAGIC: &[u8; 6] = b"\x93NUMPY";
+/// The longest header; NumPy itself reads none of more than 10 000 bytes unless it is told to.
+const HEADER: usize = 1 << 16;
 
-impl<'a> Array<'a> {
+impl<R: Read> Array<R> {
     /// `None` for what is no array.
-    pub fn of(bytes: &'a [u8]) -> Option<Self> {
-        let ([version, _], rest) = bytes.strip_prefix(MAGIC)?.split_first_chunk()?;
-        let (length, rest) = match *version {
-            1 => rest.split_at_checked(2)?,
-            _ => rest.split_at_checked(4)?,
+    pub fn of(mut bytes: R) -> Option<Self> {
+        let [magic @ .., version, _] = take::<8>(&mut bytes)?;
+        let length = match version {
+            1 => usize::from(u16::from_le_bytes(take(&mut bytes)?)),
+            _ => usize::try_from(u32::from_le_bytes(take(&mut bytes)?)).ok()?,
         };
-        let little_endian = |sum, byte: &u8| 256 * sum + usize::from(*byte);
-        let length = length.iter().rev().fold(0, little_endian);
-        let (header, numbers) = rest.split_at_checked(length)?;
-        let header = std::str::from_utf8(header).ok()?;
+        if magic != *MAGIC || length > HEADER {
+            return None;
+        }
+        let mut header = vec![0; length];
+        bytes.read_exact(&mut header).ok()?;
+        let header = String::from_utf8(header).ok()?;
         // `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }`
         let after = |key: &str| Some(header.split_once(&format!("'{key}':"))?.1.trim_start());
         let shape = after("shape")?.strip_prefix('(')?.split_once(')')?.0;
@@ -37,10 +44,10 @@ impl<'a> Array<'a> {
             .map(str::trim)
             .filter(|size| !size.is_empty());
         Some(Self {
-            kind: kind(after("descr")?),
+            kind: kind(after("descr")?).to_owned(),
             by_columns: after("fortran_order")?.starts_with("True"),
             shape: sizes.map(|size| size.parse().ok()).collect::<Option<_>>()?,
-            numbers,
+            numbers: bytes,
         })
     }
 
@@ -53,65 +60,89 @@ impl<'a> Array<'a> {
     /// are refused unread: to read them is to run the code that they name.
     ///
     /// # Errors
-    /// An array that holds something else, has too many columns, or is cut off.
+    /// An array that holds something else, has too many columns or numbers, or is cut off.
     #[allow(clippy::cast_precision_loss)] // integers of loggers are far below 2^53
-    pub fn columns(&self, name: &str) -> Result<Vec<Vec<f64>>, String> {
+    pub fn columns(self, name: &str, room: &mut Room) -> Result<Vec<Vec<f64>>, String> {
         if self.is_text() || !(1..=2).contains(&self.shape.len()) {
             return Ok(Vec::new());
         }
-        match self.kind {
-            "<f8" => self.each(name, f64::from_le_bytes),
-            "<f4" => self.each(name, |bytes| f64::from(f32::from_le_bytes(bytes))),
-            "<i8" => self.each(name, |bytes| i64::from_le_bytes(bytes) as f64),
-            "<i4" => self.each(name, |bytes| f64::from(i32::from_le_bytes(bytes))),
-            "<i2" => self.each(name, |bytes| f64::from(i16::from_le_bytes(bytes))),
-            "<u8" => self.each(name, |bytes| u64::from_le_bytes(bytes) as f64),
-            "<u4" => self.each(name, |bytes| f64::from(u32::from_le_bytes(bytes))),
-            "|u1" | "|b1" => self.each(name, |[byte]| f64::from(byte)),
-            "|i1" => self.each(name, |byte| f64::from(i8::from_le_bytes(byte))),
-            "<u2" => self.each(name, |bytes| f64::from(u16::from_le_bytes(bytes))),
-            "|O" => Err(format!(
-                "array {name:?} holds pickled objects, which are never read, since they can run any code; save arrays of numbers"
-            )),
+        let columns = match self.kind.as_str() {
+            "<f8" => self.each(room, f64::from_le_bytes),
+            "<f4" => self.each(room, |bytes| f64::from(f32::from_le_bytes(bytes))),
+            "<i8" => self.each(room, |bytes| i64::from_le_bytes(bytes) as f64),
+            "<i4" => self.each(room, |bytes| f64::from(i32::from_le_bytes(bytes))),
+            "<i2" => self.each(room, |bytes| f64::from(i16::from_le_bytes(bytes))),
+            "<u8" => self.each(room, |bytes| u64::from_le_bytes(bytes) as f64),
+            "<u4" => self.each(room, |bytes| f64::from(u32::from_le_bytes(bytes))),
+            "<u2" => self.each(room, |bytes| f64::from(u16::from_le_bytes(bytes))),
+            "|u1" | "|b1" => self.each(room, |[byte]| f64::from(byte)),
+            "|i1" => self.each(room, |byte| f64::from(i8::from_le_bytes(byte))),
+            "|O" => Err(
+                "holds pickled objects, which are never read, since they can run any code; save arrays of numbers"
+                    .to_owned(),
+            ),
             kind => Err(format!(
-                "array {name:?} holds `{kind}`; save it as numbers, such as array.astype(float)"
+                "holds `{kind}`; save it as numbers, such as array.astype(float)"
             )),
-        }
+        };
+        columns.map_err(|fault| format!("array {name:?} {fault}"))
     }
 
     fn each<const SIZE: usize>(
-        &self,
-        name: &str,
+        self,
+        room: &mut Room,
         number: impl Fn([u8; SIZE]) -> f64,
     ) -> Result<Vec<Vec<f64>>, String> {
-        let (cells, _) = self.numbers.as_chunks::<SIZE>();
         let length = |axis: usize| self.shape.get(axis).copied().unwrap_or(1);
-        let (rows, columns) = (length(0), length(1));
-        if rows.checked_mul(columns) != Some(cells.len()) {
-            return Err(format!(
-                "array {name:?} is cut off at {} numbers; write the file again",
-                cells.len()
-            ));
-        }
+        let columns = length(1);
+        // Rows without a cell are none.
+        let rows = if columns == 0 { 0 } else { length(0) };
         if columns > LOG_COLUMNS {
             return Err(format!(
-                "array {name:?} has {columns} columns; at most {LOG_COLUMNS} are read"
+                "has {columns} columns; at most {LOG_COLUMNS} are read"
             ));
         }
-        let column = |column: usize| {
-            let (first, step) = match self.by_columns {
-                true => (column * rows, 1),
-                false => (column, columns),
-            };
-            let cells = cells.get(first..).unwrap_or_default().iter();
-            cells
-                .step_by(step)
-                .take(rows)
-                .map(|cell| number(*cell))
-                .collect()
+        let count = (rows as u64).saturating_mul(columns as u64);
+        room.take_numbers(count)
+            .map_err(|why| format!("is too large: {why}"))?;
+        let mut all: Vec<Vec<f64>> = (0..columns).map(|_| Vec::with_capacity(rows)).collect();
+        let mut numbers = BufReader::new(self.numbers);
+        let mut read = |column: &mut Vec<f64>| {
+            let mut cell = [0; SIZE];
+            numbers.read_exact(&mut cell)?;
+            column.push(number(cell));
+            Ok(())
         };
-        Ok((0..columns).map(column).collect())
+        let whole = match self.by_columns {
+            true => all
+                .iter_mut()
+                .try_for_each(|column| (0..rows).try_for_each(|_| read(column))),
+            false => (0..rows).try_for_each(|_| all.iter_mut().try_for_each(&mut read)),
+        };
+        let unreadable = |why: io::Error| format!("cannot be read: {why}");
+        whole.map_err(|why: io::Error| match why.kind() {
+            ErrorKind::UnexpectedEof => {
+                let found: usize = all.iter().map(Vec::len).sum();
+                format!("is cut off at {found} numbers; write the file again")
+            }
+            _ => unreadable(why),
+        })?;
+        // Checksums are told where the numbers end.
+        match numbers.bytes().next().transpose() {
+            Ok(None) => Ok(all),
+            Ok(Some(_)) => Err(format!(
+                "holds more than its {count} numbers; write the file again"
+            )),
+            Err(why) => Err(unreadable(why)),
+        }
     }
+}
+
+/// The next bytes; `None` where there are not as many.
+fn take<const SIZE: usize>(bytes: &mut impl Read) -> Option<[u8; SIZE]> {
+    let mut taken = [0; SIZE];
+    bytes.read_exact(&mut taken).ok()?;
+    Some(taken)
 }
 
 /// What stands in quotes, or all of a description of fields, which has none around it.

@@ -11,15 +11,19 @@ use parquet::record::reader::RowIter;
 use parquet::schema::types::Type;
 
 use super::arrays::Arrays;
-use super::unpack::too_large;
+use super::room::too_large;
 use crate::data::error::LogError;
 use crate::files;
-use crate::limits::unpacked_bytes;
+use crate::limits::{LOG_COLUMNS, unpacked_bytes};
 
 /// # Errors
 /// A file that is damaged, or whose lists are of different lengths.
 pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
-    let mut table = Arrays::default();
+    let packed = files::size(path).map_err(|why| LogError::Open {
+        path: path.to_owned(),
+        why,
+    })?;
+    let mut table = Arrays::of(packed);
     for list in lists(path, |_| true)? {
         let (name, is_list) = (list.name.clone(), list.is_list);
         for (number, column) in (1..).zip(list.columns(path)?) {
@@ -36,75 +40,95 @@ pub(super) fn read(path: &Path) -> Result<Arrays, LogError> {
 pub(super) struct List {
     pub name: String,
     pub is_list: bool,
-    /// Row after row, and how many each has.
-    numbers: Vec<f64>,
-    lengths: Vec<u32>,
+    rows: usize,
+    /// One for each number of the first row.
+    columns: Vec<Vec<f64>>,
+    /// The first row that has not as many, and how many it has. Nothing is kept from there on.
+    ragged: Option<(usize, usize)>,
 }
 
 impl List {
+    /// One without a row, whose first will be this.
+    ///
+    /// # Errors
+    /// More numbers than a log has columns.
+    fn of(name: &str, first: &Field) -> Result<Self, ParquetError> {
+        let mut row = Vec::new();
+        add_numbers(first, &mut row);
+        if row.len() > LOG_COLUMNS {
+            let told = format!(
+                "{name:?} has {} numbers a row, and at most {LOG_COLUMNS} columns are read",
+                row.len()
+            );
+            return Err(ParquetError::General(told));
+        }
+        Ok(Self {
+            name: name.to_owned(),
+            is_list: matches!(first, Field::ListInternal(_)),
+            rows: 0,
+            columns: vec![Vec::new(); row.len()],
+            ragged: None,
+        })
+    }
+
     /// The columns that the rows make.
     ///
     /// # Errors
     /// A row of another length than the first.
     pub fn columns(self, path: &Path) -> Result<Vec<Vec<f64>>, LogError> {
-        let width = self.lengths.first().copied().unwrap_or(0);
-        if let Some(row) = self.lengths.iter().position(|length| *length != width) {
-            return Err(LogError::Form {
+        let width = self.columns.len();
+        match self.ragged {
+            None => Ok(self.columns),
+            Some((row, length)) => Err(LogError::Form {
                 path: path.to_owned(),
                 fault: format!(
-                    "row {} of {:?} has {} number(s) where the first has {width}; write as many in all",
+                    "row {} of {:?} has {length} number(s) where the first has {width}; write as many in all",
                     row + 1,
                     self.name,
-                    self.lengths[row]
                 ),
-            });
+            }),
         }
-        let width = width as usize;
-        let column = |k: usize| {
-            self.numbers
-                .iter()
-                .skip(k)
-                .step_by(width)
-                .copied()
-                .collect()
-        };
-        Ok(match width {
-            1 => vec![self.numbers],
-            _ => (0..width).map(column).collect(),
-        })
     }
 
-    /// All numbers, row after row.
+    /// The numbers of a column that has one in each row.
     pub fn numbers(&self) -> &[f64] {
-        &self.numbers
+        self.columns.first().map_or(&[], Vec::as_slice)
     }
 
     /// Adds the rows of another file.
     pub fn extend(&mut self, other: &Self) {
-        self.numbers.extend(&other.numbers);
-        self.lengths.extend(&other.lengths);
+        let as_wide = self.columns.len() == other.columns.len();
+        let other_width = (!as_wide).then_some((0, other.columns.len()));
+        let ragged = other_width.or(other.ragged);
+        let ragged = ragged.map(|(row, length)| (self.rows + row, length));
+        self.ragged = self.ragged.or(ragged);
+        for (column, other) in self.columns.iter_mut().zip(&other.columns) {
+            column.extend(other);
+        }
+        self.rows += other.rows;
     }
 
     /// Those rows of which this says so, in their order.
-    pub fn retain(&mut self, mut is_kept: impl FnMut() -> bool) {
-        let (mut numbers, mut lengths) = (Vec::new(), Vec::new());
-        let mut rest = self.numbers.as_slice();
-        for length in &self.lengths {
-            let (row, behind) = rest.split_at(*length as usize);
-            rest = behind;
-            if is_kept() {
-                numbers.extend_from_slice(row);
-                lengths.push(*length);
-            }
+    pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        for column in &mut self.columns {
+            let mut row = 0..;
+            column.retain(|_| row.next().is_some_and(&is_kept));
         }
-        (self.numbers, self.lengths) = (numbers, lengths);
     }
 
-    fn push(&mut self, field: &Field) {
-        let before = self.numbers.len();
-        add_numbers(field, &mut self.numbers);
-        let added = u32::try_from(self.numbers.len() - before);
-        self.lengths.push(added.unwrap_or(u32::MAX));
+    /// Adds a row, with a place for its numbers.
+    fn push(&mut self, field: &Field, numbers: &mut Vec<f64>) {
+        numbers.clear();
+        add_numbers(field, numbers);
+        if numbers.len() != self.columns.len() {
+            self.ragged.get_or_insert((self.rows, numbers.len()));
+        }
+        if self.ragged.is_none() {
+            for (column, number) in self.columns.iter_mut().zip(numbers) {
+                column.push(*number);
+            }
+        }
+        self.rows += 1;
     }
 }
 
@@ -134,19 +158,14 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
     let schema = Type::group_type_builder(schema.name())
         .with_fields(wanted)
         .build()?;
-    let mut lists: Vec<List> = Vec::new();
+    let (mut lists, mut numbers) = (Vec::<List>::new(), Vec::new());
     for row in RowIter::from_file_into(Box::new(reader)).project(Some(schema))? {
         let row = row?;
         for (index, (name, field)) in row.get_column_iter().enumerate() {
             if lists.len() == index {
-                lists.push(List {
-                    name: name.clone(),
-                    is_list: matches!(field, Field::ListInternal(_)),
-                    numbers: Vec::new(),
-                    lengths: Vec::new(),
-                });
+                lists.push(List::of(name, field)?);
             }
-            lists[index].push(field);
+            lists[index].push(field, &mut numbers);
         }
     }
     Ok(lists)
@@ -175,7 +194,8 @@ fn check_size(reader: &SerializedFileReader<File>, most: u64) -> Result<(), Parq
 }
 
 fn check_cells(cells: u64, most: u64) -> Result<(), ParquetError> {
-    match cells.saturating_mul(8) <= most {
+    // 8 bytes each, twice as many while a column grows.
+    match cells.saturating_mul(16) <= most {
         true => Ok(()),
         false => Err(too_large().into()),
     }

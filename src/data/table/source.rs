@@ -1,12 +1,12 @@
 //! A file that is read from its beginning as often as it is needed, and never at once.
 
 use std::fs::File;
-use std::io::{self, BufReader, Cursor, Read, Seek};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::MultiGzDecoder;
 
-use super::unpack::Unpacked;
+use super::room::Unpacked;
 use crate::data::error::LogError;
 use crate::files;
 
@@ -19,6 +19,7 @@ pub(super) const BLOCK: usize = 1 << 16;
 /// A file, unpacked where it is packed with gzip.
 pub struct Source {
     path: PathBuf,
+    size: u64,
     is_packed: bool,
 }
 
@@ -26,17 +27,30 @@ impl Source {
     /// # Errors
     /// A file that cannot be read.
     pub fn of(path: &Path) -> Result<Self, LogError> {
-        let mut source = Self {
+        let mut begin = Vec::new();
+        let size = files::open(path).and_then(|file| {
+            let size = file.metadata()?.len();
+            file.take(GZIP.len() as u64).read_to_end(&mut begin)?;
+            Ok(size)
+        });
+        Ok(Self {
             path: path.to_owned(),
-            is_packed: false,
-        };
-        source.is_packed = source.begin()?.starts_with(GZIP);
-        Ok(source)
+            size: size.map_err(|why| LogError::Open {
+                path: path.to_owned(),
+                why,
+            })?,
+            is_packed: begin == GZIP,
+        })
     }
 
     /// Whether the file is packed.
     pub fn is_packed(&self) -> bool {
         self.is_packed
+    }
+
+    /// Its bytes as it is, packed or not.
+    pub fn size(&self) -> u64 {
+        self.size
     }
 
     /// All that it holds, from the beginning.
@@ -46,7 +60,7 @@ impl Source {
     pub fn open(&self) -> io::Result<Box<dyn Read>> {
         let file = files::open(&self.path)?;
         match self.is_packed {
-            true => Ok(Box::new(unpacked(file)?)),
+            true => Ok(Box::new(unpacked(self.size, file))),
             false => Ok(Box::new(file)),
         }
     }
@@ -56,33 +70,8 @@ impl Source {
     /// # Errors
     /// A file that cannot be read.
     pub fn begin(&self) -> Result<Vec<u8>, LogError> {
-        self.read(16)
-    }
-
-    /// All bytes of a file that is to be read at once.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
-    pub fn contents(&self) -> Result<Vec<u8>, LogError> {
-        self.read(u64::MAX)
-    }
-
-    /// A file in which parts are sought: as it is or, if it is packed, in memory.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
-    pub fn archive(&self) -> Result<Box<dyn Archive>, LogError> {
-        if self.is_packed {
-            return Ok(Box::new(Cursor::new(self.contents()?)));
-        }
-        let file = files::open(&self.path);
-        let file = file.map_err(|why| self.fault(&self.path, why))?;
-        Ok(Box::new(BufReader::with_capacity(BLOCK, file)))
-    }
-
-    fn read(&self, most: u64) -> Result<Vec<u8>, LogError> {
         let mut bytes = Vec::new();
-        let read = |source: Box<dyn Read>| source.take(most).read_to_end(&mut bytes);
+        let read = |source: Box<dyn Read>| source.take(16).read_to_end(&mut bytes);
         let read = self.open().and_then(read);
         read.map_err(|why| self.fault(&self.path, why))?;
         Ok(bytes)
@@ -101,13 +90,7 @@ impl Source {
     }
 }
 
-/// What can be read from any place.
-pub trait Archive: Read + Seek {}
-
-impl<R: Read + Seek> Archive for R {}
-
-fn unpacked(file: File) -> io::Result<impl Read> {
-    let packed = file.metadata()?.len();
+fn unpacked(packed: u64, file: File) -> impl Read {
     let blocks = BufReader::with_capacity(BLOCK, file);
-    Ok(Unpacked::of(packed, MultiGzDecoder::new(blocks)))
+    Unpacked::of(packed, MultiGzDecoder::new(blocks))
 }

@@ -3,12 +3,10 @@
 use std::collections::HashMap;
 use std::error::Error;
 use std::fs;
-use std::io;
 use std::path::Path;
 
 use rusqlite::{Connection, OpenFlags};
 
-use super::super::unpack::Unpacking;
 use super::Recording;
 use crate::data::error::LogError;
 
@@ -28,7 +26,9 @@ fn add(path: &Path, recording: &mut Recording) -> Result<(), Box<dyn Error>> {
     let bag = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
     check_tables(&bag)?;
     let topics = add_topics(&bag, recording)?;
-    count(&bag, &topics, fs::metadata(path)?.len(), recording)?;
+    let packed = fs::metadata(path)?.len();
+    recording.extend(packed);
+    count(&bag, &topics, packed, recording)?;
     let is_read = |(_, topic): &(&i64, &usize)| recording.topics[**topic].decoder.is_some();
     let read: Vec<String> = topics
         .iter()
@@ -45,7 +45,11 @@ fn add(path: &Path, recording: &mut Recording) -> Result<(), Box<dyn Error>> {
     while let Some(row) = messages.next()? {
         let (topic, data) = (topics[&row.get::<_, i64>(0)?], row.get_ref(2)?.as_blob()?);
         match data.starts_with(ZSTD) {
-            true => recording.add(topic, row.get(1)?, &unpacked(data).unwrap_or_default()),
+            true => {
+                let data = zstd::Decoder::new(data);
+                let data = data.and_then(|data| recording.unpacked.read(data));
+                recording.add(topic, row.get(1)?, &data.unwrap_or_default());
+            }
             false => recording.add(topic, row.get(1)?, data),
         }
     }
@@ -103,8 +107,4 @@ fn add_topics(
         Ok((row.get(0)?, recording.topic(&name, &kind, &encoding)))
     })?;
     topics.collect()
-}
-
-fn unpacked(message: &[u8]) -> io::Result<Vec<u8>> {
-    Unpacking::of(message.len() as u64).read(zstd::Decoder::new(message)?)
 }

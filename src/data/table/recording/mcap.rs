@@ -39,8 +39,10 @@ pub(super) fn read(path: &Path, recording: &mut Recording) -> Result<(), LogErro
 
 fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
     let mut file = files::open(path)?;
+    let packed = file.metadata()?.len();
+    recording.extend(packed);
     // A damaged length, or a part that holds more than it seems to, must not take all memory.
-    let fits = usize::try_from(unpacked_bytes(file.metadata()?.len()));
+    let fits = usize::try_from(unpacked_bytes(packed));
     let largest = fits.map_or(RECORD_BYTES, |bytes| bytes.min(RECORD_BYTES));
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
@@ -57,6 +59,9 @@ fn add(path: &Path, recording: &mut Recording) -> McapResult<()> {
             // What follows is an index.
             LinearReadEvent::Record { opcode, .. } if opcode == op::DATA_END => break,
             LinearReadEvent::Record { opcode, data } => {
+                if recording.unpacked.take(data.len() as u64).is_err() {
+                    break;
+                }
                 if !is_whole(opcode, data) {
                     return Err(McapError::UnexpectedEoc);
                 }

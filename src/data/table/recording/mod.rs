@@ -8,12 +8,15 @@ mod message;
 mod rows;
 
 use std::collections::HashMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use self::message::{CHANNELS, Decoder, Message};
 use super::arrays::Arrays;
+use super::room::Room;
 use crate::data::columns::Columns;
 use crate::data::error::LogError;
+use crate::limits::MESSAGE_BYTES;
 
 /// How files of each kind begin.
 pub(super) const SQLITE: &[u8] = b"SQLite format 3\0";
@@ -59,6 +62,9 @@ struct Recording {
     /// The indices of the series by topic and names.
     series_by_names: HashMap<(usize, Vec<String>), usize>,
     notes: Vec<String>,
+    /// For what is packed in the files, and for what is kept of it.
+    unpacked: Room,
+    kept: Room,
 }
 
 struct Topic {
@@ -115,7 +121,21 @@ impl Recording {
             series: Vec::new(),
             series_by_names: HashMap::new(),
             notes: Vec::new(),
+            unpacked: Room::of(0),
+            kept: Room::of(0),
         }
+    }
+
+    /// A file of it has so many bytes.
+    fn extend(&mut self, packed: u64) {
+        self.unpacked.extend(packed);
+        self.kept.extend(packed);
+    }
+
+    /// Whether all was kept that is read of it.
+    fn check(&self) -> io::Result<()> {
+        self.unpacked.check()?;
+        self.kept.check()
     }
 
     /// The index of a topic, which begins here or in an earlier file.
@@ -141,7 +161,11 @@ impl Recording {
         let Some(decoder) = entry.decoder else {
             return;
         };
-        match decoder(data) {
+        let decoded = match data.len() <= MESSAGE_BYTES {
+            true => decoder(data),
+            false => Err(format!("is longer than {} MB", MESSAGE_BYTES >> 20)),
+        };
+        match decoded {
             Ok(message) => self.sort_in(topic, logged_ns, message),
             Err(why) => {
                 let told = || format!("message {} of {} {why}", entry.messages, entry.name);
@@ -150,8 +174,23 @@ impl Recording {
         }
     }
 
+    /// Keeps a message, where there is room for it.
     fn sort_in(&mut self, topic: usize, logged_ns: i64, message: Message) {
-        let entry = self.series_by_names.entry((topic, message.names));
+        let names = (topic, message.names);
+        let is_known = self.series_by_names.contains_key(&names);
+        let bytes_of_names = if is_known {
+            0
+        } else {
+            bytes_of_names(&names.1)
+        };
+        if self
+            .kept
+            .take(bytes_of_sample(&message.values) + bytes_of_names)
+            .is_err()
+        {
+            return;
+        }
+        let entry = self.series_by_names.entry(names);
         let series = *entry.or_insert_with_key(|(topic, names)| {
             self.series.push(Series {
                 topic: *topic,
@@ -173,4 +212,15 @@ impl Recording {
             fault,
         }
     }
+}
+
+/// What a sample takes in its series, and then in the columns of a table \[bytes\].
+fn bytes_of_sample(values: &[f64]) -> u64 {
+    2 * (size_of::<Sample>() + size_of_val(values)) as u64
+}
+
+/// What the names of a series take, there and where it is looked for \[bytes\].
+fn bytes_of_names(names: &[String]) -> u64 {
+    let bytes = |name: &String| size_of::<String>() + name.len();
+    2 * names.iter().map(bytes).sum::<usize>() as u64
 }

@@ -11,12 +11,13 @@ impl Recording {
     /// asked of, only the names are there.
     ///
     /// # Errors
-    /// As [`Recording::choose`], and messages of the topics asked for that cannot be decoded.
+    /// As [`Recording::choose`], and messages of the topics asked for that cannot be decoded, and more of them than is kept.
     pub(super) fn table(&self, columns: &Columns) -> Result<Arrays, LogError> {
+        self.check().map_err(|why| self.fault(why.to_string()))?;
         let chosen = self.choose(columns)?;
         let (asked, unasked) = self.others(chosen, columns);
         let used: Vec<&Series> = [&[chosen], asked.as_slice()].concat();
-        self.check(&used)?;
+        self.check_messages(&used)?;
         let clock = Clock::of(&used);
         let all = clock.rows(chosen);
         let begins = |series: &&Series| Some(clock.rows(series).first()?.ns);
@@ -24,7 +25,7 @@ impl Recording {
         let known = used.iter().filter_map(begins).max();
         let rows = &all[all.partition_point(|row| Some(row.ns) < known)..];
 
-        let mut table = Arrays::default();
+        let mut table = Arrays::of(self.kept.packed());
         table.notes.extend(self.notes.iter().cloned());
         table.notes.push(self.told_of_time(chosen, clock));
         table
@@ -55,7 +56,7 @@ impl Recording {
     }
 
     /// Every message of these topics can be decoded.
-    fn check(&self, used: &[&Series]) -> Result<(), LogError> {
+    fn check_messages(&self, used: &[&Series]) -> Result<(), LogError> {
         let mut faults = used
             .iter()
             .filter_map(|series| self.topics[series.topic].fault.as_ref());
