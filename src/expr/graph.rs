@@ -177,19 +177,6 @@ impl Graph {
         }
     }
 
-    /// The value of a constant or of operations on constants alone, which are no constant where it is not finite.
-    pub(super) fn value_of_constants(&self, node: Node) -> Option<f64> {
-        match self.ops[node.index()] {
-            Op::Const(value) => Some(value),
-            Op::Unary(op, a) => Some(op.apply(self.value_of_constants(a)?)),
-            Op::Binary(op, a, b) => {
-                let a = self.value_of_constants(a)?;
-                Some(op.apply(a, self.value_of_constants(b)?))
-            }
-            Op::Input(_) | Op::Where(..) => None,
-        }
-    }
-
     fn push(&mut self, op: Op) -> Node {
         let next = Node(u32::try_from(self.ops.len()).expect("fewer than 2^32 operations"));
         let ops = &mut self.ops;

@@ -5,6 +5,7 @@
 //!
 //! This module knows no file, no optimiser and no command line.
 
+mod constants;
 mod error;
 mod eval;
 mod gradient;

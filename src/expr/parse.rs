@@ -381,7 +381,16 @@ mod tests {
             "this is inf, no finite number\n    a + 1e200 * 1e200\n        ^^^^^^^^^^^^^"
         );
         assert!(message_of("log(1 - 1) * a").starts_with("this is -inf"));
-        assert!(message_of("a / (2 - 2)").starts_with("this is divided by zero"));
+        for zero in [
+            "a / (2 - 2)",
+            "a / (b * 0)",
+            "a / where(1 > 2, 3, clamp(-1, 0, 1))",
+        ] {
+            assert!(
+                message_of(zero).starts_with("this is divided by zero"),
+                "{zero}"
+            );
+        }
         assert!(parse("a / 0").is_ok() && parse_finite("a / 2").is_ok());
     }
 

@@ -1,4 +1,4 @@
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::ops::Range;
 
 use super::error::{listed, shortened, suggestion};
@@ -27,8 +27,6 @@ pub struct Scope {
     sign: SignForm,
     /// Nodes whose signs are nodes of their own.
     signs: HashMap<Node, Node>,
-    /// Whether constants have to be finite.
-    is_checked: bool,
 }
 
 impl Formula {
@@ -47,19 +45,6 @@ impl Formula {
     }
 }
 
-impl Formula {
-    /// Refuse parts that are no finite numbers whatever the names stand for.
-    pub(super) fn check_constants(&self) -> Result<(), FormulaError> {
-        let mut graph = Graph::new();
-        let names: BTreeSet<&str> = self.names().into_iter().collect();
-        let scope = Scope {
-            is_checked: true,
-            ..Scope::of_inputs(&mut graph, names)
-        };
-        scope.lower(&mut graph, self).map(|_| ())
-    }
-}
-
 impl Scope {
     /// An empty scope.
     pub fn new(sign: SignForm) -> Self {
@@ -67,7 +52,6 @@ impl Scope {
             names: HashMap::new(),
             sign,
             signs: HashMap::new(),
-            is_checked: false,
         }
     }
 
@@ -105,17 +89,6 @@ impl Scope {
     }
 
     fn term(&self, graph: &mut Graph, term: &Term) -> Result<Node, Fault> {
-        let node = self.unchecked(graph, term)?;
-        match graph.value_of_constants(node) {
-            Some(value) if self.is_checked && !value.is_finite() => Err((
-                term.span.clone(),
-                format!("this is {value}, no finite number"),
-            )),
-            _ => Ok(node),
-        }
-    }
-
-    fn unchecked(&self, graph: &mut Graph, term: &Term) -> Result<Node, Fault> {
         match &term.kind {
             Kind::Number(value) => Ok(graph.constant(*value)),
             Kind::Name(name) => self.names.get(name).copied().ok_or_else(|| {
@@ -136,10 +109,6 @@ impl Scope {
             }
             Kind::Infix(infix, a, b) => {
                 let (a, b) = (self.term(graph, a)?, self.term(graph, b)?);
-                let divides = *infix == Infix::Plain(Binary::Div);
-                if self.is_checked && divides && graph.is_zero(b) {
-                    return Err((term.span.clone(), "this is divided by zero".to_owned()));
-                }
                 Ok(infix_node(graph, *infix, a, b))
             }
             Kind::Call(function, arguments) => {
