@@ -38,7 +38,7 @@ fn record(folder: &Path) {
 }
 
 /// The rig's true values, without its friction, as the published set.
-const RIGS: &str = r#"
+pub const RIGS: &str = r#"
 plain = ["coulomb_friction"]
 
 [[rig]]
@@ -54,19 +54,19 @@ also = { fourth = ["log4.csv"] }
 "#;
 
 /// A folder with a file of rigs and the logs.
-struct Bench {
+pub struct Bench {
     folder: TempDir,
 }
 
 impl Bench {
-    fn new(rigs: &str) -> Self {
+    pub fn new(rigs: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         record(&folder.path().join("logs"));
         fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
         Self { folder }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 

@@ -7,9 +7,12 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 use residyn::runs::RunFolder;
 
+use crate::bench_rigs::{Bench, RIGS};
+use crate::fuzz::exported;
 use crate::support::{refuses, says, text};
 use crate::train::config;
 
@@ -26,7 +29,11 @@ fn commands() -> Vec<Vec<String>> {
     let checkpoint = ["--checkpoint", &prior];
     let config = ["--config", &experiment];
     let plant = ["--plant", "pendulum-real", "--task", "pendulum"];
-    let all: [&[&[&str]]; 9] = [
+    let exported = exported().join("model.json");
+    let rigs = measured_rigs();
+    let [data, file] = [rigs.path(""), rigs.path("rigs.toml")];
+    let rigs = ["--data", text(&data), "--rigs", text(&file)];
+    let all: [&[&[&str]]; 11] = [
         &[&["closeloop", "--verbose"]],
         &[&["train", "--config", &recipe]],
         &[&["tune", "--config", &tuning], &checkpoint],
@@ -34,11 +41,19 @@ fn commands() -> Vec<Vec<String>> {
         &[&["mbrl"], &config],
         &[&["experiment", "physics-prior"], &config],
         &[&["bench", "effects", "--grid", &grid]],
+        &[&["bench", "rigs"], &rigs],
+        &[&["import", "--file", text(&exported)]],
         &[&["control"], &checkpoint, &plant],
         &[&["merge", "part"]],
     ];
     let owned = |words: &[&[&str]]| words.concat().into_iter().map(str::to_owned).collect();
     all.into_iter().map(owned).collect()
+}
+
+/// A file of rigs beside their logs.
+fn measured_rigs() -> &'static Bench {
+    static RIGS_AND_LOGS: OnceLock<Bench> = OnceLock::new();
+    RIGS_AND_LOGS.get_or_init(|| Bench::new(RIGS))
 }
 
 fn with_out<'a>(command: &'a [String], out: &'a str) -> Vec<&'a str> {

@@ -37,10 +37,20 @@ impl Scratch {
 
     /// A log of 2 s of a pendulum, a row every 10 ms; `row` makes q, qd and tau of the time.
     pub fn log(&self, name: &str, row: impl Fn(f64) -> [f64; 3]) -> String {
+        self.log_at(name, (0..200).map(|row| f64::from(row) * 0.01), row)
+    }
+
+    /// A log of a pendulum whose rows are at these times.
+    pub fn log_at(
+        &self,
+        name: &str,
+        times: impl Iterator<Item = f64>,
+        row: impl Fn(f64) -> [f64; 3],
+    ) -> String {
         let mut log = "time,q1,qd1,tau1\n".to_owned();
-        for time in (0..200).map(|row| f64::from(row) * 0.01) {
+        for time in times {
             let [q, qd, tau] = row(time);
-            writeln!(log, "{time},{q:?},{qd:?},{tau:?}").unwrap();
+            writeln!(log, "{time:?},{q:?},{qd:?},{tau:?}").unwrap();
         }
         self.file(name, log)
     }
@@ -56,11 +66,12 @@ impl Scratch {
         self.model(name, "C_g * sin(q1) + C_i * tau1", acceleration)
     }
 
-    /// The small recipe with one text in place of another.
-    fn recipe(&self, name: &str, from: &str, to: &str) -> String {
-        let recipe = fs::read_to_string(config("smoke/train-pendulum.toml")).unwrap();
-        assert!(recipe.contains(from), "{from}");
-        self.file(name, recipe.replacen(from, to, 1))
+    /// A file of `configs` with one text in place of another, under its own name.
+    pub fn changed(&self, file: &str, from: &str, to: &str) -> String {
+        let text = fs::read_to_string(config(file)).unwrap();
+        assert!(text.contains(from), "{from}");
+        let (_, name) = file.rsplit_once('/').unwrap();
+        self.file(name, text.replacen(from, to, 1))
     }
 
     pub fn out(&self) -> String {
@@ -225,13 +236,13 @@ fn more_than_any_machine_could_do_is_refused_before_it_is_begun() {
     let (log, out) = (scratch.log("log.csv", swinging), scratch.out());
     let usual = config("smoke/train-pendulum.toml");
     let of_recipe = |from: &str, to: &str| {
-        let recipe = scratch.recipe("recipe.toml", from, to);
+        let recipe = scratch.changed("smoke/train-pendulum.toml", from, to);
         refuses_in_little_memory(&["train", "--config", &recipe, "--out", &out])
     };
     let hidden = "hidden = [16, 16, 16]";
     says(
         &of_recipe(hidden, "hidden = [1000000]"),
-        &["recipe.toml", "from 1 to 4096"],
+        &["train-pendulum.toml", "from 1 to 4096"],
     );
     says(&of_recipe(hidden, "hidden = [0]"), &["from 1 to 4096"]);
     says(
@@ -240,7 +251,7 @@ fn more_than_any_machine_could_do_is_refused_before_it_is_begun() {
     );
     says(
         &of_recipe("trajectories = 100", "trajectories = 100000000000"),
-        &["recipe.toml", "at most 10000000 are sampled"],
+        &["train-pendulum.toml", "at most 10000000 are sampled"],
     );
     says(
         &of_recipe("epochs = 200", "epochs = 1000000000000"),
@@ -291,7 +302,7 @@ fn a_training_that_leaves_the_finite_numbers_or_makes_it_worse_says_so() {
     let ends_in = |rate: &str| {
         let rates = format!("learning_rates = {{ physics = 0.01, residual = {rate} }}");
         let usual = "learning_rates = { physics = 0.01, residual = 0.01 }";
-        let recipe = scratch.recipe("recipe.toml", usual, &rates);
+        let recipe = scratch.changed("smoke/train-pendulum.toml", usual, &rates);
         ends_without(&[
             "train",
             "--config",
@@ -327,13 +338,13 @@ fn numbers_in_files_are_finite() {
             &refuses(&["check", &model]),
             &["model.toml, line 7, column 17", "no finite number"],
         );
-        let recipe = scratch.recipe(
-            "recipe.toml",
+        let recipe = scratch.changed(
+            "smoke/train-pendulum.toml",
             "step_s = 0.02",
             &format!("step_s = {number}"),
         );
         let told = refuses(&["train", "--config", &recipe, "--out", &scratch.out()]);
-        says(&told, &["recipe.toml", "line ", number]);
+        says(&told, &["train-pendulum.toml", "line ", number]);
     }
     let model = scratch.moving_by("model.toml", "1e999 * tau1");
     says(

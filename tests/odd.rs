@@ -1,7 +1,6 @@
 //! Odd but valid input: every outcome is an answer or one clear error, and no number beyond the finite ones is given without
 //! a word.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -14,7 +13,6 @@ use serde_json::Value;
 use crate::common::{rng, simulate, system};
 use crate::hard::{Scratch, ends_without, swinging};
 use crate::support::{answers, refuses, residyn, says, succeeds, text};
-use crate::train::config;
 
 const PENDULUM_OF_TORQUES: &str = r#"
 [system]
@@ -30,29 +28,12 @@ mass = [["I"]]
 bias = ["G * sin(q1)"]
 "#;
 
-/// A log of a swinging pendulum whose rows are at these times.
-fn at_times(scratch: &Scratch, name: &str, times: impl Iterator<Item = f64>) -> String {
-    let mut log = "time,q1,qd1,tau1\n".to_owned();
-    for time in times {
-        let [q, qd, tau] = swinging(time);
-        writeln!(log, "{time:?},{q:?},{qd:?},{tau:?}").unwrap();
-    }
-    scratch.file(name, log)
-}
-
 /// What `closeloop` answers, which writes a report that can be read again.
 fn closed(scratch: &Scratch, arguments: &[&str]) -> String {
     let out = scratch.out();
     let told = answers(&[&["closeloop", "--budget", "0s", "--out", &out], arguments].concat());
     succeeds(&["report", &out]);
     told
-}
-
-/// A built-in file of these folders with one line in place of another.
-fn changed(scratch: &Scratch, file: &str, from: &str, to: &str) -> String {
-    let text = fs::read_to_string(config(file)).unwrap();
-    assert!(text.contains(from), "{from}");
-    scratch.file("changed.toml", text.replacen(from, to, 1))
 }
 
 #[test]
@@ -100,15 +81,15 @@ fn logs_of_few_and_far_rows_get_an_answer() {
     let torques = scratch.file("torques.toml", PENDULUM_OF_TORQUES);
     let log = scratch.log("log.csv", swinging);
     // Windows of the fit are shorter than a step of this log.
-    let sparse = at_times(
-        &scratch,
+    let sparse = scratch.log_at(
         "sparse.csv",
         (0..40).map(|row| 0.5 * f64::from(row)),
+        swinging,
     );
-    let short = at_times(
-        &scratch,
+    let short = scratch.log_at(
         "short.csv",
         (0..60).map(|row| 0.01 * f64::from(row)),
+        swinging,
     );
     let out = scratch.out();
     let told = refuses(&[
@@ -137,10 +118,10 @@ fn logs_of_few_and_far_rows_get_an_answer() {
         &["--model", &torques, "--train", &log, "--test", &short],
     );
     for rows in 0..5 {
-        let few = at_times(
-            &scratch,
+        let few = scratch.log_at(
             "few.csv",
             (0..rows).map(|row| 0.01 * f64::from(row)),
+            swinging,
         );
         for command in [
             &["audit"][..],
@@ -159,10 +140,10 @@ fn logs_of_few_and_far_rows_get_an_answer() {
 fn clocks_that_no_log_has_are_refused_with_their_line() {
     let scratch = Scratch::new();
     let steps = |row: u32| 0.01 * f64::from(row);
-    let late = at_times(
-        &scratch,
+    let late = scratch.log_at(
         "late.csv",
         (0..200).map(|row| 1.7e18 + 1e9 * steps(row)),
+        swinging,
     );
     let told = refuses(&["audit", &late]);
     says(
@@ -174,7 +155,7 @@ fn clocks_that_no_log_has_are_refused_with_their_line() {
         ],
     );
     let pause = |row: u32| steps(row) + if row < 100 { 0.0 } else { 1e9 };
-    let paused = at_times(&scratch, "paused.csv", (0..200).map(pause));
+    let paused = scratch.log_at("paused.csv", (0..200).map(pause), swinging);
     let told = refuses(&["audit", &paused]);
     says(
         &told,
@@ -187,7 +168,10 @@ fn clocks_that_no_log_has_are_refused_with_their_line() {
     );
     // A pause of an hour is none of these.
     let hour = |row: u32| steps(row) + if row < 100 { 0.0 } else { 3600.0 };
-    answers(&["audit", &at_times(&scratch, "hour.csv", (0..200).map(hour))]);
+    answers(&[
+        "audit",
+        &scratch.log_at("hour.csv", (0..200).map(hour), swinging),
+    ]);
 }
 
 #[test]
@@ -350,7 +334,7 @@ fn rigs_and_tasks_beyond_any_sensor_are_refused() {
         ),
         ("torque = [[-3.0, 3.0]]", "torque = [[0, 1e300]]"),
     ] {
-        let recipe = changed(&scratch, "smoke/train-pendulum.toml", from, to);
+        let recipe = scratch.changed("smoke/train-pendulum.toml", from, to);
         says(
             &refuses(&["train", "--config", &recipe, "--out", &out]),
             &[beyond],
@@ -364,8 +348,7 @@ fn rigs_and_tasks_beyond_any_sensor_are_refused() {
     ] {
         says(&refuses(&[&plant, flags].concat()), &[beyond]);
     }
-    let recipe = changed(
-        &scratch,
+    let recipe = scratch.changed(
         "smoke/train-pendulum.toml",
         "penalty = { fixed = { alpha = 1e-4 } }\nintegrator = \"semi_implicit_euler\"",
         "integrator = { fine = { steps = 4294967295 } }",
@@ -420,12 +403,7 @@ fn effects_without_parameters_have_none_to_set() {
 fn rewards_and_plans_that_are_no_finite_numbers_end_control() {
     let scratch = Scratch::new();
     let control = |objective: &str| {
-        let task = changed(
-            &scratch,
-            "tasks/pendulum.toml",
-            "objective = \"cos(q1)\"",
-            objective,
-        );
+        let task = scratch.changed("tasks/pendulum.toml", "objective = \"cos(q1)\"", objective);
         ends_without(&[
             "control",
             "--model",
@@ -449,4 +427,25 @@ fn rewards_and_plans_that_are_no_finite_numbers_end_control() {
             "no candidate has a finite return",
         ],
     );
+}
+
+#[test]
+fn plans_that_are_no_finite_numbers_end_a_run_of_learning() {
+    let scratch = Scratch::new();
+    let infinite = "objective = \"1e300 * (1 + q1^2)\"";
+    scratch.changed("tasks/pendulum.toml", "objective = \"cos(q1)\"", infinite);
+    let own = "task = \"pendulum.toml\"";
+    let config = scratch.changed(
+        "smoke/physics-prior-pendulum.toml",
+        "task = \"pendulum\"",
+        own,
+    );
+    for command in [&["mbrl"][..], &["experiment", "physics-prior"]] {
+        let out = scratch.path(command[0]);
+        let run = ["--config", &config, "--out", text(&out)];
+        says(
+            &ends_without(&[command, &run].concat()),
+            &["no candidate of the plan at 0.000 s has a finite return"],
+        );
+    }
 }

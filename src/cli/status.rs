@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use crate::control::EpisodeError;
+use crate::control::{EpisodeError, LostPlan};
 use crate::identify::FitError;
 use crate::plant::PlantError;
 use crate::train::TrainError;
@@ -29,5 +29,6 @@ fn is_divergence(error: &(dyn Error + 'static)) -> bool {
     let of_episode = matches!(error.downcast_ref(), Some(EpisodeError::Formula { .. }));
     let of_training = matches!(error.downcast_ref(), Some(TrainError::Diverged { .. }));
     let of_command = error.is::<NotFinite>();
-    of_command || of_fit || of_plant || of_episode || of_training
+    let of_plan = error.is::<LostPlan>();
+    of_command || of_fit || of_plant || of_episode || of_plan || of_training
 }

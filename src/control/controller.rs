@@ -1,6 +1,7 @@
 use std::collections::VecDeque;
 
 use rand::{Rng, RngExt};
+use thiserror::Error;
 
 use super::Task;
 use crate::plan::{Planner, Start};
@@ -11,6 +12,16 @@ pub trait Policy {
     /// The torque (N m or N, one a joint) to hold from `time_s` on, given the sensor readings `measured` (positions, then
     /// velocities).
     fn torque(&mut self, measured: &[f64], time_s: f64) -> Vec<f64>;
+}
+
+/// A plan of which no candidate has a finite return.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error(
+    "no candidate of the plan at {time_s:.3} s has a finite return: the model leaves the finite numbers in all of them; mend \
+     the model or the objective of the task, or shorten the planner's horizon"
+)]
+pub struct LostPlan {
+    pub time_s: f64,
 }
 
 /// Model-predictive control with a receding horizon: the first steps of the best plan are executed; the rest of it
@@ -56,6 +67,15 @@ impl<'p, 'r> Controller<'p, 'r> {
     /// When plans were made of which no candidate had a finite return \[s\]: the model left the finite numbers in all of them.
     pub fn lost(&self) -> &[f64] {
         &self.lost
+    }
+
+    /// Whether all plans had a candidate with a finite return.
+    ///
+    /// # Errors
+    /// The first that had none.
+    pub fn check(&self) -> Result<(), LostPlan> {
+        let lost = self.lost.first().map(|&time_s| LostPlan { time_s });
+        lost.map_or(Ok(()), Err)
     }
 
     fn decide(&mut self, measured: &[f64], time_s: f64) {

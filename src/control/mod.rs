@@ -6,7 +6,7 @@ mod predictor;
 mod session;
 mod task;
 
-pub use controller::{Controller, Policy, RandomTorque};
+pub use controller::{Controller, LostPlan, Policy, RandomTorque};
 pub use episode::{Episode, EpisodeError, Stretch, drive, episode};
 pub use predictor::Predictor;
 pub use session::with_controller;

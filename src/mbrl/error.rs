@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use crate::control::EpisodeError;
+use crate::control::{EpisodeError, LostPlan};
 use crate::data::LogError;
 use crate::plant::PlantError;
 use crate::runs::RunFolderError;
@@ -13,6 +13,8 @@ pub enum RunError {
     Plant(#[from] PlantError),
     #[error("{0}")]
     Episode(#[from] EpisodeError),
+    #[error("{0}")]
+    Plan(#[from] LostPlan),
     #[error("{0}")]
     Train(#[source] TrainError),
     #[error("{0}")]

@@ -30,7 +30,7 @@ impl Evaluator<'_> {
     /// Evaluates a model in an episode, planning anew every `replan` steps.
     ///
     /// # Errors
-    /// A plant that diverges.
+    /// A plant that diverges, and a plan of which all candidates do.
     pub fn score(&self, predictor: &Predictor, replan: usize) -> Result<EpisodeScore, RunError> {
         let (episode, diverged) = self.episode(predictor, replan)?;
         Ok(EpisodeScore {
@@ -43,7 +43,7 @@ impl Evaluator<'_> {
     /// The whole episode, and the number of candidate plans that diverged.
     ///
     /// # Errors
-    /// A plant that diverges.
+    /// A plant that diverges, and a plan of which all candidates do.
     pub fn episode(
         &self,
         predictor: &Predictor,
@@ -56,6 +56,7 @@ impl Evaluator<'_> {
         let draws = stream(self.seed, Purpose::JudgePlan(0));
         with_controller(predictor, self.task, replan, &draws, |controller| {
             let episode = episode(self.task, &mut rig, controller, &mut rng)?;
+            controller.check()?;
             Ok((episode, controller.diverged()))
         })
     }

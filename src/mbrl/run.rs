@@ -77,7 +77,7 @@ impl Run<'_> {
     /// Carries out a round: train, evaluate, gather.
     ///
     /// # Errors
-    /// A loss that is not finite, or a plant that diverges.
+    /// A loss that is not finite, a plant that diverges, and a plan of which all candidates do.
     pub fn round(&self, state: &mut RunState) -> Result<(Round, Training), RunError> {
         let (round, seed) = (state.rounds, self.seed);
         let segments = transitions(&state.logs, self.task.joints())?;
@@ -116,10 +116,17 @@ impl Run<'_> {
         let of_round = |purpose: fn(usize) -> Purpose| stream(self.seed, purpose(state.rounds + 1));
         let (mut noise, draws) = (of_round(Purpose::Gather), of_round(Purpose::GatherPlan));
         let steps = self.schedule.gather;
-        let stretch = with_controller(predictor, self.task, self.task.replan, &draws, |policy| {
-            drive(&mut rig, policy, steps, &mut noise)
-        })?;
-        Ok(stretch.log)
+        with_controller(
+            predictor,
+            self.task,
+            self.task.replan,
+            &draws,
+            |controller| {
+                let stretch = drive(&mut rig, controller, steps, &mut noise)?;
+                controller.check()?;
+                Ok(stretch.log)
+            },
+        )
     }
 
     /// The plant in the state at the end of the last stretch under control, restored by replaying the torques of the

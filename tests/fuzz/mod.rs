@@ -21,6 +21,7 @@ use residyn::files::content_hash;
 
 use self::edits::{Form, edited};
 use self::measure::{Cost, cost};
+pub use self::seeds::exported;
 
 /// A reader, and what it is tried on.
 struct Target {
