@@ -109,6 +109,12 @@ impl<'a> Element<'a> {
         })
     }
 
+    /// Whether it has no bytes, or none any more.
+    fn is_empty(&self) -> bool {
+        let (beside, behind) = self.bytes.get_ref();
+        beside.limit() == 0 && behind.limit() == 0
+    }
+
     /// All bytes of one that is short, up to the next.
     fn whole(mut self) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
@@ -120,12 +126,12 @@ impl<'a> Element<'a> {
     /// Passes over what is not read yet.
     fn pass(mut self) -> io::Result<()> {
         io::copy(&mut self.bytes, &mut io::sink())?;
-        let (_, rest) = self.bytes.into_inner();
-        if rest.limit() > 0 {
+        if !self.is_empty() {
             return Err(ErrorKind::UnexpectedEof.into());
         }
+        let (_, behind) = self.bytes.into_inner();
         // The last element is not always filled up.
-        io::copy(&mut rest.into_inner().take(self.padding), &mut io::sink())?;
+        io::copy(&mut behind.into_inner().take(self.padding), &mut io::sink())?;
         Ok(())
     }
 }
@@ -141,7 +147,7 @@ const SHORT: u64 = 1 << 12;
 
 /// The columns of a matrix of real numbers; structures, cells and texts are left out.
 fn add(table: &mut Arrays, element: &mut Element<'_>) -> Result<(), String> {
-    if element.kind != MATRIX {
+    if element.kind != MATRIX || element.is_empty() {
         return Ok(());
     }
     let Some((name, array)) = array(&mut element.bytes).map_err(fault)? else {
