@@ -67,6 +67,7 @@ pub mod sim;
 #[cfg(feature = "train")]
 pub mod train;
 
+mod decomposition;
 mod guarded;
 mod layout;
 

@@ -429,6 +429,22 @@ fn rewards_and_plans_that_are_no_finite_numbers_end_control() {
     );
 }
 
+/// A mass whose inverse is infinite: what divides by it leaves the finite numbers.
+#[test]
+fn a_mass_too_small_for_its_inverse_is_no_mechanism() {
+    let scratch = Scratch::new();
+    let light = "[system]\nname = \"axis\"\njoints = 1\nprismatic = [1]\n\
+                 [parameters]\nm = { value = 1e-320, unit = \"kg\" }\n\
+                 [dynamics]\nmass = [[\"m\"]]\nbias = [\"0\"]\n";
+    let model = scratch.file("light.toml", light);
+    for format in ["mjcf", "urdf"] {
+        let out = text(&scratch.path("light.xml")).to_owned();
+        let export = ["export", "--model", &model, "--format", format];
+        let told = refuses(&[&export[..], &["--out", &out]].concat());
+        says(&told, &["too small or too large"]);
+    }
+}
+
 #[test]
 fn plans_that_are_no_finite_numbers_end_a_run_of_learning() {
     let scratch = Scratch::new();

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::space::Space;
 use super::study::Study;
 use crate::data::{Audit, Finding, Severity, Smooth};
+use crate::decomposition::least_squares;
 use crate::model::Model;
 use crate::sim::metric::balance_of;
 
@@ -93,12 +94,8 @@ fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
             column(&|_| 1.0),
         ];
         let columns = DMatrix::from_columns(&columns);
-        // A decomposition of what is not finite would never end, and of nothing there is none.
-        if columns.is_empty() || !columns.iter().all(|value| value.is_finite()) {
-            return None;
-        }
-        let solved = columns.svd(true, true).solve(&torque, 1e-9);
-        solved.ok().map(|found| (varies, found[0]))
+        let found = least_squares(columns, &torque, 1e-9)?;
+        Some((varies, found[0]))
     };
     let told: Vec<(f64, f64)> = (0..n).filter_map(of_joint).collect();
     let all: f64 = told.iter().map(|(varies, _)| varies).sum();

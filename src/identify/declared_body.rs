@@ -1,5 +1,7 @@
 use nalgebra::{Cholesky, Matrix4, SMatrix, SVector, SymmetricEigen};
 
+use crate::decomposition::eigen;
+
 /// Eigenvalues of a declared pseudo-inertia below this share of its largest are raised to it: a body of no extent has none
 /// of its own kind near it.
 const LEAST_SHARE: f64 = 1e-6;
@@ -86,7 +88,7 @@ fn physical(inertia: &Matrix4<f64>) -> Option<Matrix4<f64>> {
     let SymmetricEigen {
         eigenvalues,
         eigenvectors,
-    } = inertia.symmetric_eigen();
+    } = eigen(*inertia)?;
     let least = LEAST_SHARE * eigenvalues.max();
     let raised = Matrix4::from_diagonal(&eigenvalues.map(|value| value.max(least)));
     (least > 0.0).then(|| eigenvectors * raised * eigenvectors.transpose())

@@ -1,8 +1,8 @@
 use nalgebra::DMatrix;
 
-use super::eigen::eigen;
 use super::outcome::Fit;
 use super::values::Values;
+use crate::decomposition::eigen;
 use crate::model::Dynamics;
 
 /// Which combinations of the free parameters the logs determine: the practical identifiability of the model.

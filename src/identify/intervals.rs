@@ -1,11 +1,11 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::eigen::eigen;
 use super::normal_equations::with_unit_diagonal;
 use super::outcome::Fit;
 use super::shooting::Shooting;
 use crate::data::SAME_S;
+use crate::decomposition::eigen;
 
 /// How well a fit determines its free parameters.
 #[derive(Debug, Clone)]

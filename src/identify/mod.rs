@@ -8,7 +8,7 @@
 mod balance;
 mod combinations;
 mod declared_body;
-mod eigen;
+mod distance;
 mod fit;
 mod identifiability;
 mod intervals;
@@ -27,7 +27,7 @@ mod values;
 
 pub use crate::sim::{Window, cut, initial_state};
 pub use combinations::{BodiesTold, Combination, bodies_told};
-pub use eigen::squared_distance;
+pub use distance::squared_distance;
 pub use fit::{as_it_stands, fit, fit_below, predicted_cost};
 pub use identifiability::{Identifiability, Open, identifiability, open};
 pub use intervals::{BLOCK_S, Uncertainty, blocks, stretches, uncertainty};

@@ -3,9 +3,9 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::eigen::eigen;
 use super::normal_equations::{Reduced, WindowTerms, with_unit_diagonal};
 use super::values::Column;
+use crate::decomposition::eigen;
 
 /// Why parameters could not be fitted.
 #[derive(Debug, Clone, PartialEq, Error)]

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::{Column, Kind};
 use super::series::{Wave, rounded};
 use crate::data::Joint;
+use crate::decomposition::least_squares;
 
 /// Least part of a column that is independent of the others, relative to its length.
 const INDEPENDENT: f64 = 1e-10;
@@ -113,8 +114,8 @@ fn without(directions: &[DVector<f64>], vector: &DVector<f64>) -> DVector<f64> {
 fn factors(kept: &[DVector<f64>], vector: &DVector<f64>) -> Vec<f64> {
     // Normalised, so that units do not matter.
     let unit: Vec<DVector<f64>> = kept.iter().map(DVector::normalize).collect();
-    let svd = DMatrix::from_columns(&unit).svd(true, true);
-    let solution = svd.solve(vector, 0.0).expect("both factors were asked for");
+    let solution = least_squares(DMatrix::from_columns(&unit), vector, 0.0);
+    let solution = solution.expect("vectors of length one are finite");
     let in_units = solution.iter().zip(kept);
     in_units
         .map(|(share, kept)| {

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::decomposition::eigen;
+
 /// A frame relative to another: x in this frame is `rotation * x + origin` in the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
@@ -143,7 +145,10 @@ fn spread(a: &Vector3<f64>, b: &Vector3<f64>) -> Matrix3<f64> {
 
 /// Why no body can have this inertia tensor (kg m^2) about its centre of mass, if so.
 pub(crate) fn fault(tensor: &Matrix3<f64>) -> Option<&'static str> {
-    let mut principal: Vec<f64> = tensor.symmetric_eigenvalues().iter().copied().collect();
+    let Some(eigen) = eigen(*tensor) else {
+        return Some("is not finite");
+    };
+    let mut principal: Vec<f64> = eigen.eigenvalues.iter().copied().collect();
     principal.sort_by(f64::total_cmp);
     let rounding = 1e-6 * principal[2].abs();
     if principal[0] < -rounding {

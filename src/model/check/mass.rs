@@ -6,6 +6,7 @@ use rand::{Rng, RngExt};
 use super::places::Places;
 use super::{Finding, Kind, Severity};
 use crate::data::Joint;
+use crate::decomposition::eigen;
 use crate::model::system::{Model, Motion};
 
 /// States that are drawn.
@@ -93,8 +94,10 @@ fn not_symmetric(samples: &[Sample]) -> Option<(&Sample, String)> {
 
 fn not_positive(samples: &[Sample]) -> Option<(&Sample, String)> {
     let ends = |sample: &Sample| {
-        let eigenvalues = sample.matrix.symmetric_eigenvalues();
-        [eigenvalues.min(), eigenvalues.amax()]
+        let eigen = eigen(sample.matrix.clone());
+        eigen.map_or([f64::NAN; 2], |eigen| {
+            [eigen.eigenvalues.min(), eigen.eigenvalues.amax()]
+        })
     };
     let ends = samples.iter().map(|sample| (sample, ends(sample)));
     let share = |[least, most]: [f64; 2]| if most > 0.0 { least / most } else { 0.0 };

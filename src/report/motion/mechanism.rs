@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::Tracks;
 use super::sketch::{PictureEntry, Point, Sketch};
 use crate::closeloop::Outcome;
+use crate::decomposition::eigen;
 use crate::model::chain::{Joint, Pose, recover};
 
 /// Half the length of the line that stands for the base, as a share of the mechanism.
@@ -87,7 +88,9 @@ fn view(seen: &[Vec<Vector3<f64>>]) -> [Vector3<f64>; 2] {
     let count = all().count().max(1) as f64;
     let middle = all().sum::<Vector3<f64>>() / count;
     let products = all().map(|point| (point - middle) * (point - middle).transpose());
-    let axes = products.sum::<Matrix3<f64>>().symmetric_eigen();
+    let Some(axes) = eigen(products.sum::<Matrix3<f64>>()) else {
+        return [Vector3::x(), Vector3::y()];
+    };
     let sight: Vector3<f64> = axes.eigenvectors.column(axes.eigenvalues.imin()).into();
     if sight.z.abs() > STEEP {
         return [Vector3::x(), Vector3::y()];

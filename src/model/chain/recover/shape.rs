@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::decomposition::least_squares;
 use crate::model::Dynamics;
 use crate::model::chain::series::Series;
 
@@ -113,12 +114,10 @@ impl Shape {
                 .rows_mut(k * entries, entries)
                 .copy_from(&scaled(column));
         }
-        let svd = left.clone().svd(true, true);
-        let found = svd
-            .solve(&right, 1e-12)
-            .expect("both factors were asked for");
+        let found = least_squares(left.clone(), &right, 1e-12)
+            .ok_or("its masses or forces are too small or too large to be told apart")?;
         let off = (&left * &found - &right).amax();
-        if off > SAME {
+        if !(off <= SAME) {
             return Err(format!(
                 "{KNOWN} (off by {off:.1e} of the largest torque or inertia)"
             ));

@@ -1,27 +1,10 @@
-use nalgebra::{DMatrix, DVector, Dyn, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use super::normal_equations::with_unit_diagonal;
+use crate::decomposition::eigen;
 
 /// A direction with a smaller eigenvalue than this, where the diagonal is one, has none but by rounding.
 const ROUNDING: f64 = 1e-12;
-/// Sweeps per row after which a decomposition has failed; two or three are the rule.
-const MOST_SWEEPS: usize = 100;
-
-/// The eigenvalues and eigenvectors of a symmetric matrix; `None` where it is not finite, over which the iteration would
-/// never end.
-pub(super) fn eigen(matrix: DMatrix<f64>) -> Option<SymmetricEigen<f64, Dyn>> {
-    if matrix.is_empty() {
-        let eigenvalues = DVector::zeros(0);
-        return Some(SymmetricEigen {
-            eigenvectors: matrix,
-            eigenvalues,
-        });
-    }
-    let most = MOST_SWEEPS * matrix.nrows();
-    let is_finite = matrix.iter().all(|value| value.is_finite());
-    is_finite.then(|| SymmetricEigen::try_new(matrix, f64::EPSILON, most))?
-}
-
 /// v^T M^+ v: the squared Mahalanobis distance of values from zero under a covariance, without the directions in which they
 /// have no spread; NaN where the matrix is not finite.
 pub fn squared_distance(matrix: &DMatrix<f64>, values: &DVector<f64>) -> f64 {
@@ -41,17 +24,7 @@ pub fn squared_distance(matrix: &DMatrix<f64>, values: &DVector<f64>) -> f64 {
 mod tests {
     use nalgebra::{DMatrix, DVector};
 
-    use super::{eigen, squared_distance};
-
-    #[test]
-    fn a_matrix_that_is_not_finite_has_no_eigenvalues() {
-        let found = eigen(DMatrix::from_row_slice(2, 2, &[2.0, 1.0, 1.0, 2.0])).unwrap();
-        assert!((found.eigenvalues.max() - 3.0).abs() < 1e-12);
-        for bad in [f64::NAN, f64::INFINITY] {
-            assert!(eigen(DMatrix::from_row_slice(2, 2, &[1.0, bad, bad, 1.0])).is_none());
-        }
-        assert!(eigen(DMatrix::zeros(0, 0)).is_some());
-    }
+    use super::squared_distance;
 
     #[test]
     fn distances_do_not_depend_on_units_and_leave_out_directions_without_spread() {
