@@ -10,6 +10,7 @@ mod findings;
 mod formulas;
 mod mechanisms;
 mod models;
+mod printers;
 mod reports;
 
 /// How many times as many cases as usual are tried: `RESIDYN_PROPERTIES`, 1 without it. A larger number begins with the same

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use cpu_time::ThreadTime;
 
-/// The time that an input may take \[s\].
+/// The time that an input may take, of a megabyte or less, and each megabyte of a longer one \[s\].
 const MOST_S: f64 = 1.0;
 /// The memory that an input may take, and more for each of its own bytes \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
@@ -33,7 +33,8 @@ pub fn cost(length: usize, read: impl FnOnce() -> bool) -> Result<Cost, String> 
         bytes: memory.bytes_max,
         accepted: result.map_err(|panic| format!("panics: {}", message(&*panic)))?,
     };
-    if cost.seconds > MOST_S {
+    let megabytes = length as f64 / f64::from(1 << 20);
+    if cost.seconds > MOST_S * megabytes.max(1.0) {
         return Err(format!("takes {:.1} s", cost.seconds));
     }
     if cost.bytes > MOST_BYTES + MOST_RATIO * length as u64 {

@@ -8,6 +8,7 @@ mod measure;
 mod packed;
 mod seeds;
 mod targets;
+mod watch;
 
 use std::fs;
 use std::io::Write;
@@ -22,6 +23,7 @@ use residyn::files::content_hash;
 use self::edits::{Form, edited};
 use self::measure::{Cost, cost};
 pub use self::seeds::exported;
+use self::watch::Watch;
 
 /// A reader, and what it is tried on.
 struct Target {
@@ -56,9 +58,11 @@ impl Target {
             ));
         }
         let (begun, mut all) = (Instant::now(), All::default());
+        let watch = Watch::of(self.name);
         for number in asked.clone().unwrap_or(0..self.inputs) {
             let input = self.input(number, &seeds);
             fs::write(&file, &input).unwrap();
+            watch.begin(number);
             match cost(input.len(), || (self.read)(&file)) {
                 Ok(cost) => all.add(cost),
                 Err(fault) => all.faults.push(self.kept(number, &fault, &input)),

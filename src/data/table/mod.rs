@@ -3,6 +3,8 @@
 mod arrays;
 mod csv;
 #[cfg(feature = "parquet")]
+mod ending;
+#[cfg(feature = "parquet")]
 mod lerobot;
 mod mat;
 mod npy;

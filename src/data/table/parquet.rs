@@ -1,6 +1,5 @@
 //! Parquet: a column of numbers is a column; one of lists of numbers is as many as a list is long, `name1`, `name2` ..
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -11,6 +10,7 @@ use parquet::record::reader::RowIter;
 use parquet::schema::types::Type;
 
 use super::arrays::Arrays;
+use super::ending::Ending;
 use super::room::too_large;
 use crate::data::error::LogError;
 use crate::files;
@@ -147,7 +147,7 @@ pub(super) fn lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec
 fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>, ParquetError> {
     let file = files::open(path)?;
     let most = unpacked_bytes(file.metadata()?.len());
-    let reader = SerializedFileReader::new(file)?;
+    let reader = SerializedFileReader::new(Ending(file))?;
     check_size(&reader, most)?;
     let schema = reader.metadata().file_metadata().schema().clone();
     let fields = schema.get_fields().iter();
@@ -173,7 +173,7 @@ fn read_lists(path: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<List>
 
 /// Whether the cells of all columns take no more than so many bytes: those of the pages, since a packed one may hold any number
 /// of them, whatever the description of the file says.
-fn check_size(reader: &SerializedFileReader<File>, most: u64) -> Result<(), ParquetError> {
+fn check_size(reader: &SerializedFileReader<Ending>, most: u64) -> Result<(), ParquetError> {
     let described = reader.metadata().file_metadata();
     let columns = described.schema().get_fields().len() as u64;
     let rows = described.num_rows().cast_unsigned();

@@ -73,7 +73,7 @@ impl Names {
 
 impl Notation for Names {
     fn number(&self, value: f64) -> String {
-        let sign = if value < 0.0 { "-" } else { "" };
+        let sign = if value.is_sign_negative() { "-" } else { "" };
         format!("{sign}MODEL_({:?})", value.abs())
     }
 
