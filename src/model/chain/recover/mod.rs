@@ -98,7 +98,8 @@ pub(crate) fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recover
         _ => return Err(KNOWN.to_owned()),
     };
     let found = shape.fit(declared)?;
-    let (mut joints, downward) = build(&found, gravity(declared))?;
+    let gravity = gravity(declared);
+    let (mut joints, downward) = build(&found, gravity)?;
     let largest = found.iter().map(|x| x.abs()).fold(0.0, f64::max);
     for (joint, damping) in joints.iter_mut().zip(shape.damping(&found)) {
         if *damping < -ROUNDING * largest {
@@ -110,7 +111,7 @@ pub(crate) fn recover(declared: &Dynamics, prismatic: &[bool]) -> Result<Recover
             0.0
         };
     }
-    Ok(upright(joints, downward))
+    Ok(upright(joints, downward, gravity))
 }
 
 /// The model's own gravity if it has one, m/s^2.
@@ -120,8 +121,9 @@ fn gravity(declared: &Dynamics) -> f64 {
     own.map_or(GRAVITY, |p| p.value)
 }
 
-/// Joints given in the world frame as joints of a chain, turned so that gravity acts against z.
-fn upright(mut joints: Vec<Joint>, downward: Planar) -> Recovered {
+/// Joints given in the world frame as joints of a chain, turned so that gravity acts against z. What differs by rounding from
+/// the model's own is that.
+fn upright(mut joints: Vec<Joint>, downward: Planar, own: f64) -> Recovered {
     let level = Pose {
         rotation: turn(Vector3::y(), (-downward.conj()).arg()),
         origin: Vector3::zeros(),
@@ -132,9 +134,11 @@ fn upright(mut joints: Vec<Joint>, downward: Planar) -> Recovered {
         joint.pose = inner.inverse().then(&outer);
         inner = outer;
     }
+    let found = downward.norm();
+    let is_own = (found - own).abs() <= ROUNDING * own;
     Recovered {
         joints,
-        gravity: downward.norm(),
+        gravity: if is_own { own } else { found },
     }
 }
 
