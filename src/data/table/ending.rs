@@ -1,5 +1,5 @@
-//! A Parquet file whose end is an error: its reader looks for what a damaged length claims beyond the end, a byte at a time and
-//! up to 2^31 times.
+//! A Parquet file that its reader can trust: its end is an error, where the reader looks for what a damaged length claims beyond
+//! it, a byte at a time and up to 2^31 times; and what describes the file and its pages was passed over once before.
 
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read};
@@ -8,7 +8,34 @@ use bytes::Bytes;
 use parquet::errors::Result;
 use parquet::file::reader::{ChunkReader, Length};
 
-pub(super) struct Ending(pub File);
+use super::thrift;
+
+pub(super) struct Ending(File);
+
+/// The length of the description before it, and how the file ends.
+const FOOTER: u64 = 8;
+
+impl Ending {
+    /// # Errors
+    /// A file whose description is cut off or damaged.
+    pub fn of(file: File) -> Result<Self> {
+        let file = Self(file);
+        // A file without a footer is told of by the reader.
+        let Some(footer) = file.len().checked_sub(FOOTER) else {
+            return Ok(file);
+        };
+        let mut length = [0; 4];
+        file.up_to_end(footer)?.read_exact(&mut length)?;
+        if let Some(start) = footer.checked_sub(u32::from_le_bytes(length).into()) {
+            thrift::pass(&mut file.up_to_end(start)?)?;
+        }
+        Ok(file)
+    }
+
+    fn up_to_end(&self, start: u64) -> Result<UpToEnd> {
+        self.0.get_read(start).map(UpToEnd)
+    }
+}
 
 impl Length for Ending {
     fn len(&self) -> u64 {
@@ -19,8 +46,12 @@ impl Length for Ending {
 impl ChunkReader for Ending {
     type T = UpToEnd;
 
+    /// What is read so is the footer, or begins with the description of a page.
     fn get_read(&self, start: u64) -> Result<UpToEnd> {
-        self.0.get_read(start).map(UpToEnd)
+        if start.checked_add(FOOTER) != Some(self.len()) {
+            thrift::pass(&mut self.up_to_end(start)?)?;
+        }
+        self.up_to_end(start)
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {

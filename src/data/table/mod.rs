@@ -14,6 +14,8 @@ mod parquet;
 mod recording;
 mod room;
 mod source;
+#[cfg(feature = "parquet")]
+mod thrift;
 
 use std::path::Path;
 
