@@ -1,13 +1,9 @@
 //! Parts of a formula that are no finite numbers whatever its names stand for.
 
-use std::ops::Range;
-
 use super::FormulaError;
 use super::op::{Binary, Function, Unary};
 use super::parse::{Formula, Infix, Kind, Term};
-
-/// Bytes of a formula and what is wrong there.
-type Fault = (Range<usize>, String);
+use super::scope::Fault;
 
 impl Formula {
     /// Refuse such parts.

@@ -18,7 +18,7 @@ pub enum SignForm {
 }
 
 /// Bytes of a formula and what is wrong there.
-type Fault = (Range<usize>, String);
+pub(super) type Fault = (Range<usize>, String);
 
 /// The names that a formula may use, and their nodes.
 #[derive(Debug, Clone)]

@@ -66,12 +66,12 @@ impl Episode {
     /// # Errors
     /// A data set that cannot be read, no such episode, and several where none is named.
     pub fn read(&self) -> Result<Arrays, LogError> {
-        let (mut frames, info) = (self.frames()?, self.info()?);
+        let files = self.files().map_err(|why| self.unreadable(why))?;
+        let (mut frames, info) = (self.frames(&files)?, self.info()?);
         let mut of = |name: &str| {
             let list = frames.remove(name);
             list.map_or(Ok(Vec::new()), |list| list.columns(&self.path))
         };
-        let files = self.files().map_err(|why| self.unreadable(why))?;
         let packed: io::Result<u64> = files.iter().map(|file| files::size(file)).sum();
         let mut table = Arrays::of(packed.map_err(|why| self.unreadable(why))?);
         for time in of(TIME)? {
@@ -86,11 +86,11 @@ impl Episode {
     }
 
     /// The rows of the episode, by column.
-    fn frames(&self) -> Result<BTreeMap<String, List>, LogError> {
+    fn frames(&self, files: &[PathBuf]) -> Result<BTreeMap<String, List>, LogError> {
         let is_wanted = |name: &str| [STATE.0, ACTION.0, EPISODE, TIME].contains(&name);
         let mut frames: BTreeMap<String, List> = BTreeMap::new();
-        for file in self.files().map_err(|why| self.unreadable(why))? {
-            for list in lists(&file, is_wanted)? {
+        for file in files {
+            for list in lists(file, is_wanted)? {
                 match frames.get_mut(&list.name) {
                     Some(before) => before.extend(&list),
                     None => {
