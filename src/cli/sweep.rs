@@ -15,12 +15,11 @@ use super::shard::{self, Sharding};
 use super::{Answer, Common, command_line, inputs, interrupt, progress, voice};
 use crate::runs::{Identity, RunFolder};
 use crate::train::recipe::{Job, Member, Recipe, SweepResults};
-use crate::train::{Backend, SweepProgress};
 
-/// Train many models by one recipe at once, with different initial weights or different weights of the penalty
+/// Train many models by one recipe, with different initial weights or different weights of the penalty
 ///
-/// All models are trained on the data of --seed: on the processor one after the other, on a graphics card (--device cuda)
-/// as one batch, which keeps it busy. Each model is a line of DIR/models.jsonl, and an interrupted sweep is resumed.
+/// All models are trained on the data of --seed, one after the other. Each is a line of DIR/models.jsonl, and an
+/// interrupted sweep is resumed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         residyn sweep --config configs/train-pendulum.toml --seeds 100\n  \
@@ -38,9 +37,6 @@ pub(super) struct Arguments {
     /// Give all models the initial weights of --seed, so that they differ in alpha alone
     #[arg(long, requires = "alpha")]
     one_seed: bool,
-    /// Number of models that a graphics card trains at once; fewer need less memory
-    #[arg(long, default_value = "1000", value_name = "COUNT")]
-    together: NonZeroUsize,
     /// Folder of the results: models.jsonl and sweep.json
     #[arg(long, default_value = "sweep", value_name = "DIR")]
     out: PathBuf,
@@ -108,6 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         voice::say(format!("note: {note}"));
     }
     let members = arguments.members();
+    job.check_members(&members)?;
     let mut store = Store::open(&folder, &job)?;
     if let Some(part) = arguments.sharding.part(&folder, arguments.identity(&job))? {
         let members: Vec<Member> = part.shard().share(members).collect();
@@ -169,15 +166,9 @@ impl Arguments {
 
 /// Train the models that are not stored yet, and store them.
 fn train(job: &Job, members: &[Member], store: &mut Store, arguments: &Arguments) -> Result<()> {
-    // On the processor one is trained after the other anyway.
-    let together = match arguments.common.device == Backend::NdArray {
-        true => 1,
-        false => arguments.together.get(),
-    };
     let is_new = |member: &&Member| store.find(member).is_none();
     let new: Vec<Member> = members.iter().filter(is_new).copied().collect();
-    let batches = new.chunks(together);
-    let bar = progress::bar(batches.len() * job.recipe.fit.epochs);
+    let bar = progress::bar(new.len() * job.recipe.fit.epochs);
     let out = arguments.out.display().to_string();
     let _orderly = interrupt::orderly(store.folder(), move || {
         format!(
@@ -187,18 +178,12 @@ fn train(job: &Job, members: &[Member], store: &mut Store, arguments: &Arguments
     });
     let begun = Instant::now();
     let mut diverged = 0;
-    for batch in batches {
+    for member in &new {
         let since = Instant::now();
-        let mut observer = |at: SweepProgress| {
-            bar.inc(1);
-            bar.set_message(format!("epochs, {} diverged", diverged + at.diverged));
-        };
-        let trained = job.sweep(batch)?.run(&job.data.training, &mut observer)?;
-        diverged += trained.iter().filter(|model| model.diverged).count();
-        let each_s = since.elapsed().as_secs_f64() / batch.len() as f64;
-        for (member, trained) in batch.iter().zip(trained) {
-            store.add(member, trained, each_s)?;
-        }
+        let trained = job.train_member(member, &mut || bar.inc(1))?;
+        diverged += usize::from(trained.diverged);
+        bar.set_message(format!("epochs, {diverged} diverged"));
+        store.add(member, trained, since.elapsed().as_secs_f64())?;
     }
     bar.finish_and_clear();
     voice::took("training", begun);

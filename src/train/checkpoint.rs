@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use burn::tensor::Device;
 
 use super::manifest::{FORMAT, Manifest};
-use super::optimizer::Moments;
-use super::{Backend, Best, CheckpointError, HybridModel, Training, moments};
+use super::{Backend, Best, CheckpointError, HybridModel, Training};
 use crate::files::{
     FreshFolder, OutputError, content_id, end_of_links, folder_of, hidden_beside, read_saved,
     remove_folder, write_whole,
@@ -19,7 +18,8 @@ const MODEL: &str = "model.toml";
 const WEIGHTS: &str = "weights.safetensors";
 /// The model to continue from, which differs where an earlier one was the best.
 const LAST: &str = "last.safetensors";
-const OPTIMIZER: &str = "optimizer.safetensors";
+/// What the optimiser remembers.
+const OPTIMIZER: &str = "optimizer.bpk";
 
 /// A checkpoint as read from its directory.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Checkpoint {
     /// The model to use.
     pub weights: ModelWeights,
     last: ModelWeights,
-    moments: [Moments; 2],
+    optimizer: Vec<u8>,
     dir: PathBuf,
 }
 
@@ -45,17 +45,16 @@ pub struct Checkpoint {
 pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), CheckpointError> {
     let dir = &end_of_links(dir);
     refuse_other_contents(dir)?;
-    let moments = &training.optimizer.moments;
-    let steps = moments.each_ref().map(|moments| moments.steps);
-    let manifest = Manifest::of(training, &origin.config, origin.seed, steps);
-    let last = training.model.weights();
+    let optimizer = training.optimizer.to_bytes();
+    let manifest = Manifest::of(training, origin, &optimizer);
+    let last = training.model().weights();
     let used = training.best.as_ref().map_or(&last, |best| &best.weights);
     let json = serde_json::to_vec_pretty(&manifest)
         .map_err(|error| io("encode the description of", dir)(std::io::Error::other(error)))?;
     let files: [(&str, &[u8]); 5] = [
         (WEIGHTS, &weights::to_bytes(&manifest.shape, used)),
         (LAST, &weights::to_bytes(&manifest.shape, &last)),
-        (OPTIMIZER, &moments::to_bytes(&manifest, moments)),
+        (OPTIMIZER, &optimizer),
         (MODEL, origin.model_toml.as_bytes()),
         (MANIFEST, &json),
     ];
@@ -144,9 +143,13 @@ impl Checkpoint {
         let model_toml = String::from_utf8(read(&dir, MODEL)?)
             .map_err(|error| corrupt(MODEL, error.to_string(), &dir))?;
         let (weights, last) = (numbers(WEIGHTS)?, numbers(LAST)?);
-        let bytes = read(&dir, OPTIMIZER)?;
+        let optimizer = read(&dir, OPTIMIZER)?;
+        if content_id(&optimizer) != manifest.optimizer {
+            let reason = "it is not the file that checkpoint.json describes";
+            return Err(corrupt(OPTIMIZER, reason.to_owned(), &dir));
+        }
         Ok(Self {
-            moments: moments::from_bytes(&manifest, &last, &bytes, OPTIMIZER, &dir)?,
+            optimizer,
             weights,
             last,
             model_toml,
@@ -211,9 +214,9 @@ impl Checkpoint {
     ) -> Result<Training, CheckpointError> {
         let model = self.build(&self.last, dynamics, device)?;
         let manifest = &self.manifest;
-        let mut training = Training::new(model, manifest.settings.clone(), manifest.rng.clone())?;
-        training.optimizer.moments = self.moments.clone();
-        training.epoch = manifest.epoch;
+        let training = Training::new(model, manifest.settings.clone(), manifest.rng.clone())?;
+        let resumed = training.resumed_at(manifest.epoch, &self.optimizer);
+        let mut training = resumed.map_err(|reason| corrupt(OPTIMIZER, reason, &self.dir))?;
         training.penalty_weight = manifest.penalty_weight;
         training.history.clone_from(&manifest.history);
         training.best = manifest.best.as_ref().map(|best| Best {

@@ -1,40 +1,38 @@
-//! The loss as a composition of Burn's operations, one row of the batch in each entry of a tensor.
+//! The loss as a composition of Burn's operations, one row of the batch in each entry of a tensor: the reference of the
+//! fused loss, and what other devices than the processor run.
 
 use burn::tensor::Tensor;
 
-use super::{Columns, Unpacked};
+use super::{Columns, HybridModel};
 use crate::sim::Integrator;
 
 /// Below this size a residual counts as absent: it keeps the slope of the norm finite at zero, where every residual
 /// begins.
 pub(super) const NORM_FLOOR: f64 = 1e-6;
 
-/// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
-/// after the other's.
-pub(super) fn of_each(
-    model: &Unpacked,
-    models: usize,
+/// E and ||F_r||, `[2]`.
+pub(super) fn loss(
+    model: &HybridModel,
     batch: &Columns,
     integrator: Integrator,
     scale: &[f64],
-) -> [Tensor<1>; 2] {
-    let rows = batch.size / models;
+) -> Tensor<1> {
+    let model = model.unpack();
     let mut state = batch.states[0].clone();
     let (mut errors, mut residuals) = (Vec::new(), Vec::new());
     for (k, input) in batch.inputs.iter().enumerate() {
         let step = model.step(integrator, &state, input, &batch.time[k], &batch.dt[k]);
-        let error = squared_error(&step.state, &batch.states[k + 1], scale);
-        errors.push(mean_of_each(error, models, rows));
-        residuals.extend((step.residual).map(|r| mean_of_each(r.square(), models, rows)));
+        errors.push(squared_error(&step.state, &batch.states[k + 1], scale).sum());
+        residuals.extend(step.residual.map(|residual| residual.square().sum()));
         state = step.state;
     }
-    let steps = batch.inputs.len() as f64;
-    let error = mean(errors, steps).expect("segments have steps");
-    let norm = mean(residuals, steps).map_or_else(
+    let count = (batch.size * batch.inputs.len()) as f64;
+    let error = mean(errors, count).expect("segments have steps");
+    let norm = mean(residuals, count).map_or_else(
         || error.zeros_like(),
         |square| (square + NORM_FLOOR * NORM_FLOOR).sqrt(),
     );
-    [error, norm]
+    Tensor::cat(vec![error, norm], 0)
 }
 
 /// The squared norm of the error, `[batch]`.
@@ -45,14 +43,7 @@ fn squared_error(found: &[Tensor<1>], wanted: &[Tensor<1>], scale: &[f64]) -> Te
         .expect("models have states")
 }
 
-/// The sum of each model's entries, divided by its rows, `[models]`.
-fn mean_of_each<const D: usize>(entries: Tensor<D>, models: usize, rows: usize) -> Tensor<1> {
-    let count = entries.shape().num_elements();
-    let sums = entries.reshape([models, count / models]).sum_dim(1);
-    sums.reshape([models]) / rows as f64
-}
-
 fn mean(parts: Vec<Tensor<1>>, count: f64) -> Option<Tensor<1>> {
     let sum = parts.into_iter().reduce(|sum, part| sum + part)?;
-    Some(if count == 1.0 { sum } else { sum / count })
+    Some(sum / count)
 }

@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use super::OptimizerKind;
 use super::hybrid::HybridError;
 use crate::files::OutputError;
 use crate::limits::EPOCHS;
@@ -59,6 +60,10 @@ pub enum TrainError {
     ErrorScale { states: usize, scale: Vec<f64> },
     #[error("setting `{name}` is {value}; it must be finite and not negative")]
     Setting { name: &'static str, value: f64 },
+    #[error(
+        "setting `weight_decay` is above 0, and {0:?} has no decoupled weight decay; take adam, adan, lamb or lion"
+    )]
+    Decay(OptimizerKind),
     #[error("setting `anneal` is {0}; it is a share of the learning rates, above 0 and at most 1")]
     Anneal(f64),
     #[error("setting `epochs` is {0}; at most {EPOCHS} are trained")]

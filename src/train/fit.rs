@@ -3,8 +3,8 @@ use std::ops::ControlFlow;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::loss::Gradient;
 use super::optimizer::Optimizer;
+use super::packed::Packed;
 use super::{Batch, Batching, Best, FitSettings, Objective, Record, Segments, TrainError};
 use crate::train::HybridModel;
 
@@ -12,7 +12,10 @@ use crate::train::HybridModel;
 /// result by a bit on the same backend and machine.
 #[derive(Clone)]
 pub struct Training {
-    pub(super) model: HybridModel,
+    /// The model as the run began.
+    model: HybridModel,
+    /// Its numbers by now.
+    numbers: Packed,
     pub(super) settings: FitSettings,
     pub(super) optimizer: Optimizer,
     pub(super) rng: ChaCha8Rng,
@@ -75,18 +78,20 @@ impl Training {
         rng: ChaCha8Rng,
     ) -> Result<Self, TrainError> {
         settings.check()?;
+        let numbers = Packed::of(&model, &settings);
         Ok(Self {
             objective: Objective::new(
                 settings.integrator,
                 settings.error_scale.as_deref(),
                 model.joints(),
             )?,
-            optimizer: Optimizer::new(model.structure(), &settings),
+            optimizer: Optimizer::new(&model, &numbers, &settings)?,
             epoch: 0,
             penalty_weight: settings.penalty.initial(),
             history: Vec::new(),
             best: None,
             model,
+            numbers,
             settings,
             rng,
         })
@@ -128,9 +133,7 @@ impl Training {
             self.record(batches)?;
         }
         while self.epoch < self.settings.epochs {
-            self.optimizer
-                .rates
-                .anneal(self.settings.share_in(self.epoch));
+            self.optimizer.begin_epoch();
             let Epoch { loss, error } = self.run_epoch(batches)?;
             self.epoch += 1;
             self.penalty_weight = self.settings.penalty.next(self.penalty_weight, error);
@@ -153,8 +156,8 @@ impl Training {
     }
 
     /// The current model.
-    pub fn model(&self) -> &HybridModel {
-        &self.model
+    pub fn model(&self) -> HybridModel {
+        self.numbers.unpacked(&self.model)
     }
 
     /// The result: the best model by validation error, or the current one without validation.
@@ -164,7 +167,7 @@ impl Training {
     pub fn result(&self) -> Result<HybridModel, TrainError> {
         match &self.best {
             Some(best) => Ok(self.model.with_weights(&best.weights)?),
-            None => Ok(self.model.clone()),
+            None => Ok(self.model()),
         }
     }
 
@@ -178,6 +181,19 @@ impl Training {
             penalty_weight: self.penalty_weight,
             history: self.history,
             ..Self::new(model, self.settings, self.rng)?
+        })
+    }
+
+    /// The run after so many epochs, with what its optimiser remembered then.
+    ///
+    /// # Errors
+    /// What is wrong with bytes that are no record of this optimiser.
+    pub(super) fn resumed_at(self, epoch: usize, optimizer: &[u8]) -> Result<Self, String> {
+        let optimizer = self.optimizer.resumed(optimizer, &self.numbers, epoch)?;
+        Ok(Self {
+            optimizer,
+            epoch,
+            ..self
         })
     }
 
@@ -216,21 +232,24 @@ impl Training {
 
     /// One step of the optimiser on one batch.
     fn step(&mut self, batch: &Batch) -> Result<Epoch, TrainError> {
-        let Gradient { loss, by_numbers } =
-            self.objective.gradient(&self.model, batch, self.weights());
-        let total = self.total(loss)?;
-        let step = |numbers: &mut _| self.optimizer.step(numbers, &by_numbers);
-        self.model.update(step);
+        let (model, weights) = (&self.model, self.weights());
+        let (loss, parts) = (self.objective).weighted_loss(model, &self.numbers, batch, weights);
+        let total = self.total(parts)?;
+        // Nothing is where all learning rates are zero.
+        if loss.is_tracked() {
+            let stepped = (self.optimizer).step(self.numbers.clone(), loss.backward());
+            self.numbers = stepped.within_bounds(model);
+        }
         Ok(Epoch {
             loss: total,
-            error: loss[0],
+            error: parts[0],
         })
     }
 
     /// Evaluates the current model on all training segments and on validation.
     fn record(&mut self, batches: &Batches) -> Result<(), TrainError> {
-        let model = self.model.without_gradients();
-        let evaluate = |batch| self.objective.loss(&model, batch);
+        let model = self.model();
+        let evaluate = |batch| self.objective.evaluate(&model, batch);
         let parts = evaluate(&batches.evaluation);
         let (loss, [error, residual_norm]) = (self.total(parts)?, parts);
         let validation = batches
@@ -240,7 +259,7 @@ impl Training {
                 error if error.is_finite() => error,
                 _ => f64::INFINITY,
             });
-        let weights = self.model.weights();
+        let weights = model.weights();
         self.history.push(Record {
             epoch: self.epoch,
             loss,
@@ -277,7 +296,7 @@ impl Training {
         if total.is_finite() {
             return Ok(total);
         }
-        let named = self.model.parameters().into_iter();
+        let named = self.model().parameters().into_iter();
         let list: Vec<String> = named.map(|(name, v)| format!("{name} = {v:.6}")).collect();
         Err(TrainError::Diverged {
             epoch: self.epoch,

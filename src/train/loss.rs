@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
+use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use super::composed;
-use super::fused::{Evaluation, Problem, Workers};
-use super::hybrid::{Numbers, to_f32, to_f64, vector};
-use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, Unpacked};
+use super::fused::{self, Problem, Workers};
+use super::hybrid::{to_f64, vector};
+use super::packed::Packed;
+use super::{Backend, Blocks, Columns, HybridModel, Segments, TrainError, composed};
 use crate::model;
 use crate::sim::Integrator;
 
@@ -24,7 +25,7 @@ pub struct Objective {
 /// What evaluates losses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Implementation {
-    /// One pass over rollout, networks and penalty, on the processor; other devices compose the loss.
+    /// One operation for rollout, networks and penalty, on the processor; other devices compose the loss.
     Fused,
     /// Burn's operations on every device.
     Composed,
@@ -37,15 +38,6 @@ pub enum Batch {
     Columns(Columns),
     /// For the fused loss.
     Blocks(Arc<Blocks>),
-}
-
-/// A loss with its gradient.
-#[derive(Debug, Clone)]
-pub(super) struct Gradient {
-    /// E and ||F_r||.
-    pub loss: [f64; 2],
-    /// Of their weighted sum, by the learnable numbers.
-    pub by_numbers: Numbers,
 }
 
 impl Objective {
@@ -105,7 +97,8 @@ impl Objective {
         self.workers.clone()
     }
 
-    /// E and ||F_r|| of a model on a batch.
+    /// E and ||F_r|| of a model on a batch, a tensor `[2]`: with derivatives where the model is on a device that takes them.
+    /// It is part of Burn's graph like any other tensor, so that terms of one's own can be added to it.
     ///
     /// E: the mean over all segments and steps of ||(s' - s_hat') / scale||_2^2, where s_hat' is reached from the segment's
     /// first state by the unrolled integrator.
@@ -114,65 +107,60 @@ impl Objective {
     /// in a model without a residual. This is the norm of F_r as a function, under the distribution of the data. The mean
     /// of the norms would treat rows one by one and pull small residuals to zero as hard as large ones, so that an effect
     /// in few rows would vanish first.
-    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> [f64; 2] {
+    pub fn loss(&self, model: &HybridModel, batch: &Batch) -> Tensor<1> {
         match batch {
-            Batch::Columns(columns) => numbers(self.composed_loss(&model.unpack(), columns)),
-            Batch::Blocks(blocks) => self.evaluation(model, blocks).loss.map(f64::from),
+            Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
+            Batch::Blocks(blocks) => {
+                let [flat, none] = [model.flat(), Tensor::empty([0], &model.device())];
+                let each = [[1.0, 0.0], [0.0, 1.0]];
+                self.fused_loss(model, [flat, none], blocks, &each).0
+            }
         }
     }
 
-    /// The loss, and the gradient of the sum of its parts times `weights`. The model must be on a device with gradients.
-    pub(super) fn gradient(
+    /// The sum of the two of a model with other numbers, times these weights, `[1]`; and the two alone.
+    #[allow(clippy::cast_possible_truncation)] // training runs in f32
+    pub(super) fn weighted_loss(
         &self,
         model: &HybridModel,
+        packed: &Packed,
         batch: &Batch,
         weights: [f64; 2],
-    ) -> Gradient {
+    ) -> (Tensor<1>, [f64; 2]) {
         match batch {
-            Batch::Columns(columns) => {
-                let tensors = model.tensors().map(Tensor::require_grad);
-                let loss = self.composed_loss(&model.unpack_tensors(&tensors), columns);
+            Batch::Columns(_) => {
+                let loss = self.loss(&packed.viewed(model), batch);
+                let parts = numbers(loss.clone());
                 let weights = vector(&weights, &loss.device());
-                let mut gradients = (loss.clone() * weights).backward();
-                let by_numbers = tensors.map(|tensor| {
-                    let gradient = tensor.grad_remove(&mut gradients);
-                    gradient.map_or_else(Vec::new, to_f32)
-                });
-                Gradient {
-                    loss: numbers(loss),
-                    by_numbers,
-                }
+                ((loss * weights).sum(), parts)
             }
             Batch::Blocks(blocks) => {
-                let evaluation = self.evaluation(model, blocks);
-                Gradient {
-                    loss: evaluation.loss.map(f64::from),
-                    by_numbers: evaluation.derivative(weights),
-                }
+                let first = packed.first.val();
+                let residual = match &packed.residual {
+                    Some(residual) => residual.val(),
+                    None => Tensor::empty([0], &first.device()),
+                };
+                let weights = weights.map(|weight| weight as f32);
+                self.fused_loss(model, [first, residual], blocks, &[weights])
             }
         }
     }
 
-    fn evaluation(&self, model: &HybridModel, blocks: &Arc<Blocks>) -> Evaluation {
+    fn fused_loss(
+        &self,
+        model: &HybridModel,
+        numbers: [Tensor<1>; 2],
+        blocks: &Arc<Blocks>,
+        sums: &[[f32; 2]],
+    ) -> (Tensor<1>, [f64; 2]) {
         let structure = model.structure();
         let problem = Problem::new(structure, blocks, self.integrator, &self.precision);
-        Evaluation::new(problem, &self.workers, model.numbers())
+        fused::loss(numbers, problem, self.workers.clone(), sums)
     }
 
-    /// E and ||F_r||, `[2]`.
-    fn composed_loss(&self, unpacked: &Unpacked, columns: &Columns) -> Tensor<1> {
-        Tensor::cat(self.of_each(1, unpacked, columns).to_vec(), 0)
-    }
-
-    /// E and ||F_r|| of each of so many models, `[models]`. The batch has the same number of rows for each, one model's
-    /// after the other's.
-    pub(super) fn of_each(
-        &self,
-        models: usize,
-        unpacked: &Unpacked,
-        batch: &Columns,
-    ) -> [Tensor<1>; 2] {
-        composed::of_each(unpacked, models, batch, self.integrator, &self.scale)
+    /// The same as numbers, without derivatives.
+    pub fn evaluate(&self, model: &HybridModel, batch: &Batch) -> [f64; 2] {
+        numbers(self.loss(&model.valid(), batch))
     }
 }
 
@@ -189,7 +177,8 @@ impl Clone for Objective {
     }
 }
 
-fn numbers(loss: Tensor<1>) -> [f64; 2] {
+/// E and ||F_r|| of a loss.
+pub(super) fn numbers(loss: Tensor<1>) -> [f64; 2] {
     let parts = to_f64(loss).try_into();
     parts.expect("a loss has two parts")
 }

@@ -2,10 +2,11 @@ use serde::{Deserialize, Serialize};
 
 use super::history::infinite_if_null;
 use super::{FitSettings, Record, Training};
-use crate::model::ModelShape;
+use crate::files::content_id;
+use crate::model::{ModelShape, Origin};
 
 /// The number of the checkpoint format that this program writes and reads.
-pub const FORMAT: u64 = 2;
+pub const FORMAT: u64 = 3;
 
 /// `checkpoint.json`: everything about a checkpoint but its weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -24,8 +25,8 @@ pub struct Manifest {
     /// alpha or lambda.
     pub penalty_weight: f64,
     pub rng: rand_chacha::ChaCha8Rng,
-    /// Steps that Adam has taken with the prior and with the residual.
-    pub optimizer_steps: [usize; 2],
+    /// A hash of what the optimiser remembers.
+    pub optimizer: String,
     pub best: Option<SavedBest>,
     pub history: Vec<Record>,
 }
@@ -39,29 +40,20 @@ pub struct SavedBest {
 }
 
 impl Manifest {
-    pub(super) fn of(
-        training: &Training,
-        config: &serde_json::Value,
-        seed: u64,
-        optimizer_steps: [usize; 2],
-    ) -> Self {
-        let weights = training.model.weights();
+    pub(super) fn of(training: &Training, origin: &Origin, optimizer: &[u8]) -> Self {
+        let model = training.model();
+        let weights = model.weights();
         Self {
             format: FORMAT,
             residyn: env!("CARGO_PKG_VERSION").to_owned(),
-            shape: ModelShape::of(
-                training.model.system(),
-                training.model.joints(),
-                &training.model.declared(),
-                &weights,
-            ),
-            config: config.clone(),
-            seed,
+            shape: ModelShape::of(model.system(), model.joints(), &model.declared(), &weights),
+            config: origin.config.clone(),
+            seed: origin.seed,
             settings: training.settings.clone(),
             epoch: training.epoch,
             penalty_weight: training.penalty_weight,
             rng: training.rng.clone(),
-            optimizer_steps,
+            optimizer: content_id(optimizer),
             best: training.best.as_ref().map(|best| SavedBest {
                 epoch: best.epoch,
                 validation: best.validation,

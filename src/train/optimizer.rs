@@ -1,150 +1,191 @@
-//! Adam on the learnable numbers of a model. Burn's would take some thirty tensor operations for what is one loop over
-//! a few hundred numbers.
+//! Burn's optimisers and learning-rate schedulers as a recipe names them.
 
-use super::{FitSettings, Structure};
-use crate::train::hybrid::Numbers;
+use burn::lr_scheduler::cosine::CosineAnnealingLrSchedulerConfig;
+use burn::lr_scheduler::exponential::ExponentialLrSchedulerConfig;
+use burn::lr_scheduler::linear::LinearLrSchedulerConfig;
+use burn::lr_scheduler::module_lr_scheduler::{ModuleLearningRate, ModuleLrScheduler};
+use burn::module::ParamGroup;
+use burn::optim::{
+    AdaGradConfig, AdamConfig, AdamWConfig, AdanConfig, GradientsParams, LambConfig, LionConfig,
+    ModuleOptimizer, RmsPropConfig, SgdConfig,
+};
+use burn::tensor::Gradients;
+use serde::{Deserialize, Serialize};
 
-/// Decay rates of the running means of the gradient and of its square.
-const BETAS: [f32; 2] = [0.9, 0.999];
-// PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses,
-// and would stop them short of it.
-pub(super) const EPSILON: f32 = 1e-8;
+use super::packed::Packed;
+use super::without_subnormals::WithoutSubnormals;
+use super::{FitSettings, HybridModel, TrainError, optimizer_record};
 
-/// Learning rates and weight decays of the prior and of the residual.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rates {
-    learning: [f64; 2],
-    /// Each weight decays by this share of its learning rate.
-    decays: [f64; 2],
-    /// The current share of the learning rates.
-    share: f64,
+// PyTorch's value. Burn's default of 1e-5 is as large as gradients near the optimum of these losses, and would stop Adam
+// short of it.
+const EPSILON: f32 = 1e-8;
+
+/// An optimiser of Burn's, with Burn's defaults but for [`EPSILON`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OptimizerKind {
+    /// Adam or, where weights decay, AdamW.
+    #[default]
+    Adam,
+    AdaGrad,
+    Adan,
+    Lamb,
+    Lion,
+    RmsProp,
+    Sgd,
 }
 
-/// Adam's moments of one part of a model.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Moments {
-    /// Steps taken.
-    pub steps: usize,
-    /// Running means of the gradient and of its square.
-    pub first: Vec<f32>,
-    pub second: Vec<f32>,
+/// How the learning rates fall from one epoch to the next, each a scheduler of Burn's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Schedule {
+    /// By the same factor in each epoch.
+    #[default]
+    Exponential,
+    /// Along half a period of a cosine.
+    Cosine,
+    /// By the same amount in each epoch.
+    Linear,
 }
 
-/// Adam on the numbers of the prior and of the residual.
-#[derive(Debug, Clone)]
-pub(super) struct Optimizer {
-    pub rates: Rates,
-    pub moments: [Moments; 2],
-}
-
-impl Rates {
-    pub(super) fn new(structure: &Structure, settings: &FitSettings) -> Self {
-        let (rates, decay) = (&settings.learning_rates, settings.weight_decay);
-        let (prior, of_prior) = match structure.equations {
-            Some(_) => (rates.physics, 0.0),
-            // A prior below a residual was trained before and must not decay.
-            None if structure.has_residual => (rates.prior, 0.0),
-            None => (rates.prior, decay),
-        };
-        Self {
-            learning: [prior, rates.residual],
-            decays: [of_prior, decay],
-            share: 1.0,
+impl OptimizerKind {
+    /// The optimiser without a decay of weights.
+    fn plain(self) -> ModuleOptimizer {
+        match self {
+            Self::Adam => adam().into(),
+            Self::AdaGrad => AdaGradConfig::new().init(),
+            Self::Adan => AdanConfig::new().init(),
+            Self::Lamb => LambConfig::new().init(),
+            Self::Lion => LionConfig::new().init(),
+            Self::RmsProp => RmsPropConfig::new().init(),
+            Self::Sgd => SgdConfig::new().init(),
         }
     }
 
-    /// Sets the share of the learning rates for the next steps.
-    pub(super) fn anneal(&mut self, share: f64) {
-        self.share = share;
+    /// The optimiser, with weights that decay in `group` by this share of the learning rate.
+    fn decaying(self, group: ParamGroup, decay: f32) -> Result<ModuleOptimizer, TrainError> {
+        let plain = self.plain();
+        Ok(match self {
+            Self::Adam => {
+                let config = AdamWConfig::new().with_epsilon(EPSILON);
+                let adam_w = config.with_weight_decay(decay).build();
+                plain.with_group(group, WithoutSubnormals(adam_w), None)
+            }
+            Self::Adan => plain.with_group(
+                group,
+                AdanConfig::new().with_weight_decay(decay).build(),
+                None,
+            ),
+            Self::Lamb => plain.with_group(
+                group,
+                LambConfig::new().with_weight_decay(decay).build(),
+                None,
+            ),
+            Self::Lion => plain.with_group(
+                group,
+                LionConfig::new().with_weight_decay(decay).build(),
+                None,
+            ),
+            Self::AdaGrad | Self::RmsProp | Self::Sgd => return Err(TrainError::Decay(self)),
+        })
     }
+}
 
-    /// Learning rate of the prior (0) or of the residual (1), and what its weights are multiplied by before each step.
-    pub(super) fn of(&self, part: usize) -> (f64, f64) {
-        let rate = self.learning[part] * self.share;
-        (rate, 1.0 - rate * self.decays[part])
+fn adam() -> WithoutSubnormals<burn::optim::Adam> {
+    WithoutSubnormals(AdamConfig::new().with_epsilon(EPSILON).build())
+}
+
+impl Schedule {
+    /// A scheduler from 1 in the first of so many epochs to `last` in the last.
+    fn scheduler(self, last: f64, epochs: usize) -> ModuleLrScheduler {
+        let steps = epochs.saturating_sub(1).max(1);
+        let scheduler = match self {
+            Self::Exponential => {
+                let factor = last.powf(1.0 / steps as f64);
+                ExponentialLrSchedulerConfig::new(1.0, factor).init()
+            }
+            Self::Cosine => {
+                let config = CosineAnnealingLrSchedulerConfig::new(1.0, steps);
+                config.with_min_lr(last).init()
+            }
+            Self::Linear => LinearLrSchedulerConfig::new(1.0, last, steps).init(),
+        };
+        scheduler.expect("a share above 0 and at most 1, and steps")
     }
+}
+
+/// An optimiser of the parts of a model, each with a learning rate of its own.
+#[derive(Clone)]
+pub(super) struct Optimizer {
+    optimizer: ModuleOptimizer,
+    /// The share of the learning rates.
+    share: ModuleLrScheduler,
+    /// The learning rate of the prior or of all, and that of the residual with its tensor.
+    prior: f64,
+    residual: (ParamGroup, f64),
+    /// The rates of the current epoch.
+    rates: ModuleLearningRate,
 }
 
 impl Optimizer {
-    pub(super) fn new(structure: &Structure, settings: &FitSettings) -> Self {
-        Self {
-            rates: Rates::new(structure, settings),
-            moments: Default::default(),
-        }
+    /// # Errors
+    /// A decay of weights that the optimiser does not have.
+    pub(super) fn new(
+        model: &HybridModel,
+        numbers: &Packed,
+        settings: &FitSettings,
+    ) -> Result<Self, TrainError> {
+        let residual = ParamGroup::ids_from_module(numbers.residual.clone());
+        let [prior, of_residual] = settings.learning_rates.of(model);
+        #[allow(clippy::cast_possible_truncation)] // training runs in f32
+        let decay = settings.weight_decay as f32;
+        Ok(Self {
+            optimizer: match (decay > 0.0, &model.residual, &model.prior) {
+                // A prior below a residual was trained before and must not decay.
+                (true, Some(_), _) => settings.optimizer.decaying(residual.clone(), decay)?,
+                (true, None, Some(_)) => settings.optimizer.decaying(ParamGroup::all(), decay)?,
+                _ => settings.optimizer.plain(),
+            },
+            share: settings
+                .schedule
+                .scheduler(settings.anneal, settings.epochs),
+            prior,
+            residual: (residual, of_residual),
+            rates: ModuleLearningRate::default(),
+        })
     }
 
-    /// Takes a step against these gradients.
-    #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn step(&mut self, numbers: &mut Numbers, gradients: &Numbers) {
-        let parts = numbers.iter_mut().zip(gradients).zip(&mut self.moments);
-        for (part, ((numbers, gradient), moments)) in parts.enumerate() {
-            let (rate, kept) = self.rates.of(part);
-            if kept < 1.0 {
-                numbers.iter_mut().for_each(|x| *x *= kept as f32);
-            }
-            moments.step(numbers, gradient, rate as f32);
-        }
+    /// Sets the learning rates of the next epoch.
+    pub(super) fn begin_epoch(&mut self) {
+        let share = self.share.step().base();
+        let (residual, rate) = self.residual.clone();
+        let rates = ModuleLrScheduler::new(self.prior * share);
+        self.rates = rates.with_group(residual, rate * share).step();
     }
-}
 
-impl Moments {
-    /// Algorithm 1 of Kingma and Ba 2015, "Adam: a method for stochastic optimization", arXiv:1412.6980, in the order
-    /// of operations of its section 2.
-    fn step(&mut self, numbers: &mut [f32], gradient: &[f32], rate: f32) {
-        if numbers.is_empty() {
-            return;
-        }
-        self.first.resize(numbers.len(), 0.0);
-        self.second.resize(numbers.len(), 0.0);
-        self.steps += 1;
-        let steps = i32::try_from(self.steps).unwrap_or(i32::MAX);
-        let [first, second] = BETAS.map(|beta| 1.0 - beta.powi(steps));
-        let (factor, floor) = (second.sqrt() / first, EPSILON * second.sqrt());
-        let moments = self.first.iter_mut().zip(&mut self.second);
-        for ((x, slope), (first, second)) in numbers.iter_mut().zip(gradient).zip(moments) {
-            *first = normal(*first * BETAS[0] + slope * (1.0 - BETAS[0]));
-            *second = normal(*second * BETAS[1] + slope * slope * (1.0 - BETAS[1]));
-            *x -= *first * factor / (second.sqrt() + floor) * rate;
-        }
+    /// The numbers after a step against these gradients.
+    pub(super) fn step(&mut self, numbers: Packed, gradients: Gradients) -> Packed {
+        let gradients = GradientsParams::from_grads(gradients, &numbers);
+        self.optimizer.step(self.rates.clone(), numbers, gradients)
     }
-}
 
-/// Zero in place of a subnormal number. The moments of a weight whose gradient stays zero, as behind a ReLU that no row
-/// activates, would decay into the subnormal range, where processors are slow.
-fn normal(x: f32) -> f32 {
-    if x.abs() < f32::MIN_POSITIVE { 0.0 } else { x }
-}
+    /// What it remembers of its steps, in the order of a file.
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
+        optimizer_record::to_bytes(&self.optimizer)
+    }
 
-#[cfg(test)]
-mod tests {
-    use burn::optim::{AdamConfig, Optimizer as _};
-    use burn::tensor::Tensor;
-
-    use super::{EPSILON, Moments};
-    use crate::train::Backend;
-    use crate::train::hybrid::vector;
-
-    #[test]
-    fn steps_are_those_of_burns_adam_to_the_last_bit() {
-        let device = Backend::NdArray.device().without_autodiff();
-        let adam = AdamConfig::new().with_epsilon(EPSILON).build();
-        let start: [f64; 5] = [0.3, -1.7, 0.0, 12.0, -0.004];
-        #[allow(clippy::cast_possible_truncation)]
-        let mut numbers = start.map(|x| x as f32);
-        let (mut tensor, mut state) = (vector(&start, &device), None);
-        let mut moments = Moments::default();
-        for step in 0..200 {
-            let slopes: Vec<f64> = (0..5)
-                .map(|k| {
-                    f64::from((0.7 * f64::from(step * (k + 1))).sin() as f32) * 10f64.powi(k - 2)
-                })
-                .collect();
-            let slopes: Vec<f32> = slopes.iter().map(|slope| *slope as f32).collect();
-            moments.step(&mut numbers, &slopes, 3e-3);
-            let gradient = Tensor::<1>::from_data(slopes.as_slice(), &device);
-            (tensor, state) = adam.step(f64::from(3e-3_f32), tensor, gradient, state);
-            let wanted: Vec<f32> = tensor.to_data().iter().collect();
-            assert_eq!(numbers.as_slice(), wanted, "step {step}");
-        }
+    /// The same after so many epochs of a run with these numbers, with what it remembered then.
+    ///
+    /// # Errors
+    /// What is wrong with bytes that are no such record.
+    pub(super) fn resumed(
+        mut self,
+        bytes: &[u8],
+        numbers: &Packed,
+        epochs: usize,
+    ) -> Result<Self, String> {
+        self.optimizer = optimizer_record::from_bytes(self.optimizer, bytes, numbers)?;
+        (0..epochs).for_each(|_| self.begin_epoch());
+        Ok(self)
     }
 }

@@ -3,7 +3,7 @@ use std::num::NonZeroUsize;
 use serde::{Deserialize, Serialize};
 
 use super::penalty::not_negative;
-use super::{Penalty, TrainError};
+use super::{HybridModel, OptimizerKind, Penalty, Schedule, TrainError};
 use crate::limits::EPOCHS;
 use crate::sim::Integrator;
 
@@ -12,9 +12,12 @@ use crate::sim::Integrator;
 #[serde(default, deny_unknown_fields)]
 pub struct FitSettings {
     pub epochs: usize,
+    pub optimizer: OptimizerKind,
     pub learning_rates: LearningRates,
-    /// Share of the learning rates that is left in the last epoch; they fall by the same factor in each. 1 keeps them.
+    /// Share of the learning rates that is left in the last epoch. 1 keeps them.
     pub anneal: f64,
+    /// How they fall to that share.
+    pub schedule: Schedule,
     /// Decoupled weight decay (Loshchilov and Hutter 2019, arXiv:1711.05101): at each step the weights of the residual or,
     /// in a model without one, of the network shrink by this share of the learning rate. It keeps a network small where
     /// there are no data.
@@ -28,7 +31,7 @@ pub struct FitSettings {
     pub record_every: NonZeroUsize,
 }
 
-/// Adam's learning rates of the parts. Zero freezes a part.
+/// Learning rates of the parts. Zero freezes a part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearningRates {
@@ -55,8 +58,10 @@ impl Default for FitSettings {
     fn default() -> Self {
         Self {
             epochs: 4000,
+            optimizer: OptimizerKind::default(),
             learning_rates: LearningRates::default(),
             anneal: 1.0,
+            schedule: Schedule::default(),
             weight_decay: 0.0,
             batching: Batching::default(),
             penalty: Penalty::default(),
@@ -74,6 +79,17 @@ impl Default for LearningRates {
             prior: 0.01,
             residual: 0.01,
         }
+    }
+}
+
+impl LearningRates {
+    /// Of the prior of a model, and of its residual.
+    pub(super) fn of(&self, model: &HybridModel) -> [f64; 2] {
+        let prior = match &model.physics {
+            Some(_) => self.physics,
+            None => self.prior,
+        };
+        [prior, self.residual]
     }
 }
 
@@ -97,11 +113,5 @@ impl FitSettings {
             return Err(TrainError::Epochs(self.epochs));
         }
         self.penalty.check()
-    }
-
-    /// The share of the learning rates in an epoch, counted from 0.
-    pub(super) fn share_in(&self, epoch: usize) -> f64 {
-        let last = self.epochs.saturating_sub(1).max(1);
-        self.anneal.powf(epoch as f64 / last as f64)
     }
 }

@@ -175,8 +175,12 @@ pub fn manifests() -> Vec<Vec<u8>> {
 pub fn weights() -> Vec<Vec<u8>> {
     named(
         Some(&ours(CHECKPOINT)),
-        &["weights.safetensors", "optimizer.safetensors"],
+        &["weights.safetensors", "last.safetensors"],
     )
+}
+
+pub fn optimizers() -> Vec<Vec<u8>> {
+    named(Some(&ours(CHECKPOINT)), &["optimizer.bpk"])
 }
 
 /// The descriptions of tensors: what stands before the numbers.

@@ -8,6 +8,7 @@ use residyn::control::Task;
 use residyn::data::{Columns, Log, LogError, Quantity, audit};
 use residyn::experiment::{self, undeclared_effect};
 use residyn::expr::{Graph, Scope, SignForm, parse};
+use residyn::files::content_id;
 use residyn::formats::{ExportModel, FORMATS, Imported};
 use residyn::model::{Dynamics, Effect, Library, Model};
 use residyn::plant::Plant;
@@ -351,6 +352,33 @@ fn weights() {
         seeds: seeds::weights,
         place,
         read: checkpoint_beside,
+        ..ALONE
+    }
+    .run();
+}
+
+/// What an optimiser remembers, with a hash in the description of the checkpoint that fits.
+#[test]
+fn optimizer() {
+    let place = |folder: &Path| in_checkpoint(folder, "optimizer.bpk");
+    let read = |path: &Path| {
+        let described = path.with_file_name("checkpoint.json");
+        let mut json: Value = serde_json::from_slice(&fs::read(&described).unwrap()).unwrap();
+        json["optimizer"] = content_id(&fs::read(path).unwrap()).into();
+        fs::write(&described, json.to_string()).unwrap();
+        let folder = path.parent().unwrap();
+        let (checkpoint, declared, _) =
+            Checkpoint::open(folder, library(), Backend::NdArray).unwrap();
+        let device = Backend::NdArray.device();
+        checkpoint.training(&declared.dynamics(), &device).is_ok()
+    };
+    Target {
+        name: "optimizer",
+        inputs: 2000,
+        form: Form::Bytes,
+        seeds: seeds::optimizers,
+        place,
+        read,
         ..ALONE
     }
     .run();

@@ -71,12 +71,37 @@ impl Network {
         for layer in &self.layers {
             let weight = &numbers[layer.weight.clone()];
             let transposed = &mut self.transposed[layer.transposed.clone()];
-            for (output, weights) in weight.chunks_exact(layer.inputs).enumerate() {
-                let column = transposed[output..].iter_mut().step_by(layer.outputs);
-                for (to, weight) in column.zip(weights) {
-                    *to = *weight;
-                }
-            }
+            transpose(weight, layer.inputs, transposed);
+        }
+    }
+
+    /// Replace all weights and biases by `numbers` in another order: each layer's weights `[input][output]`, as Burn's
+    /// linear layers have them.
+    ///
+    /// # Panics
+    /// When the count of numbers is another.
+    pub fn set_by_input(&mut self, numbers: &[f32]) {
+        assert_eq!(numbers.len(), self.numbers.len(), "one for each number");
+        for layer in &self.layers {
+            let turned = &numbers[layer.weight.clone()];
+            self.transposed[layer.transposed.clone()].copy_from_slice(turned);
+            transpose(
+                turned,
+                layer.outputs,
+                &mut self.numbers[layer.weight.clone()],
+            );
+            let biases = &numbers[layer.bias.clone()];
+            self.numbers[layer.bias.clone()].copy_from_slice(biases);
+        }
+    }
+
+    /// Append `numbers` in the order that [`Network::set_by_input`] takes them.
+    pub fn append_by_input(&self, numbers: &[f32], to: &mut Vec<f32>) {
+        let start = to.len();
+        to.extend_from_slice(numbers);
+        for layer in &self.layers {
+            let turned = &mut to[start..][layer.weight.clone()];
+            transpose(&numbers[layer.weight.clone()], layer.inputs, turned);
         }
     }
 
@@ -120,6 +145,16 @@ impl Network {
                 },
             };
             product.run(simd, from, &mut to[..layer.outputs]);
+        }
+    }
+}
+
+/// The transpose of a matrix, row after row, with so many columns.
+fn transpose(matrix: &[f32], columns: usize, to: &mut [f32]) {
+    let rows = matrix.len() / columns;
+    for (k, row) in matrix.chunks_exact(columns).enumerate() {
+        for (to, from) in to[k..].iter_mut().step_by(rows).zip(row) {
+            *to = *from;
         }
     }
 }

@@ -5,9 +5,9 @@ use pulp::Arch;
 use super::part::{Part, Pass, PassOver};
 use super::problem::{Problem, Weights};
 use crate::lanes::WorkerPool;
+use crate::sim::batch::Network;
 use crate::train::Structure;
 use crate::train::composed::NORM_FLOOR;
-use crate::train::hybrid::Numbers;
 
 /// The threads that evaluate losses, and the idle buffers of earlier evaluations.
 #[derive(Debug, Default)]
@@ -37,7 +37,7 @@ struct Buffers {
 
 /// An evaluated loss, with everything its derivative needs.
 #[derive(Debug)]
-pub(in crate::train) struct Evaluation {
+pub(super) struct Evaluation {
     workers: Arc<Workers>,
     problem: Arc<Problem>,
     buffers: Arc<Buffers>,
@@ -95,14 +95,10 @@ impl Task {
 }
 
 impl Evaluation {
-    /// Evaluates the loss with these learnable numbers of the prior and of the residual.
+    /// Evaluates the loss with these learnable numbers, in the order of
+    /// [`HybridModel::flat`](crate::train::HybridModel::flat).
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(in crate::train) fn new(
-        problem: Problem,
-        workers: &Arc<Workers>,
-        numbers: &Numbers,
-    ) -> Self {
-        let problem = Arc::new(problem);
+    pub(super) fn new(problem: Arc<Problem>, workers: Arc<Workers>, numbers: &[f32]) -> Self {
         let buffers = workers.take(&problem.structure, problem.parts().count());
         let mut weights = buffers
             .weights
@@ -115,7 +111,7 @@ impl Evaluation {
         drop(weights);
         let mut evaluation = Self {
             loss: [0.0; 2],
-            workers: workers.clone(),
+            workers,
             problem,
             buffers,
         };
@@ -132,18 +128,20 @@ impl Evaluation {
         evaluation
     }
 
-    /// From the derivatives of a quantity by the two parts of the loss to those by the learnable numbers of the prior and
-    /// of the residual.
+    /// From the derivatives of a quantity by the two parts of the loss to those by the learnable numbers.
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(in crate::train) fn derivative(&self, by_loss: [f64; 2]) -> Numbers {
+    pub(super) fn derivative(&self, by_loss: [f32; 2]) -> Vec<f32> {
         let (problem, norm) = (&self.problem, self.loss[1]);
+        let by_loss = by_loss.map(f64::from);
         let by_mean = match problem.structure.has_residual {
             true => by_loss[1] / (2.0 * f64::from(norm)),
             false => 0.0,
         };
         let seeds = [by_loss[0], by_mean].map(|by| (by / problem.count()) as f32);
         self.run(Pass::Reverse(seeds));
-        summed(&problem.structure, &self.buffers.parts)
+        let weights = self.buffers.weights.read();
+        let networks = &weights.unwrap_or_else(PoisonError::into_inner).networks;
+        summed(&problem.structure, networks, &self.buffers.parts)
     }
 
     fn run(&self, pass: Pass) {
@@ -166,9 +164,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The derivatives by the learnable numbers of the prior and of the residual, summed over the parts.
+/// The derivatives by the learnable numbers, summed over the parts.
 #[allow(clippy::cast_possible_truncation)] // training runs in f32
-fn summed(structure: &Structure, parts: &[Mutex<Part>]) -> Numbers {
+fn summed(structure: &Structure, networks: &[Network], parts: &[Mutex<Part>]) -> Vec<f32> {
     let (first, others) = parts.split_first().expect("there is a part");
     let first = &mut *lock(first);
     for other in others {
@@ -186,12 +184,11 @@ fn summed(structure: &Structure, parts: &[Mutex<Part>]) -> Numbers {
         true => 0.0,
         false => (free.next().expect("one number for each free parameter") * p.scale) as f32,
     });
-    let mut networks = std::mem::take(&mut first.by_networks).into_iter();
-    let prior = match structure.equations {
-        None => networks.next().unwrap_or_default(),
-        Some(_) => parameters.collect(),
-    };
-    [prior, networks.next().unwrap_or_default()]
+    let mut sums: Vec<f32> = parameters.collect();
+    for (network, by_network) in networks.iter().zip(&first.by_networks) {
+        network.append_by_input(by_network, &mut sums);
+    }
+    sums
 }
 
 #[cfg(test)]
@@ -203,6 +200,7 @@ mod tests {
     use crate::sim::Integrator;
     use crate::train::Backend;
     use crate::train::fused::problem::{Problem, RECORD_LIMIT};
+    use crate::train::hybrid::to_f32;
     use crate::train::tests::{hybrid, transitions};
 
     #[test]
@@ -217,7 +215,8 @@ mod tests {
                 record_limit,
                 ..problem
             };
-            let evaluation = Evaluation::new(problem, &Arc::default(), model.numbers());
+            let numbers = to_f32(model.flat());
+            let evaluation = Evaluation::new(Arc::new(problem), Arc::default(), &numbers);
             (evaluation.loss, evaluation.derivative([1.0, 0.3]))
         };
         assert_eq!(derivative(0), derivative(RECORD_LIMIT));

@@ -4,6 +4,7 @@
 mod blocks;
 mod evaluation;
 mod forward;
+mod operation;
 mod part;
 mod problem;
 mod programs;
@@ -14,5 +15,6 @@ mod rows;
 mod workspace;
 
 pub use blocks::Blocks;
-pub(super) use evaluation::{Evaluation, Workers};
+pub(super) use evaluation::Workers;
+pub(super) use operation::loss;
 pub(super) use problem::Problem;

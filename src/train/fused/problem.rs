@@ -5,7 +5,6 @@ use super::Blocks;
 use crate::sim::Integrator;
 use crate::sim::batch::{Network, Rows};
 use crate::train::Structure;
-use crate::train::hybrid::Numbers;
 
 /// Blocks of rows that a thread takes through the model together: enough to share the reading of weights, and few
 /// enough that their intermediate values stay in the processor's cache.
@@ -100,22 +99,21 @@ impl Weights {
         }
     }
 
-    /// Sets the learnable numbers of the prior and of the residual.
+    /// Sets the learnable numbers, in the order of [`HybridModel::flat`](crate::train::HybridModel::flat).
     #[allow(clippy::cast_possible_truncation)] // training runs in f32
-    pub(super) fn set(&mut self, structure: &Structure, [prior, residual]: &Numbers) {
-        let parameters = structure.parameters().iter().zip(prior);
+    pub(super) fn set(&mut self, structure: &Structure, numbers: &[f32]) {
+        let (scaled, mut rest) = numbers.split_at(self.parameters.len());
+        let parameters = structure.parameters().iter().zip(scaled);
         for (to, (parameter, scaled)) in self.parameters.iter_mut().zip(parameters) {
             *to = match parameter.fixed {
                 true => parameter.value as f32,
                 false => scaled * parameter.scale as f32,
             };
         }
-        let flat = match structure.equations {
-            None => [prior.as_slice(), residual],
-            Some(_) => [residual.as_slice(), &[]],
-        };
-        for (network, flat) in self.networks.iter_mut().zip(flat) {
-            network.set_numbers(flat);
+        for network in &mut self.networks {
+            let (numbers, after) = rest.split_at(network.numbers());
+            network.set_by_input(numbers);
+            rest = after;
         }
     }
 }

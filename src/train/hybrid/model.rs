@@ -1,29 +1,40 @@
 use std::sync::Arc;
 
+use burn::backend::DispatchTensor;
+use burn::module::{Module, ParamId};
 use burn::tensor::{Device, Tensor};
 
-use super::tensor::{rows_of, vector_of_f32};
-use super::{HybridError, Structure, Unpacked, equations};
+use super::flat::flattened;
+use super::{HybridError, Mlp, Physics, Structure, Unpacked};
 use crate::control::Predictor;
 use crate::model::{
-    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, to_f32, with_residual,
+    Dynamics, MlpWeights, ModelShape, ModelWeights, Parameter, nothing_but, with_residual,
 };
 use crate::sim::Integrator;
 
-/// Learnable numbers of the prior and of the residual.
-pub(in crate::train) type Numbers = [Vec<f32>; 2];
+/// Burn's identifiers of the tensors: of the physical parameters, and the first of each network. They do not depend on what
+/// was made before, so that an optimiser's record fits a model that is built anew.
+const PHYSICS_ID: u64 = 1;
+const PRIOR_IDS: u64 = 1 << 32;
+const RESIDUAL_IDS: u64 = 2 << 32;
 
 /// ds/dt = F_p(s, a) + F_r(s, a): what is known, and a network for what is not.
 ///
 /// F_p, the prior, is either equations with learnable parameters or itself a network. Leaving out F_r
 /// gives a physics-only or a data-driven model. States are positions then velocities, `2n` columns.
-#[derive(Debug, Clone)]
+///
+/// It is a Burn module: `loss.backward()`, optimisers, records, visitors, `no_grad` and moves between devices work as with
+/// any other. `physics`, `prior` and `residual` are the paths of its parameter groups.
+#[derive(Module, Debug)]
 pub struct HybridModel {
-    /// value / scale of each physical parameter, or the prior network's numbers, see [`MlpWeights::flat`]; and the
-    /// residual network's.
-    numbers: Numbers,
+    /// The physical parameters, where the prior is equations.
+    pub physics: Option<Physics>,
+    /// The prior, where it is a network.
+    pub prior: Option<Mlp>,
+    /// F_r, where the model has one.
+    pub residual: Option<Mlp>,
+    #[module(skip)]
     structure: Arc<Structure>,
-    device: Device,
 }
 
 impl HybridModel {
@@ -35,10 +46,12 @@ impl HybridModel {
     /// # Errors
     /// A parameter that is not finite, outside of its bounds, or without a scale.
     pub fn physics(dynamics: &Dynamics, device: &Device) -> Result<Self, HybridError> {
+        let physics = Physics::new(dynamics, ParamId::from(PHYSICS_ID), device)?;
         Ok(Self {
-            numbers: [equations::scaled(dynamics)?, Vec::new()],
+            physics: Some(physics),
+            prior: None,
+            residual: None,
             structure: Arc::new(Structure::of_equations(dynamics)),
-            device: device.clone(),
         })
     }
 
@@ -56,9 +69,10 @@ impl HybridModel {
     ) -> Result<Self, HybridError> {
         weights.check(joints)?;
         Ok(Self {
-            numbers: [to_f32(&weights.flat()), Vec::new()],
+            physics: None,
+            prior: Some(Mlp::new(weights, PRIOR_IDS, device)),
+            residual: None,
             structure: Arc::new(Structure::of_network(system, joints, weights)),
-            device: device.clone(),
         })
     }
 
@@ -68,9 +82,8 @@ impl HybridModel {
     /// A network that is not one for the model's joints.
     pub fn with_residual(self, weights: &MlpWeights) -> Result<Self, HybridError> {
         weights.check(self.joints())?;
-        let [prior, _] = self.numbers;
         Ok(Self {
-            numbers: [prior, to_f32(&weights.flat())],
+            residual: Some(Mlp::new(weights, RESIDUAL_IDS, &self.device())),
             structure: Arc::new(self.structure.with_residual(weights)),
             ..self
         })
@@ -138,15 +151,10 @@ impl HybridModel {
 
     /// Every learnable number.
     pub fn weights(&self) -> ModelWeights {
-        let network = |made: Option<&MlpWeights>, numbers: &[f32]| {
-            let numbers: Vec<f64> = numbers.iter().copied().map(f64::from).collect();
-            Some(made?.with_flat(&numbers))
-        };
-        let [prior, residual] = &self.numbers;
         ModelWeights {
             parameters: self.parameters().into_iter().map(|(_, v)| v).collect(),
-            prior: network(self.structure.prior(), prior),
-            residual: network(self.structure.residual(), residual),
+            prior: self.prior.as_ref().map(Mlp::weights),
+            residual: self.residual.as_ref().map(Mlp::weights),
         }
     }
 
@@ -211,23 +219,23 @@ impl HybridModel {
     /// The declared equations with the current values.
     fn equations(&self) -> Option<Dynamics> {
         let declared = self.structure.equations.as_ref()?;
-        Some(equations::current(declared, &self.numbers[0]))
+        let physics = self.physics.as_ref()?;
+        Some(declared.clone().with_values(physics.values()))
     }
 
-    /// Unpacks the learnable numbers for evaluations without a gradient.
+    /// Unpacks the physical parameters, once for all evaluations that one gradient runs through.
     pub fn unpack(&self) -> Unpacked<'_> {
-        self.unpack_tensors(&self.tensors())
+        Unpacked::new(self)
     }
 
-    /// Unpacks the model's [`HybridModel::tensors`], once for all evaluations that one gradient runs through.
-    pub(in crate::train) fn unpack_tensors(&self, tensors: &[Tensor<1>; 2]) -> Unpacked<'_> {
-        let tensors = tensors.clone().map(|numbers| rows_of(numbers, 1));
-        Unpacked::new(&self.structure, 1, tensors)
-    }
-
-    /// The device that the model was made on.
+    /// The device of the model's tensors.
     pub fn device(&self) -> Device {
-        self.device.clone()
+        let networks = [&self.prior, &self.residual];
+        let of_network = |mlp: &Mlp| mlp.layers.first().map(|layer| layer.weight.device());
+        let physics = self.physics.as_ref().map(|physics| physics.scaled.device());
+        let mut found = networks.into_iter().flatten().filter_map(of_network);
+        let device = physics.or_else(|| found.next());
+        device.expect("a prior is equations or a network")
     }
 
     /// The model without its learnable numbers.
@@ -235,30 +243,51 @@ impl HybridModel {
         &self.structure
     }
 
-    /// The same model on the device without gradients.
-    #[must_use]
-    pub(in crate::train) fn without_gradients(&self) -> Self {
+    /// All learnable numbers as one tensor, with their derivatives: the physical parameters as value / scale or the layers of
+    /// the prior, then the layers of the residual, each layer's weights `[input][output]` before its biases.
+    pub(in crate::train) fn flat(&self) -> Tensor<1> {
+        let residual = self.residual.iter().flat_map(Mlp::tensors);
+        flattened(self.tensors_of_prior().chain(residual).collect())
+    }
+
+    /// The same as a tensor of the prior and one of the residual.
+    pub(in crate::train) fn flat_parts(&self) -> (Tensor<1>, Option<Tensor<1>>) {
+        let residual = self.residual.as_ref();
+        let residual = residual.map(|residual| flattened(residual.tensors().collect()));
+        (flattened(self.tensors_of_prior().collect()), residual)
+    }
+
+    fn tensors_of_prior(&self) -> impl Iterator<Item = DispatchTensor> {
+        let physics = self.physics.iter();
+        let physics = physics.map(|physics| physics.scaled.val().into_dispatch());
+        physics.chain(self.prior.iter().flat_map(Mlp::tensors))
+    }
+
+    /// The same model with other numbers, views of `flat`.
+    pub(in crate::train) fn with_flat(&self, flat: &Tensor<1>) -> Self {
+        let mut first = 0;
+        let mut next = |count: usize| {
+            first += count;
+            flat.clone().narrow(0, first - count, count)
+        };
+        let parameters = self.structure.parameters().len();
+        let physics = self.physics.as_ref();
+        let physics = physics.map(|physics| physics.with_scaled(next(parameters)));
+        let mut network = |mlp: &Mlp| mlp.with_numbers(&next(mlp.num_params()));
         Self {
-            device: self.device().without_autodiff(),
-            ..self.clone()
+            physics,
+            prior: self.prior.as_ref().map(&mut network),
+            residual: self.residual.as_ref().map(&mut network),
+            structure: self.structure.clone(),
         }
     }
 
-    /// The learnable numbers of the prior and of the residual; none where there is no residual.
-    pub(in crate::train) fn numbers(&self) -> &Numbers {
-        &self.numbers
-    }
-
-    /// The numbers as tensors of their own on the model's device.
-    pub(in crate::train) fn tensors(&self) -> [Tensor<1>; 2] {
-        let numbers = self.numbers.each_ref();
-        numbers.map(|numbers| vector_of_f32(numbers, &self.device))
-    }
-
-    /// Applies `step` to the learnable numbers, then brings physical parameters back within their bounds (projected gradient
-    /// descent): a parameter may rest on a bound and leave it again.
-    pub(in crate::train) fn update(&mut self, step: impl FnOnce(&mut Numbers)) {
-        step(&mut self.numbers);
-        equations::project(self.structure.parameters(), &mut self.numbers[0]);
+    /// The same model with the physical parameters brought back within their bounds, as after a step of an optimiser.
+    #[must_use]
+    pub fn within_bounds(self) -> Self {
+        Self {
+            physics: self.physics.map(Physics::within_bounds),
+            ..self
+        }
     }
 }

@@ -50,19 +50,6 @@ impl Structure {
         equations.map_or(&[], |dynamics| &dynamics.parameters)
     }
 
-    /// The initial network of the prior, where it is one.
-    pub(super) fn prior(&self) -> Option<&MlpWeights> {
-        match self.equations {
-            Some(_) => None,
-            None => self.networks.first(),
-        }
-    }
-
-    /// The initial network of the residual.
-    pub(super) fn residual(&self) -> Option<&MlpWeights> {
-        self.networks.last().filter(|_| self.has_residual)
-    }
-
     fn new(
         system: String,
         joints: usize,

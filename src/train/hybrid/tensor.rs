@@ -17,10 +17,6 @@ pub(super) fn tensor<const D: usize>(
     Tensor::from_data(TensorData::new(model::to_f32(values), shape), device)
 }
 
-pub(super) fn vector_of_f32(values: &[f32], device: &Device) -> Tensor<1> {
-    Tensor::from_data(TensorData::new(values.to_vec(), [values.len()]), device)
-}
-
 /// The entries of a tensor, row after row.
 pub(in crate::train) fn to_f32<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     let data = tensor.into_data();
@@ -30,12 +26,6 @@ pub(in crate::train) fn to_f32<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 /// The same in f64.
 pub(in crate::train) fn to_f64<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
     to_f32(tensor).into_iter().map(f64::from).collect()
-}
-
-/// A vector as so many equal rows of a matrix; none of an empty vector, since Burn has no empty matrices.
-pub(super) fn rows_of(vector: Tensor<1>, rows: usize) -> Option<Tensor<2>> {
-    let width = vector.dims()[0];
-    (width > 0).then(|| vector.expand([rows, width]))
 }
 
 /// The columns of a matrix `[batch, width]`.

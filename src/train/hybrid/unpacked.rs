@@ -1,8 +1,7 @@
 use burn::tensor::Tensor;
 
-use super::mlp::Mlp;
 use super::tensor::columns;
-use super::{Structure, equations, replay};
+use super::{HybridModel, Mlp, replay};
 use crate::model::ResidualOn;
 
 /// ds/dt at a batch of points.
@@ -14,30 +13,19 @@ pub struct Derivative {
     pub residual: Option<Tensor<2>>,
 }
 
-/// A model, or several of one structure, with its learnable numbers unpacked for the evaluations of one loss.
+/// A model with its physical parameters unpacked for the evaluations of one loss.
 #[derive(Debug)]
 pub struct Unpacked<'m> {
-    structure: &'m Structure,
+    model: &'m HybridModel,
     parameters: Vec<Tensor<1>>,
-    prior: Option<Mlp<'m>>,
-    residual: Option<Mlp<'m>>,
 }
 
 impl<'m> Unpacked<'m> {
-    /// Models of `structure` with the learnable numbers `[models, numbers]` of prior and residual, where they have any.
-    /// Each evaluates `rows` rows, one model's after the other's; a single model takes any number where `rows` is 1.
-    pub(in crate::train) fn new(
-        structure: &'m Structure,
-        rows: usize,
-        [prior, residual]: [Option<Tensor<2>>; 2],
-    ) -> Self {
-        let network = |(made, numbers)| Mlp::new(made, &numbers);
-        let parameters = |prior| equations::columns(structure.parameters(), prior, rows);
+    pub(super) fn new(model: &'m HybridModel) -> Self {
+        let parameters = model.physics.as_ref().map(|physics| physics.columns());
         Self {
-            structure,
-            prior: structure.prior().zip(prior.clone()).map(network),
-            residual: structure.residual().zip(residual).map(network),
-            parameters: prior.map_or_else(Vec::new, parameters),
+            model,
+            parameters: parameters.unwrap_or_default(),
         }
     }
 
@@ -48,26 +36,10 @@ impl<'m> Unpacked<'m> {
         input: &[Tensor<1>],
         time: &Tensor<1>,
     ) -> Derivative {
-        let (q, qd) = state.split_at(self.structure.joints);
-        let mut rates = match (&self.structure.equations, &self.prior) {
-            (Some(equations), _) => {
-                let mut inputs = state.to_vec();
-                inputs.extend_from_slice(input);
-                inputs.push(time.clone());
-                inputs.extend_from_slice(&self.parameters);
-                replay(&equations.program, &inputs)
-            }
-            (None, prior) => {
-                let mlp = prior.as_ref().expect("a prior is equations or a network");
-                let outputs = columns(mlp.forward(q, qd, input));
-                match mlp.on() {
-                    ResidualOn::Accelerations => qd.iter().cloned().chain(outputs).collect(),
-                    ResidualOn::Derivative => outputs,
-                }
-            }
-        };
-        let mlp = self.residual.as_ref();
-        let residual = mlp.map(|mlp| mlp.forward(q, qd, input));
+        let mut rates = self.prior(state, input, time);
+        let (q, qd) = state.split_at(self.model.joints());
+        let residual = self.model.residual.as_ref();
+        let residual = residual.map(|mlp| mlp.forward(q, qd, input));
         if let Some(residual) = residual.clone() {
             let parts = columns(residual);
             let first = rates.len() - parts.len();
@@ -76,5 +48,27 @@ impl<'m> Unpacked<'m> {
             }
         }
         Derivative { rates, residual }
+    }
+
+    /// The rates without the residual.
+    fn prior(&self, state: &[Tensor<1>], input: &[Tensor<1>], time: &Tensor<1>) -> Vec<Tensor<1>> {
+        match (&self.model.structure().equations, &self.model.prior) {
+            (Some(equations), _) => {
+                let mut inputs = state.to_vec();
+                inputs.extend_from_slice(input);
+                inputs.push(time.clone());
+                inputs.extend_from_slice(&self.parameters);
+                replay(&equations.program, &inputs)
+            }
+            (None, prior) => {
+                let (q, qd) = state.split_at(self.model.joints());
+                let mlp: &Mlp = prior.as_ref().expect("a prior is equations or a network");
+                let outputs = columns(mlp.forward(q, qd, input));
+                match mlp.on() {
+                    ResidualOn::Accelerations => qd.iter().cloned().chain(outputs).collect(),
+                    ResidualOn::Derivative => outputs,
+                }
+            }
+        }
     }
 }

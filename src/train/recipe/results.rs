@@ -113,7 +113,7 @@ fn error_on(model: &HybridModel, run: &Training, segments: &Segments) -> Result<
     let scale = settings.error_scale.as_deref();
     let objective = Objective::new(settings.integrator, scale, model.joints())?;
     let batch = objective.all(segments, &model.device());
-    let [error, _] = objective.loss(model, &batch);
+    let [error, _] = objective.evaluate(model, &batch);
     Ok(error)
 }
 

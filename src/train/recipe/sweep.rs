@@ -1,9 +1,11 @@
+use std::ops::ControlFlow;
+
 use serde::Serialize;
 
 use super::{Job, Kind, Recipe, RecipeError};
 use crate::model::MlpWeights;
 use crate::runs::{Purpose, stream};
-use crate::train::{Penalty, Sweep, Variant};
+use crate::train::{FitSettings, HybridModel, Penalty, TrainError, Trained, Training};
 
 /// What sets one model of a sweep apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -15,38 +17,11 @@ pub struct Member {
 }
 
 impl Job {
-    /// Trains many models at once, all on the data of this job. Each starts from the weights that a job of its own seed
-    /// would draw.
+    /// That a sweep can train these models.
     ///
     /// # Errors
-    /// A model without a network, whose copies would all be equal; weights for a penalty that does not take them; settings
-    /// out of range.
-    ///
-    /// # Panics
-    /// If `members` is empty.
-    pub fn sweep(&self, members: &[Member]) -> Result<Sweep, RecipeError> {
-        self.check(members)?;
-        let made = self.model.structure().networks.last();
-        let made = made.expect("only models of equations alone have no network");
-        let variants = members.iter().map(|member| self.variant(made, member));
-        Ok(Sweep::new(
-            &self.model,
-            self.recipe.fit.clone(),
-            variants.collect(),
-        )?)
-    }
-
-    fn variant(&self, made: &MlpWeights, member: &Member) -> Variant {
-        let Recipe { kind, fit, .. } = &self.recipe;
-        let mut rng = stream(member.seed, Purpose::RecipeNetwork);
-        Variant {
-            network: made.redrawn(kind.last_layer(), &mut rng),
-            penalty_weight: member.alpha.unwrap_or(fit.penalty.initial()),
-            order: stream(member.seed, Purpose::RecipeOrder),
-        }
-    }
-
-    fn check(&self, members: &[Member]) -> Result<(), RecipeError> {
+    /// A model without a network, whose copies would all be equal; weights for a penalty that does not take them.
+    pub fn check_members(&self, members: &[Member]) -> Result<(), RecipeError> {
         let Self { recipe, .. } = self;
         let with_alpha = members.iter().any(|member| member.alpha.is_some());
         let no_alpha = |reason| RecipeError::NoAlpha {
@@ -69,16 +44,56 @@ impl Job {
             _ => Ok(()),
         }
     }
+
+    /// Trains one model of a sweep on the data of this job, from the weights that a job of the model's own seed would draw.
+    /// `after_epoch` is called after each epoch.
+    ///
+    /// # Errors
+    /// Settings that are out of range. A model that diverges is no error.
+    pub fn train_member(
+        &self,
+        member: &Member,
+        after_epoch: &mut dyn FnMut(),
+    ) -> Result<Trained, TrainError> {
+        let fit = &self.recipe.fit;
+        let settings = FitSettings {
+            penalty: fit
+                .penalty
+                .from(member.alpha.unwrap_or(fit.penalty.initial())),
+            ..fit.clone()
+        };
+        let order = stream(member.seed, Purpose::RecipeOrder);
+        let mut run = Training::new(self.redrawn(member.seed)?, settings, order)?;
+        let ended = run.run(&self.data.training, None, &mut |_| {
+            after_epoch();
+            ControlFlow::Continue(())
+        });
+        match ended {
+            Ok(_) => Ok(Trained::of(&run)),
+            Err(TrainError::Diverged { .. }) => Ok(Trained::diverged(&run.model())),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The job's model with the network that a job of another seed would draw.
+    fn redrawn(&self, seed: u64) -> Result<HybridModel, TrainError> {
+        let Recipe { kind, .. } = &self.recipe;
+        let mut weights = self.model.weights();
+        let network = weights.residual.as_mut().or(weights.prior.as_mut());
+        let network: &mut MlpWeights = network.expect("models of a sweep have a network");
+        let mut rng = stream(seed, Purpose::RecipeNetwork);
+        *network = network.redrawn(kind.last_layer(), &mut rng);
+        Ok(self.model.with_weights(&weights)?)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use super::Member;
-    use crate::model::Library;
-    use crate::train::Backend;
+    use crate::model::{Library, MlpWeights, ModelWeights};
     use crate::train::recipe::{Job, Recipe};
+    use crate::train::{Backend, HybridModel};
 
     #[test]
     fn a_member_begins_with_the_weights_of_its_own_job() {
@@ -89,12 +104,16 @@ mod tests {
                 Job::train(recipe, &Library::built_in(), Backend::NdArray, seed).unwrap()
             };
             let (first, own) = (job(4), job(5));
-            let network = |job: &Job| job.model.structure().networks.last().unwrap().clone();
-            let (seed, alpha) = (5, None);
-            let variant = first.variant(&network(&first), &Member { seed, alpha });
-            assert_eq!(variant.network.layers, network(&own).layers);
-            assert_ne!(variant.network.layers, network(&first).layers);
-            assert_eq!(variant.network.scaling, network(&first).scaling);
+            let network = |model: &HybridModel| -> MlpWeights {
+                let ModelWeights {
+                    prior, residual, ..
+                } = model.weights();
+                residual.or(prior).unwrap()
+            };
+            let redrawn = network(&first.redrawn(5).unwrap());
+            assert_eq!(redrawn.layers, network(&own.model).layers);
+            assert_ne!(redrawn.layers, network(&first.model).layers);
+            assert_eq!(redrawn.scaling, network(&first.model).scaling);
         }
     }
 }

@@ -124,17 +124,17 @@ fn missing_and_damaged_files_are_named() {
 fn a_damaged_optimiser_state_is_refused() {
     let (_parent, dir) = saved();
     let load = || message(&dir);
-    let path = dir.join("optimizer.safetensors");
+    let path = dir.join("optimizer.bpk");
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     assert!(
-        load().starts_with("the checkpoint's file \"optimizer.safetensors\" is damaged ("),
+        load().starts_with("the checkpoint's file \"optimizer.bpk\" is damaged ("),
         "{}",
         load()
     );
     fs::write(&path, b"").unwrap();
     assert!(
-        load().starts_with("the checkpoint's file \"optimizer.safetensors\" is damaged ("),
+        load().starts_with("the checkpoint's file \"optimizer.bpk\" is damaged ("),
         "{}",
         load()
     );
@@ -151,12 +151,12 @@ fn edit(dir: &Path, from: &str, to: &str) {
 #[test]
 fn another_format_and_another_shape_are_refused() {
     let (_parent, dir) = saved();
-    edit(&dir, "\"format\": 2", "\"format\": 7");
+    edit(&dir, "\"format\": 3", "\"format\": 7");
     let version = env!("CARGO_PKG_VERSION");
     assert_eq!(
         message(&dir),
         format!(
-            "the checkpoint has format 7, this program reads format 2; use the residyn that wrote it \
+            "the checkpoint has format 7, this program reads format 3; use the residyn that wrote it \
              (version {version}) or train again, in DIR"
         )
     );

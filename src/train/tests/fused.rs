@@ -5,12 +5,12 @@ use std::path::Path;
 use burn::tensor::Device;
 use rand::RngExt;
 
-use super::{fit, hybrid, hybrid_of, one_joint, parameter, rng, transitions};
+use super::{
+    Gradient, fit, gradient, hybrid, hybrid_of, one_joint, parameter, rng, run, transitions,
+};
 use crate::model::{Angles, Dynamics, LastLayer, Library, MlpSettings, MlpWeights, ResidualOn};
 use crate::sim::Integrator;
-use crate::train::loss::Gradient;
-use crate::train::stacked::StackedSweep;
-use crate::train::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Variant};
+use crate::train::{Backend, Batch, FitSettings, HybridModel, Objective, Segments, Training};
 
 /// Segments of `steps` irregular steps that lead through random states.
 pub(super) fn segments(joints: usize, count: usize, steps: usize) -> Segments {
@@ -69,13 +69,9 @@ fn models(joints: usize, device: &Device) -> Vec<HybridModel> {
 }
 
 /// The loss and its gradient with weights of a training.
-fn gradient(model: &HybridModel, batch: &Batch, objective: &Objective) -> Gradient {
-    let of_norm = if model.structure().has_residual {
-        1.3
-    } else {
-        0.0
-    };
-    objective.gradient(model, batch, [0.7, of_norm])
+fn weighted(model: &HybridModel, batch: &Batch, objective: &Objective) -> Gradient {
+    let of_norm = if model.residual.is_some() { 1.3 } else { 0.0 };
+    gradient(objective, model, batch, [0.7, of_norm])
 }
 
 fn norm(numbers: impl Iterator<Item = f32>) -> f64 {
@@ -88,16 +84,20 @@ fn assert_agrees(model: &HybridModel, segments: &Segments, integrator: Integrato
     let objective = Objective::new(integrator, Some(&scale), model.joints()).unwrap();
     let fused = objective.all(segments, &model.device());
     assert!(matches!(fused, Batch::Blocks(_)));
-    let found = gradient(model, &fused, &objective);
+    let found = weighted(model, &fused, &objective);
     let objective = objective.composed();
     let composed = objective.all(segments, &model.device());
     assert!(matches!(composed, Batch::Columns(_)));
-    let wanted = gradient(model, &composed, &objective);
+    let wanted = weighted(model, &composed, &objective);
     for (found, wanted) in found.loss.iter().zip(wanted.loss) {
         assert!((found - wanted).abs() <= 1e-5 * wanted, "{found} {wanted}");
     }
-    for (found, wanted) in found.by_numbers.iter().zip(&wanted.by_numbers) {
-        assert_eq!(found.len(), wanted.len());
+    let (found, wanted) = (found.by_numbers, wanted.by_numbers);
+    assert_eq!(found.len(), wanted.len());
+    // The physical parameters and the networks, whose slopes differ in size.
+    let parameters = model.declared().len();
+    for part in [0..parameters, parameters..wanted.len()] {
+        let (found, wanted) = (&found[part.clone()], &wanted[part]);
         let off = norm(found.iter().zip(wanted).map(|(a, b)| a - b));
         let size = norm(wanted.iter().copied());
         assert!(
@@ -156,7 +156,7 @@ fn a_diverging_rollout_makes_the_loss_infinite_or_nan() {
     let objective = Objective::new(Integrator::RK4, None, 1).unwrap();
     let batch = objective.all(&segments, &model.device());
     for model in [model.clone(), model.with_residual(&residual).unwrap()] {
-        let [error, _] = objective.loss(&model, &batch);
+        let [error, _] = objective.evaluate(&model, &batch);
         assert!(!error.is_finite(), "{error}");
     }
 }
@@ -186,14 +186,10 @@ fn fused_and_composed_runs_reach_the_same_error() {
         epochs: 300,
         ..FitSettings::default()
     };
-    let variant = Variant {
-        network: model.weights().residual.unwrap(),
-        penalty_weight: settings.penalty.initial(),
-        order: rng(3),
-    };
-    // A sweep composes its loss of Burn's operations.
-    let mut sweep = StackedSweep::new(&model, settings.clone(), vec![variant]).unwrap();
-    let composed = sweep.run(&segments, &mut |_| ()).unwrap().remove(0);
+    let mut composed = Training::new(model.clone(), settings.clone(), rng(3)).unwrap();
+    composed.objective = composed.objective.composed();
+    run(&mut composed, &segments);
+    let composed = composed.history().last().unwrap().clone();
     let training = fit(model, &segments, settings);
     let fused = training.history().last().unwrap();
     // Rounding grows over 300 steps of Adam to some 1e-3.

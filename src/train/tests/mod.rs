@@ -4,19 +4,24 @@ mod checkpoints;
 mod environment;
 mod fused;
 mod gradients;
+mod module;
+mod optimizers;
 mod parity;
 mod recovery;
 mod resume;
 mod shrinking;
-mod sweep;
 
 use std::ops::ControlFlow;
 
-use burn::tensor::Device;
+use burn::module::{Module, ModuleVisitor, Param};
+use burn::optim::GradientsParams;
+use burn::tensor::{Device, Tensor};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Backend, Ended, FitSettings, HybridModel, Segments, Training};
+use super::hybrid::vector;
+use super::loss::numbers;
+use super::{Backend, Batch, Ended, FitSettings, HybridModel, Objective, Segments, Training};
 use crate::expr::{Graph, Scope, SignForm, parse};
 use crate::model::{Dynamics, LastLayer, MlpSettings, MlpWeights, Parameter};
 
@@ -123,4 +128,47 @@ pub(super) fn fit(model: HybridModel, segments: &Segments, settings: FitSettings
 pub(super) fn run(training: &mut Training, segments: &Segments) {
     let ended = training.run(segments, None, &mut |_| ControlFlow::Continue(()));
     assert_eq!(ended.unwrap(), Ended::Finished);
+}
+
+/// A loss with its gradient.
+pub(super) struct Gradient {
+    /// E and ||F_r||.
+    pub loss: [f64; 2],
+    /// Of their weighted sum, by the numbers of the physical parameters and of each network, in Burn's order.
+    pub by_numbers: Vec<f32>,
+}
+
+/// The loss, and the gradient of the sum of its parts times `weights`.
+pub(super) fn gradient(
+    objective: &Objective,
+    model: &HybridModel,
+    batch: &Batch,
+    weights: [f64; 2],
+) -> Gradient {
+    let loss = objective.loss(model, batch);
+    let total = (loss.clone() * vector(&weights, &loss.device())).sum();
+    let gradients = GradientsParams::from_grads(total.backward(), model);
+    let mut flat = FlatGradient {
+        gradients: &gradients,
+        numbers: Vec::new(),
+    };
+    model.visit(&mut flat);
+    Gradient {
+        loss: numbers(loss),
+        by_numbers: flat.numbers,
+    }
+}
+
+/// The entries of all gradients, and zero for each number without one.
+struct FlatGradient<'g> {
+    gradients: &'g GradientsParams,
+    numbers: Vec<f32>,
+}
+
+impl ModuleVisitor for FlatGradient<'_> {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let gradient = self.gradients.get::<D>(param.id);
+        let gradient = gradient.unwrap_or_else(|| param.val().inner().zeros_like());
+        self.numbers.extend(gradient.into_data().iter::<f32>());
+    }
 }

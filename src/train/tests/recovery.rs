@@ -83,7 +83,7 @@ fn a_network_learns_the_dynamics_and_then_serves_as_prior() {
     let error = |k: usize, training: &Training| training.history()[k].error;
     assert!(error(3, &offline) < 0.02 * error(0, &offline));
 
-    let prior = offline.model().clone();
+    let prior = offline.model();
     let tuned = prior.with_residual(&new(LastLayer::Zero)).unwrap();
     let tuned = fit(tuned, &transitions(300, -0.5, 2), short);
     assert!(tuned.history()[0].residual_norm < 1e-5);

@@ -1,21 +1,6 @@
-//! What goes into a sweep, and what comes out of it, for each model.
-
-use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::Training;
-use crate::model::MlpWeights;
-
-/// What distinguishes one model of a sweep.
-#[derive(Debug, Clone)]
-pub struct Variant {
-    /// In place of the network of the sweep's model.
-    pub network: MlpWeights,
-    /// alpha, or the first lambda.
-    pub penalty_weight: f64,
-    /// Orders the minibatches.
-    pub order: ChaCha8Rng,
-}
+use super::{HybridModel, Training};
 
 /// A model of a sweep after its training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,13 +37,6 @@ impl From<Stored> for Trained {
     }
 }
 
-/// The progress of a sweep.
-#[derive(Debug, Clone, Copy)]
-pub struct SweepProgress {
-    /// Models that had diverged when last counted.
-    pub diverged: usize,
-}
-
 impl Trained {
     /// The end of a run that did not diverge.
     pub(super) fn of(run: &Training) -> Self {
@@ -68,6 +46,16 @@ impl Trained {
             residual_norm: last.residual_norm,
             parameters: last.parameters.clone(),
             diverged: false,
+        }
+    }
+
+    /// The end of a run that diverged in `model`.
+    pub(super) fn diverged(model: &HybridModel) -> Self {
+        Self {
+            error: f64::NAN,
+            residual_norm: f64::NAN,
+            parameters: model.weights().parameters,
+            diverged: true,
         }
     }
 }
