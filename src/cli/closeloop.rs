@@ -12,7 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::call::{Begun, files};
-use super::{Answer, Common, inputs, interrupt, progress, voice};
+use super::{Answer, Common, inputs, interrupt, progress, remedy, voice};
 use crate::closeloop::{
     Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, close_loop,
 };
@@ -146,7 +146,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             true => report::curves(&report),
             false => Vec::new(),
         };
-        let summary = report::summary(&report, &outcome.seconds, &arguments.out, &curves);
+        let words = report::Words {
+            remedy: &remedy::of_finding,
+            predict: &remedy::prediction,
+        };
+        let summary = report::summary(&report, &outcome.seconds, &arguments.out, &curves, &words);
         voice::answer(report::answer(&report), &summary)?;
     }
     Ok(answer(&outcome))
