@@ -154,6 +154,47 @@ fn logs_without_motion_get_an_answer() {
 }
 
 #[test]
+fn a_model_of_more_parameters_than_can_be_fitted_is_refused() {
+    let scratch = Scratch::new();
+    let names: Vec<String> = (1..=600).map(|k| format!("b{k}")).collect();
+    let terms = names
+        .iter()
+        .enumerate()
+        .map(|(k, name)| format!("{name} * sin({} * q1)", k + 1));
+    let bias = terms.collect::<Vec<_>>().join(" + ");
+    let declared: String = names
+        .iter()
+        .map(|name| format!("{name} = {{ value = 0.01 }}\n"))
+        .collect();
+    let text = MASS_AND_BIAS
+        .replace("m * sin(q1)", &bias)
+        .replace("[dynamics]", &format!("{declared}\n[dynamics]"));
+    let (model, log) = (
+        scratch.file("sines.toml", text),
+        scratch.log("log.csv", swinging),
+    );
+    let told = refuses(&[
+        "closeloop",
+        "--model",
+        &model,
+        "--train",
+        &log,
+        "--out",
+        &scratch.out(),
+    ]);
+    says(
+        &told,
+        &[
+            "note: ",
+            "grows with the cube",
+            "arm has 602 free parameters",
+            "at most 500",
+            "`fixed = true`",
+        ],
+    );
+}
+
+#[test]
 fn a_log_in_which_one_joint_of_two_rests_gets_an_answer() {
     let scratch = Scratch::new();
     let mut log = "time,q1,q2,qd1,qd2,tau1,tau2\n".to_owned();

@@ -148,7 +148,7 @@ fn of_study(error: &StudyError) -> Option<&'static str> {
         StudyError::NotOfMotion => {
             Some("leave --calibrate out, or compare the motion with --errors motion")
         }
-        StudyError::Fit(_) => None,
+        StudyError::TooManyParameters { .. } | StudyError::Fit(_) => None,
     }
 }
 

@@ -2,6 +2,7 @@ use thiserror::Error;
 
 use crate::data::Quantity;
 use crate::identify::FitError;
+use crate::limits::FITTED_PARAMETERS;
 use crate::model::Model;
 
 /// Why the loop could not be closed at all.
@@ -26,6 +27,11 @@ pub enum StudyError {
         "calibrating simulates motion, and here torques were compared; do not calibrate, or compare the motion"
     )]
     NotOfMotion,
+    #[error(
+        "{model} has {free} free parameters, and at most {FITTED_PARAMETERS} are fitted at once; mark those that are known \
+         `fixed = true`"
+    )]
+    TooManyParameters { model: String, free: usize },
     #[error("{0}")]
     Fit(#[from] FitError),
 }

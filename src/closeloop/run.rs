@@ -20,6 +20,7 @@ use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
 use crate::data::{Audit, Finding, Log, Repeated, Severity, audit_together, tell_repeats};
+use crate::limits::FITTED_PARAMETERS;
 use crate::model::{Library, Status};
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
@@ -43,6 +44,11 @@ pub fn close_loop(
         budget,
         learner,
     } = request;
+    let free = model.free_parameters();
+    if free > FITTED_PARAMETERS {
+        let model = model.name.clone();
+        return Err(StudyError::TooManyParameters { model, free });
+    }
     let mut split = split.in_order();
     let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
     let mut clock = Clock::start();
