@@ -8,6 +8,8 @@ pub const FORMULA_CHAIN: usize = 1000;
 pub const MODEL_TERMS: usize = 20_000;
 /// Parameters of a model, its intermediates, or its effects.
 pub const MODEL_NAMES: usize = 1000;
+/// Free parameters of a model that closing the loop fits at once: the time of a fit grows with the cube of their number.
+pub const FITTED_PARAMETERS: usize = 500;
 /// Joints of a model: enough for every serial arm, and a limit that catches slips such as `joints = 100`.
 pub const JOINTS: usize = 12;
 /// Elements of a robot description within each other, and joints behind each other.

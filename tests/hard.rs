@@ -102,6 +102,29 @@ pub fn ends_without(arguments: &[&str]) -> String {
     message
 }
 
+/// A model of one joint that gives a mass and a bias, so that its motion is compared with its torques.
+const MASS_AND_BIAS: &str = r#"
+[system]
+name = "arm"
+joints = 1
+
+[parameters]
+J = { value = 0.1, unit = "kg m^2", positive = true }
+m = { value = 2.0, unit = "N m" }
+
+[dynamics]
+mass = [["J"]]
+bias = ["m * sin(q1)"]
+"#;
+
+/// A robot description of one link, which becomes a chain of bodies.
+const ONE_LINK: &str = r#"<robot name="link">
+<link name="base"/>
+<link name="link"><inertial><origin xyz="0 0 -0.3"/><mass value="1"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+<joint name="joint" type="continuous"><parent link="base"/><child link="link"/><axis xyz="0 1 0"/></joint>
+</robot>"#;
+
 #[test]
 fn logs_without_motion_get_an_answer() {
     let scratch = Scratch::new();
@@ -110,19 +133,89 @@ fn logs_without_motion_get_an_answer() {
         scratch.log("rest.csv", |_| [0.3, 0.0, 0.0]),
         scratch.log("pushed.csv", |time| [0.0, 0.0, 0.01 * time.sin()]),
     ];
-    for log in logs {
+    let (urdf, chain) = (
+        scratch.file("link.urdf", ONE_LINK),
+        scratch.path("link.toml"),
+    );
+    succeeds(&["new", "--from-urdf", &urdf, "--out", text(&chain)]);
+    let models = [
+        "pendulum",
+        &scratch.file("arm.toml", MASS_AND_BIAS),
+        text(&chain),
+    ];
+    let each = models
+        .into_iter()
+        .flat_map(|model| logs.iter().map(move |log| (model, log)));
+    for (model, log) in each {
         let out = scratch.out();
-        let told = answers(&[
-            "closeloop",
-            "--model",
-            "pendulum",
-            "--train",
-            &log,
-            "--out",
-            &out,
-        ]);
-        assert!(told.contains("no joint moves visibly"), "{told}");
+        let told = answers(&["closeloop", "--model", model, "--train", log, "--out", &out]);
+        assert!(told.contains("no joint moves visibly"), "{model}: {told}");
     }
+}
+
+#[test]
+fn a_model_of_more_parameters_than_can_be_fitted_is_refused() {
+    let scratch = Scratch::new();
+    let names: Vec<String> = (1..=600).map(|k| format!("b{k}")).collect();
+    let terms = names
+        .iter()
+        .enumerate()
+        .map(|(k, name)| format!("{name} * sin({} * q1)", k + 1));
+    let bias = terms.collect::<Vec<_>>().join(" + ");
+    let declared: String = names
+        .iter()
+        .map(|name| format!("{name} = {{ value = 0.01 }}\n"))
+        .collect();
+    let text = MASS_AND_BIAS
+        .replace("m * sin(q1)", &bias)
+        .replace("[dynamics]", &format!("{declared}\n[dynamics]"));
+    let (model, log) = (
+        scratch.file("sines.toml", text),
+        scratch.log("log.csv", swinging),
+    );
+    let told = refuses(&[
+        "closeloop",
+        "--model",
+        &model,
+        "--train",
+        &log,
+        "--out",
+        &scratch.out(),
+    ]);
+    says(
+        &told,
+        &[
+            "note: ",
+            "grows with the cube",
+            "arm has 602 free parameters",
+            "at most 500",
+            "`fixed = true`",
+        ],
+    );
+}
+
+#[test]
+fn a_log_in_which_one_joint_of_two_rests_gets_an_answer() {
+    let scratch = Scratch::new();
+    let mut log = "time,q1,q2,qd1,qd2,tau1,tau2\n".to_owned();
+    for row in 0..600 {
+        let time = 0.01 * f64::from(row);
+        let [q, qd, tau] = swinging(time);
+        writeln!(log, "{time:?},{q:?},0,{qd:?},0,{tau:?},0").unwrap();
+    }
+    let (log, out) = (scratch.file("log.csv", log), scratch.out());
+    let told = answers(&[
+        "closeloop",
+        "--budget",
+        "0s",
+        "--model",
+        "acrobot",
+        "--train",
+        &log,
+        "--out",
+        &out,
+    ]);
+    assert!(told.contains("joint 2, 0.5 s ahead"), "{told}");
 }
 
 #[test]

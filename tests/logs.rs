@@ -10,7 +10,7 @@ use residyn::data::{Columns, Remedy, Severity, audit};
 use residyn::expr::SignForm;
 use residyn::model::Origin;
 use residyn::plant::Plant;
-use residyn::report::{Report, summary};
+use residyn::report::{self, Report, Words, summary};
 use residyn::{Library, Log, Model, Outcome, Request, Settings, Verdict, close_loop};
 use serde_json::Value;
 
@@ -498,7 +498,8 @@ fn serious_findings_stand_before_the_answer() {
     each(&mut opposite.tau[0], |tau| -tau);
     let outcome = closed(&whole_model(), vec![opposite], vec![recorded("b.csv", 2)]);
     let report = Report::new(&outcome, &Origin::of_seed(0));
-    let printed = summary(&report, &outcome.seconds, Path::new("report"), &[]);
+    let words = Words::default();
+    let printed = summary(&report, &outcome.seconds, Path::new("report"), &[], &words);
     assert!(
         printed.starts_with("Serious, to be mended first: opposite.csv: "),
         "{printed}"
@@ -507,4 +508,34 @@ fn serious_findings_stand_before_the_answer() {
     let mended =
         r#"tau1 has the opposite sign ([columns] tau = [{ column = "tau1", factor = -1 }])"#;
     assert!(whole.contains(mended), "{printed}");
+}
+
+#[test]
+fn a_test_log_that_was_fitted_is_said_to_be_no_test() {
+    let run = || vec![recorded("run.csv", 1)];
+    let tests = vec![recorded("again.csv", 1), recorded("b.csv", 2)];
+    let outcome = closed(&whole_model(), run(), tests);
+    let report = Report::new(&outcome, &Origin::of_seed(0));
+    let words = Words::default();
+    let fitted = "again.csv was fitted as well: its error says how well the models fit, not how well they predict.";
+    let shown = [
+        report::text(&report),
+        report::page(&report),
+        summary(&report, &[], Path::new("report"), &[], &words),
+    ];
+    for shown in shown {
+        let whole = shown.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(whole.contains(fitted), "{shown}");
+        assert!(!whole.contains("nothing was fitted"), "{shown}");
+    }
+    let json = serde_json::to_value(&report).unwrap();
+    assert_eq!(
+        json["error"]["fitted_logs"],
+        serde_json::json!(["again.csv"])
+    );
+    let apart = closed(&whole_model(), run(), vec![recorded("b.csv", 2)]);
+    let report = Report::new(&apart, &Origin::of_seed(0));
+    assert!(report::page(&report).contains("to which nothing was fitted"));
+    let json = serde_json::to_value(&report).unwrap();
+    assert_eq!(json["error"]["fitted_logs"], Value::Null);
 }

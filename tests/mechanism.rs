@@ -322,7 +322,7 @@ fn anything_but_a_serial_chain_is_refused_with_place_and_remedy() {
             "planar_2r.urdf",
             "</robot>",
             "<link name=\"x\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link><joint name=\"j\" type=\"revolute\"><parent link=\"upper\"/><child link=\"x\"/></joint></robot>",
-            &["line 34", "branches", "`fore` and `x`", "--tip, as `upper`"],
+            &["line 34", "branches", "`fore` and `x`", "such as `upper`"],
         ),
         (
             "planar_2r.urdf",

@@ -22,6 +22,7 @@ mod experiments;
 mod export;
 mod export_c;
 mod export_fmu;
+mod flags;
 mod folders;
 mod front_door;
 mod functions;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -13,13 +13,17 @@ use pyo3::prelude::*;
 /// How long Ctrl-C may go unheard.
 const LISTEN_EVERY: Duration = Duration::from_millis(50);
 
+/// How far work may run ahead of what Python has heard of it: where the progress of some epoch ends a training, the
+/// training ends there and not long after.
+const AHEAD: usize = 16;
+
 /// How long to wait for work that is to stop, so that Ctrl-C has its effect within a second.
 const GRACE: Duration = Duration::from_millis(800);
 
 /// What long work tells of its progress to.
 #[derive(Clone)]
 pub struct Listener<M> {
-    messages: Sender<M>,
+    messages: SyncSender<M>,
     stopped: Arc<AtomicBool>,
 }
 
@@ -34,7 +38,7 @@ impl<M> Listener<M> {
         }
     }
 
-    /// Tell of progress, and hear whether to go on.
+    /// Tell of progress, and hear whether to go on; waits where Python is far behind.
     pub fn tell_or_stop(&self, message: M) -> ControlFlow<()> {
         match !self.stopped.load(Ordering::Relaxed) && self.messages.send(message).is_ok() {
             true => ControlFlow::Continue(()),
@@ -56,7 +60,7 @@ where
     T: Send + 'static,
     M: Send + 'static,
 {
-    let (messages, mut inbox) = channel();
+    let (messages, mut inbox) = sync_channel(AHEAD);
     let stopped = Arc::new(AtomicBool::new(false));
     let listener = Listener {
         messages,
@@ -73,7 +77,16 @@ where
             Err(why) => Ok(why == RecvTimeoutError::Timeout),
         }
     };
-    while listen().inspect_err(|_| stop(py, &stopped, &worker))? {}
+    let listened = loop {
+        match listen() {
+            Ok(true) => {}
+            Ok(false) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
+    // Work that waits to be heard goes on.
+    drop(inbox);
+    listened.inspect_err(|_| stop(py, &stopped, &worker))?;
     let ended = py.detach(|| worker.join());
     Ok(ended.unwrap_or_else(|panic| resume_unwind(panic)))
 }

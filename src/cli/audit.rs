@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use super::{Answer, Common, inputs, voice};
+use super::{Answer, Common, inputs, remedy, voice};
 use crate::data::{Audit, Columns, Log, Severity, audit_together, tell_repeats};
 use crate::model::Library;
 
@@ -32,7 +32,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
         voice::print(&(serde_json::to_string_pretty(&audits)? + "\n"))?;
     } else {
         for audit in &audits {
-            voice::answer(headline(audit), &format!("{audit}\n"))?;
+            let text = audit.told(&|remedy| format!("paste: {}", remedy::of_finding(remedy)));
+            voice::answer(headline(audit), &format!("{text}\n"))?;
         }
     }
     let serious = audits.iter().any(|audit| audit.serious().next().is_some());

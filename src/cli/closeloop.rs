@@ -12,7 +12,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::call::{Begun, files};
-use super::{Answer, Common, inputs, interrupt, progress, voice};
+use super::{Answer, Common, inputs, interrupt, progress, remedy, voice};
 use crate::closeloop::{
     Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, close_loop,
 };
@@ -86,6 +86,9 @@ impl From<Errors> for Space {
     }
 }
 
+/// With more free parameters than this a model takes minutes.
+const MANY_PARAMETERS: usize = 150;
+
 /// The demo rig: its plant file is embedded, so that the program needs nothing but itself.
 const DEMO: &str = include_str!("../../configs/demo.toml");
 
@@ -146,7 +149,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
             true => report::curves(&report),
             false => Vec::new(),
         };
-        let summary = report::summary(&report, &outcome.seconds, &arguments.out, &curves);
+        let words = report::Words {
+            remedy: &remedy::of_finding,
+            predict: &remedy::prediction,
+        };
+        let summary = report::summary(&report, &outcome.seconds, &arguments.out, &curves, &words);
         voice::answer(report::answer(&report), &summary)?;
     }
     Ok(answer(&outcome))
@@ -164,6 +171,14 @@ fn kept(out: &Path, written: &Arc<AtomicBool>) -> impl Fn() -> String + Send + '
 fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(Model, Split)> {
     let declared = library.model(model)?;
     inputs::print_findings(model, &declared, arguments.common.seed);
+    if declared.free_parameters() > MANY_PARAMETERS {
+        voice::say(format!(
+            "note: {}: {} free parameters are fitted at once; the time of a fit grows with the cube of their number, and is \
+             less where those that are known are `fixed = true`",
+            model.display(),
+            declared.free_parameters()
+        ));
+    }
     let mut train = inputs::logs(&arguments.train, &declared)?;
     let mut test = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::Args;
 
-use super::voice;
+use super::{remedy, voice};
 use crate::data::{Columns, LeaveOut, Log, audit_together, leave_out};
 use crate::limits::RUNS;
 use crate::model::check::Severity;
@@ -122,7 +122,8 @@ pub(super) fn print_notes_and_faults<'l>(
     for (log, audit) in logs.into_iter().zip(audits) {
         print_notes([log]);
         for finding in audit.serious() {
-            voice::say(format!("serious: {}: {finding}", log.name()));
+            let told = finding.told(&remedy::of_finding);
+            voice::say(format!("serious: {}: {told}", log.name()));
         }
     }
 }

@@ -1,18 +1,31 @@
 use std::error::Error;
 use std::io::{self, ErrorKind};
+use std::path::Path;
 
 use anyhow::Chain;
 
 use crate::bench::GridError;
 use crate::bench::rigs::RigsError;
+use crate::closeloop::StudyError;
 use crate::control::NoTask;
+use crate::data::Remedy;
 use crate::experiment::ExperimentError;
 use crate::files::OutputError;
+use crate::formats::ExportError;
+use crate::model::{FileError, FileRemedy};
 use crate::runs::{MergeError, RunFolderError};
 use crate::train::recipe::RecipeError;
 
 /// The error number of too many open files, the same on all Unix systems.
 const EMFILE: i32 = 24;
+
+/// How to predict a log that a fit has not seen.
+pub(super) fn prediction(model: &Path) -> String {
+    format!(
+        "predict another log: residyn evaluate --model {} --test LOG",
+        model.display()
+    )
+}
 
 /// What to do about an error, in terms of the command line, of which the library knows nothing.
 pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
@@ -25,6 +38,17 @@ pub(super) fn remedy(error: &(dyn Error + 'static)) -> Option<&'static str> {
         .or_else(|| error.downcast_ref().and_then(of_experiment))
         .or_else(|| error.downcast_ref().and_then(of_grid))
         .or_else(|| error.downcast_ref().and_then(of_rigs))
+        .or_else(|| error.downcast_ref().and_then(of_file))
+        .or_else(|| error.downcast_ref().and_then(of_study))
+        .or_else(|| error.downcast_ref().and_then(of_export))
+}
+
+/// What mends a finding about a log, as it is to be pasted.
+pub(super) fn of_finding(remedy: &Remedy) -> String {
+    match remedy {
+        Remedy::LeaveOut(spans) => format!("--leave-out {}", spans.join(" ")),
+        Remedy::Columns(_) => remedy.to_string(),
+    }
 }
 
 /// What to do where nothing more fits on a disk.
@@ -107,4 +131,27 @@ fn of_rigs(error: &RigsError) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+fn of_file(error: &FileError) -> Option<&'static str> {
+    error.remedy.map(|remedy| match remedy {
+        FileRemedy::Tip => "--tip names the last body",
+    })
+}
+
+fn of_study(error: &StudyError) -> Option<&'static str> {
+    match error {
+        StudyError::NoTest { .. } => Some("--test names the test logs"),
+        StudyError::NoTorques { .. } | StudyError::Commanded { .. } => {
+            Some("--errors motion compares the motion")
+        }
+        StudyError::NotOfMotion => {
+            Some("leave --calibrate out, or compare the motion with --errors motion")
+        }
+        StudyError::TooManyParameters { .. } | StudyError::Fit(_) => None,
+    }
+}
+
+fn of_export(error: &ExportError) -> Option<&'static str> {
+    matches!(error, ExportError::Delay { .. }).then_some("--step gives it")
 }

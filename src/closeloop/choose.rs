@@ -3,7 +3,7 @@
 use super::select::usual_friction;
 use super::study::Study;
 use crate::data::Log;
-use crate::data::statistics::upper_median;
+use crate::data::statistics::{mean, upper_median};
 use crate::identify::{Window, cut, fit_torques};
 use crate::model::{Effect, Model};
 use crate::sim::FIT_S;
@@ -23,7 +23,7 @@ impl Study<'_> {
         self.tells_more_of_torques(library).unwrap_or(false)
     }
 
-    /// `None` where there are no torques to tell.
+    /// `None` where there are no torques to tell, or no motion.
     fn tells_more_of_torques(&self, library: &[Effect]) -> Option<bool> {
         let own = &self.declared.effects;
         let friction = usual_friction(self, library);
@@ -36,7 +36,7 @@ impl Study<'_> {
             return Some(true);
         }
         let far = self.settings.fit.prescribed * torque;
-        if self.motion_error(&fitted.model) < far {
+        if self.motion_error(&fitted.model)? < far {
             return Some(false);
         }
         // Torques may be fitted well by what cannot move like the rig.
@@ -45,11 +45,12 @@ impl Study<'_> {
             ..self.again()
         };
         let by_motion = by_motion.fit_declared(&[]).ok()?;
-        Some(self.motion_error(&by_motion.model) >= far)
+        Some(self.motion_error(&by_motion.model)? >= far)
     }
 
-    /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them.
-    fn motion_error(&self, model: &Model) -> f64 {
+    /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them; of the
+    /// joints that move at all, `None` where none does.
+    fn motion_error(&self, model: &Model) -> Option<f64> {
         let windows = cut(self.logs, self.settings.fit.window_s);
         let every = windows.len().div_ceil(self.settings.fit.sample_windows);
         let windows: Vec<Window> = windows.into_iter().step_by(every.max(1)).collect();
@@ -63,11 +64,10 @@ impl Study<'_> {
                 .zip(&ways)
                 .filter(|(_, way)| **way > AT_REST * farthest);
             let shares: Vec<f64> = moving.map(|(error, way)| error.position[j] / way).collect();
-            upper_median(&shares)
+            (!shares.is_empty()).then(|| upper_median(&shares))
         };
-        let joints = model.joints;
-        let mean = (0..joints).map(share).sum::<f64>() / joints as f64;
-        mean.sqrt()
+        let shares: Vec<f64> = (0..model.joints).filter_map(share).collect();
+        (!shares.is_empty()).then(|| mean(&shares).sqrt())
     }
 }
 

@@ -122,10 +122,7 @@ impl Evidence {
         let significant =
             self.p_alone() < level || self.gain > settings.plain && p < settings.significant_alone;
         if self.gain < settings.worthwhile {
-            return Some(format!(
-                "it lowers the loss on left-out stretches by {:.1} % only",
-                100.0 * self.gain
-            ));
+            return Some(too_small(self.gain));
         }
         if !significant {
             return Some(format!(
@@ -140,5 +137,28 @@ impl Evidence {
                 -100.0 * self.crossed_gain, self.p_of_falls
             )
         })
+    }
+}
+
+/// That an effect changes the loss on left-out stretches by too little; a negative gain is a rise.
+fn too_small(gain: f64) -> String {
+    let percent = 100.0 * gain.abs();
+    match gain < 0.0 {
+        true => format!("it raises the loss on left-out stretches by {percent:.1} %"),
+        false => format!("it lowers the loss on left-out stretches by {percent:.1} % only"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::too_small;
+
+    #[test]
+    fn a_loss_that_rises_is_said_to_rise() {
+        let raises = "it raises the loss on left-out stretches by 2.3 %";
+        assert_eq!(too_small(-0.0234), raises);
+        let lowers = "it lowers the loss on left-out stretches by 0.4 % only";
+        assert_eq!(too_small(0.0041), lowers);
+        assert_eq!(too_small(0.0), lowers.replace("0.4", "0.0"));
     }
 }

@@ -1,5 +1,7 @@
 //! Stage 3: fit the declared model.
 
+use std::collections::BTreeSet;
+
 use super::error::StudyError;
 use super::fitted::Fitted;
 use super::select::usual_friction;
@@ -172,8 +174,7 @@ impl Study<'_> {
         let values = Values::of(&dynamics, self.logs);
         let end = self.end_of_declared();
         let bodies = self.declared.inertias().concat();
-        let readiness = |parameter| self.readiness(parameter);
-        let mut verdict = identifiability(&dynamics, readiness, &values, &fitted.fit);
+        let mut verdict = identifiability(&dynamics, self.readiness(), &values, &fitted.fit);
         let known = verdict.hold.len() + verdict.determined;
         // Combinations that nothing tells and nothing holds are of bodies, or else of effects.
         let open = if bodies.is_empty() {
@@ -192,8 +193,8 @@ impl Study<'_> {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
         let covariance = uncertainty(&self.shooting, &fitted.fit).covariance;
-        let readiness = |parameter| self.readiness(parameter);
-        open(&dynamics, readiness, &values, &fitted.fit, &covariance)
+        let fit = &fitted.fit;
+        open(&dynamics, self.readiness(), &values, fit, &covariance)
     }
 
     /// Index behind the parameters of the declared equations and of the effects that the file carries.
@@ -203,9 +204,12 @@ impl Study<'_> {
 
     /// Parameters of the equations are held before those of effects that the file carries, and nothing else is. What nothing
     /// tells of a body stays as it is declared, and so does the body.
-    fn readiness(&self, parameter: usize) -> Option<usize> {
-        let mut bodies = self.declared.inertias().into_iter().flatten();
-        let is_held = parameter < self.end_of_declared() && bodies.all(|part| part != parameter);
-        is_held.then(|| usize::from(parameter >= self.declared.parameters.len()))
+    fn readiness(&self) -> impl Fn(usize) -> Option<usize> {
+        let (of_equations, end) = (self.declared.parameters.len(), self.end_of_declared());
+        let bodies: BTreeSet<usize> = self.declared.inertias().into_iter().flatten().collect();
+        move |parameter| {
+            let is_held = parameter < end && !bodies.contains(&parameter);
+            is_held.then(|| usize::from(parameter >= of_equations))
+        }
     }
 }

@@ -46,6 +46,8 @@ pub struct Given {
     /// The training logs as they were fitted: with readings that jump masked and dropped rows put in or left out.
     pub studied: Vec<Log>,
     pub test: Vec<Log>,
+    /// Names of the test logs that are training logs once more: they were fitted, and test nothing.
+    pub fitted_tests: Vec<String>,
     pub split: SplitMethod,
     /// Of the training logs, then of the test logs.
     pub audits: Vec<Audit>,

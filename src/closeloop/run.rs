@@ -15,10 +15,12 @@ use super::request::Request;
 use super::score::{Scored, Scorer, contradicted, findings};
 use super::select::is_of_too_many;
 use super::space::Space;
+use super::split::Split;
 use super::stage::{Clock, Observer, Progress, Stage};
 use super::study::Study;
 use super::verdict::verdict;
-use crate::data::{Audit, Finding, Log, Severity, audit_together, tell_repeats};
+use crate::data::{Audit, Finding, Log, Repeated, Severity, audit_together, tell_repeats};
+use crate::limits::FITTED_PARAMETERS;
 use crate::model::{Library, Status};
 
 /// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
@@ -42,6 +44,11 @@ pub fn close_loop(
         budget,
         learner,
     } = request;
+    let free = model.free_parameters();
+    if free > FITTED_PARAMETERS {
+        let model = model.name.clone();
+        return Err(StudyError::TooManyParameters { model, free });
+    }
     let mut split = split.in_order();
     let deadline = budget.and_then(|budget| Instant::now().checked_add(budget));
     let mut clock = Clock::start();
@@ -92,7 +99,7 @@ pub fn close_loop(
         tell_pushes(&test_study, &forces, &mut of_test);
     }
     let mut audits = [of_train, of_test].concat();
-    tell_repeats(split.train.iter().chain(&split.test), &mut audits);
+    let fitted_tests = tell_fitted_tests(&split, &mut audits);
     let learned = learn(&refined, learner, rng, progress);
     progress(Stage::Score.into());
     let by_log = study.by_log(&found.chosen.after);
@@ -140,6 +147,7 @@ pub fn close_loop(
         given: Given {
             train: split.train,
             test: split.test,
+            fitted_tests,
             split: split.method,
             audits,
             settings: settings.clone(),
@@ -149,6 +157,18 @@ pub fn close_loop(
             studied,
         },
     })
+}
+
+/// Say in the audits which logs repeat each other; the test logs that are training logs once more.
+fn tell_fitted_tests(split: &Split, audits: &mut [Audit]) -> Vec<String> {
+    let trained = split.train.len();
+    let repeated = tell_repeats(split.train.iter().chain(&split.test), audits);
+    let of_test = split.test.iter().zip(&repeated[trained..]);
+    let is_fitted = |repeated: &Repeated| repeated.is_identical() && repeated.place < trained;
+    of_test
+        .filter(|(_, repeated)| repeated.as_ref().is_some_and(is_fitted))
+        .map(|(log, _)| log.name())
+        .collect()
 }
 
 /// What fits read of logs; of long ones their audits say so.

@@ -34,8 +34,8 @@ mod trajectory;
 
 pub(crate) use audit::reversed_driving;
 pub use audit::{
-    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Response, Severity, TorqueDemand,
-    TorqueLag, VelocityCheck, audit, audit_together, tell_repeats,
+    Audit, Channel, Finding, JointAudit, MAX_LAG_S, Remedy, Repeated, Response, Severity,
+    TorqueDemand, TorqueLag, VelocityCheck, audit, audit_together, tell_repeats,
 };
 pub use channels::Channels;
 pub use column::{Column, Quantity};

@@ -68,8 +68,11 @@ pub(crate) fn median_of(mut values: Vec<f64>) -> f64 {
 }
 
 /// The middle value, or the upper of the two middle ones: the robust scale of a fit, where their mean would cost a
-/// second pass and say no more.
+/// second pass and say no more. 0 of no values.
 pub(crate) fn upper_median(values: &[f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
     nth(values, values.len() / 2)
 }
 
@@ -111,7 +114,7 @@ pub(crate) fn quartiles(values: &[f64]) -> [f64; 3] {
     })
 }
 
-/// The value that would stand at a place, from 0, if the values were sorted.
+/// The value that would stand at a place, from 0, if the values were sorted; there has to be one.
 fn nth(values: &[f64], place: usize) -> f64 {
     *values
         .to_vec()
@@ -162,6 +165,7 @@ mod tests {
         assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
         assert_eq!(upper_median(&[4.0, 1.0, 2.0, 3.0]), 3.0);
+        assert_eq!(upper_median(&[]), 0.0);
         assert_eq!(quantile(&[5.0, 1.0, 3.0], 1.0), 5.0);
         assert_eq!(quantile(&[], 0.5), 0.0);
         assert_eq!(mad(&[1.0, 1.0, 2.0, 100.0, 1.0]), 0.0);

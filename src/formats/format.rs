@@ -63,11 +63,7 @@ impl RobotReader {
         let mut chain = (self.read)(file, tip)?;
         if let Some(name) = drive {
             let found = ReadyDrive::find(Library::drives(), name);
-            chain.drive = Some(found.map_err(|message| FileError {
-                path: file.to_owned(),
-                place: None,
-                message,
-            })?);
+            chain.drive = Some(found.map_err(|message| FileError::new(file, None, message))?);
         }
         let name = Path::new(&chain.name);
         let model = Model::from_text(name, &model_text(&chain), Library::built_in().effects())?;
@@ -93,6 +89,17 @@ pub enum ExportError {
         format: &'static str,
         system: String,
         reason: String,
+    },
+    #[error(
+        "a model of `{system}` cannot be written as {format}: the delay of joint {joint} is {delay_s:?} s, and at most \
+         {DELAY_STEPS} steps of {step_s:?} s are remembered; give a longer step"
+    )]
+    Delay {
+        format: &'static str,
+        system: String,
+        joint: Joint,
+        delay_s: f64,
+        step_s: f64,
     },
     #[error("{0}")]
     Write(#[from] OutputError),
@@ -130,11 +137,13 @@ impl Format {
         for joint in Joint::all(model.joints()) {
             let delay_s = model.filter(joint, CommandFilter::Delay).unwrap_or(0.0);
             if !(delay_s / step_s <= DELAY_STEPS as f64) {
-                let reason = format!(
-                    "the delay of joint {joint} is {delay_s:?} s, and at most {DELAY_STEPS} steps of {step_s:?} s are remembered; \
-                     give a longer --step"
-                );
-                return Err(model.refused(self.name, reason));
+                return Err(ExportError::Delay {
+                    system: model.name().to_owned(),
+                    format: self.name,
+                    joint,
+                    delay_s,
+                    step_s,
+                });
             }
         }
         Ok(())

@@ -22,20 +22,18 @@ pub(in crate::formats) struct Source<'x> {
 
 /// The text of a file.
 pub(in crate::formats) fn text(path: &Path) -> Result<String, FileError> {
-    read_text(path).map_err(|error| FileError {
-        path: path.to_owned(),
-        place: None,
-        message: format!("cannot be read: {error}; give an XML file"),
+    read_text(path).map_err(|error| {
+        let message = format!("cannot be read: {error}; give an XML file");
+        FileError::new(path, None, message)
     })
 }
 
 impl<'x> Source<'x> {
     pub fn new(path: &Path, text: &'x str) -> Result<Self, FileError> {
         crowd::check(path, text)?;
-        let document = Document::parse(text).map_err(|error| FileError {
-            path: path.to_owned(),
-            place: Some(place(&error, text)),
-            message: format!("this is not valid XML: {error}"),
+        let document = Document::parse(text).map_err(|error| {
+            let message = format!("this is not valid XML: {error}");
+            FileError::new(path, Some(place(&error, text)), message)
         })?;
         Ok(Self {
             path: path.to_owned(),
@@ -113,11 +111,8 @@ impl<'x> Source<'x> {
     /// An error at a position, in bytes from the beginning of the file.
     pub fn error_at(&self, at: usize, message: impl Into<String>) -> FileError {
         let place = self.document.text_pos_at(at);
-        FileError {
-            path: self.path.clone(),
-            place: Some((place.row as usize, place.col as usize)),
-            message: message.into(),
-        }
+        let place = (place.row as usize, place.col as usize);
+        FileError::new(&self.path, Some(place), message)
     }
 
     /// An error at an attribute of an element.

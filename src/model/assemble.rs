@@ -112,6 +112,12 @@ impl Model {
         parameters
     }
 
+    /// How many parameters fits may change, those of effects among them.
+    pub fn free_parameters(&self) -> usize {
+        let all = self.all_parameters();
+        all.iter().filter(|parameter| !parameter.fixed).count()
+    }
+
     fn filters(&self) -> Vec<Filter> {
         let filter = |(effect, place): (&FittedEffect, Range<usize>)| match effect.effect.entry {
             Entry::Command(kind) => Some(Filter {

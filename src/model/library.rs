@@ -141,10 +141,9 @@ fn embedded<T>(folder: &str, read: impl Fn(&Path, &str) -> Result<T, FileError>)
 /// # Errors
 /// Unreadable folder.
 pub fn effect_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
-    let unreadable = |error: std::io::Error| FileError {
-        path: folder.to_owned(),
-        place: None,
-        message: format!("cannot be read as a folder of effects: {error}"),
+    let unreadable = |error: std::io::Error| {
+        let message = format!("cannot be read as a folder of effects: {error}");
+        FileError::new(folder, None, message)
     };
     let entries = std::fs::read_dir(folder).map_err(unreadable)?;
     let mut paths: Vec<PathBuf> = entries

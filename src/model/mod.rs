@@ -38,7 +38,7 @@ pub use network::{
     Angles, InputScaling, LastLayer, LayerWeights, MlpSettings, MlpWeights, NetworkError,
     ResidualOn,
 };
-pub use reader::FileError;
+pub use reader::{FileError, FileRemedy};
 pub use ready_drive::ReadyDrive;
 pub(crate) use residual::nothing_but;
 pub use residual::with_residual;

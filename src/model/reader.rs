@@ -18,6 +18,40 @@ pub struct FileError {
     /// Line and column, counted from 1; `None` where the error concerns the whole file.
     pub place: Option<(usize, usize)>,
     pub message: String,
+    /// What the caller can give otherwise to mend it.
+    pub remedy: Option<FileRemedy>,
+}
+
+/// What mends an error in a file besides the file itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FileRemedy {
+    /// Another last body of the chain that is read from a robot description.
+    Tip,
+}
+
+impl FileError {
+    pub(crate) fn new(
+        path: &Path,
+        place: Option<(usize, usize)>,
+        message: impl Into<String>,
+    ) -> Self {
+        Self {
+            path: path.to_owned(),
+            place,
+            message: message.into(),
+            remedy: None,
+        }
+    }
+
+    /// The same error, which this mends as well.
+    #[must_use]
+    pub(crate) fn mended_by(self, remedy: FileRemedy) -> Self {
+        Self {
+            remedy: Some(remedy),
+            ..self
+        }
+    }
 }
 
 impl std::error::Error for FileError {}
@@ -63,11 +97,8 @@ impl Document {
     }
 
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        let text = read_text(path).map_err(|error| FileError {
-            path: path.to_owned(),
-            place: None,
-            message: format!("cannot be read: {error}"),
-        })?;
+        let text = read_text(path)
+            .map_err(|error| FileError::new(path, None, format!("cannot be read: {error}")))?;
         Ok(Self::new(path, &text))
     }
 
@@ -89,11 +120,7 @@ impl Document {
         let before = &self.text[..self.text.floor_char_boundary(at)];
         let line = before.matches('\n').count() + 1;
         let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-        FileError {
-            path: self.path.clone(),
-            place: Some((line, column)),
-            message: message.into(),
-        }
+        FileError::new(&self.path, Some((line, column)), message)
     }
 
     pub fn formula_error(&self, at: usize, error: &FormulaError) -> FileError {

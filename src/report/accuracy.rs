@@ -64,6 +64,20 @@ pub(super) fn about_models(has_friction: bool) -> String {
 const ABOUT_ZEROED: &str = " \"Zeroed\" is the model with effects where the zeros of each test log's sensors are estimated on \
                             its first second, and scored on the rest: what a rig gives that is zeroed before a run.";
 
+/// That test logs were fitted as well, which the errors on them do not test; `None` where none was.
+pub(super) fn fitted_tests(report: &Report) -> Option<String> {
+    let fitted = &report.error.fitted_logs;
+    let (were, their, say) = match fitted.len() {
+        0 => return None,
+        1 => ("was", "its error", "says"),
+        _ => ("were", "their errors", "say"),
+    };
+    Some(format!(
+        "{} {were} fitted as well: {their} {say} how well the models fit, not how well they predict.",
+        listed(fitted)
+    ))
+}
+
 /// What was compared, as a sentence.
 pub(super) fn compared(report: &Report) -> String {
     match report.compared {
@@ -93,9 +107,10 @@ pub(super) fn torques(report: &Report) -> String {
     let models = scored_torques(errors);
     let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let mut out = format!(
-        "## Torque error on the test logs\n\nRoot mean square of the difference between the torques that the logged motion needs \
+        "## Torque error on the test logs\n\n{}Root mean square of the difference between the torques that the logged motion needs \
          and those logged, both low-passed, in N m (N where a joint slides). {}\n\n\
          | joint | {} | with effects / fitted |\n|---|{}---|\n",
+        not_tested(report),
         about_models(errors.with_friction.is_some()),
         names.join(" | "),
         "---|".repeat(names.len())
@@ -253,6 +268,11 @@ pub(super) fn zeroed_in_vain(error: &ErrorEntry) -> Option<String> {
     })
 }
 
+/// [`fitted_tests`] as a paragraph above a table.
+fn not_tested(report: &Report) -> String {
+    fitted_tests(report).map_or_else(String::new, |sentence| format!("{sentence}\n\n"))
+}
+
 /// A paragraph, where there is something to say.
 fn paragraph(sentence: Option<String>) -> String {
     sentence.map_or_else(String::new, |sentence| format!("\n{sentence}\n"))
@@ -262,9 +282,10 @@ pub(super) fn errors(report: &Report) -> String {
     let models = scored(report);
     let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let mut out = format!(
-        "## Open-loop error on the test logs\n\nRoot mean square of the position error in {}; in brackets the median over \
+        "## Open-loop error on the test logs\n\n{}Root mean square of the position error in {}; in brackets the median over \
          windows. {}{}\n\n\
          | horizon | joint | windows | {} | with effects / fitted |\n|---|---|---|{}---|\n",
+        not_tested(report),
         position_unit(report),
         about_models(report.error.with_friction.is_some()),
         [

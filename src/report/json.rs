@@ -286,6 +286,7 @@ fn errors(outcome: &Outcome) -> ErrorEntry {
     let errors = &outcome.errors;
     ErrorEntry {
         logs: "test".to_owned(),
+        fitted_logs: outcome.given.fitted_tests.clone(),
         horizons_s: errors.before.horizons.iter().map(|h| h.horizon_s).collect(),
         unscored_s: outcome.given.unscored_s.clone(),
         declared: model(&errors.declared),

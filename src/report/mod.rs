@@ -28,7 +28,7 @@ pub use folder::{ReadError, WriteError, write};
 pub use model_file::model_file;
 pub use page::{ResultsPage, Share, page};
 pub use schema::{Report, schema};
-pub use summary::{answer, curves, summary};
+pub use summary::{Words, answer, curves, summary};
 pub use tensorboard::EventFile;
 pub use text::text;
 pub(crate) use wording::digits;

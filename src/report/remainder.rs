@@ -74,7 +74,7 @@ pub(super) fn network(report: &Report) -> String {
 
 fn proposed(proposal: &Proposal) -> String {
     format!(
-        "{}.\nSupported only by its fit. As an effect file, for a folder given with `--effects`:\n\n\
+        "{}.\nSupported only by its fit. As an effect file, for a folder of effects of your own:\n\n\
          ```toml\n{}```\n\n",
         capitalised(&proposal_line(proposal)),
         proposal.file

@@ -96,11 +96,11 @@ pub struct Report {
     pub(super) tried: Vec<Vec<TriedEntry>>,
     /// number of candidates in each round
     pub(super) candidates: Vec<usize>,
-    /// whether the search was stopped because its time was spent (--budget)
+    /// whether the search was stopped because its time was spent
     pub(super) stopped: bool,
     /// errors by which the residual network is used or not; null where none is trained
     pub(super) network: Option<NetworkCheck>,
-    /// what the training logs could show (--calibrate); null where it was not asked for
+    /// what the training logs could show, by simulations of the accepted model; null where it was not asked for
     pub(super) calibration: Option<CalibrationEntry>,
     pub(super) shown: ShownEntry,
     /// paths in the folder of this report
@@ -311,6 +311,10 @@ pub(super) struct TorqueEntry {
 pub(super) struct ErrorEntry {
     #[schemars(extend("const" = "test"))]
     pub logs: String,
+    /// test logs that are training logs once more: they were fitted, and their errors test nothing; left out where there are
+    /// none
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fitted_logs: Vec<String>,
     #[schemars(length(min = 1), extend("items" = json!({"type": "number", "exclusiveMinimum": 0})))]
     pub horizons_s: Vec<f64>,
     /// horizons that were asked for, but are longer than any stretch of the test logs
@@ -329,7 +333,7 @@ pub(super) struct ErrorEntry {
     pub zeroed: Option<ModelError>,
     /// with a network trained on what is left; null where none was trained
     pub hybrid: Option<ModelError>,
-    /// the models given with --against, as they are
+    /// the models given to compare with, as they are
     pub against: Vec<ContenderEntry>,
     /// 95 % interval of the relative reduction of the position error, before to after; null where the logs are too few
     pub reduction_ci95: Option<[f64; 2]>,

@@ -24,7 +24,7 @@ impl Backend {
         Self::Cuda,
     ];
 
-    /// The name that `--device` takes.
+    /// Its name in settings and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::NdArray => "ndarray",

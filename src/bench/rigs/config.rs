@@ -71,7 +71,7 @@ pub struct Rig {
     pub declared: Declared,
     pub logs: Vec<String>,
     pub test: Test,
-    /// Intervals that are neither fitted nor scored, as `--leave-out` takes them.
+    /// Intervals that are neither fitted nor scored, each as `LOG@T0-T1`.
     pub leave_out: Vec<String>,
     /// Effects on every joint.
     pub plain: Vec<String>,

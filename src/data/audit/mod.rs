@@ -24,7 +24,7 @@ pub use demand::TorqueDemand;
 pub use joint::JointAudit;
 pub(crate) use misread::reversed_driving;
 pub use quality::{Audit, Finding, Remedy, Severity};
-pub use repeats::tell_repeats;
+pub use repeats::{Repeated, tell_repeats};
 pub use response::Response;
 
 use std::ops::Range;

@@ -98,7 +98,7 @@ pub struct Finding {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
-    /// Arguments of `--leave-out`.
+    /// Intervals to leave out, each as `LOG@T0-T1`.
     LeaveOut(Vec<String>),
     /// Lines of the model file, in the table `[columns]`.
     Columns(Vec<String>),
@@ -142,6 +142,15 @@ impl Finding {
         }
     }
 
+    /// The sentence, and in brackets what mends it, in the words of the caller, or else where it is so.
+    pub(crate) fn told(&self, words: RemedyWords<'_>) -> String {
+        let more = self.remedy.as_ref().map(words);
+        match more.or_else(|| self.place()) {
+            Some(more) => format!("{} ({more})", self.text),
+            None => self.text.clone(),
+        }
+    }
+
     /// Where it is in the log, `t = 2 to 3.2 s, 5 to 6 s and shorter`; `None` where it concerns the whole log.
     pub(super) fn place(&self) -> Option<String> {
         let told = longest(self.spans_s.clone(), TOLD_SPANS);
@@ -159,6 +168,9 @@ fn ends(span: &Interval) -> [f64; 2] {
     [span.start_s, span.end_s]
 }
 
+/// How the program that shows a finding calls what mends it.
+pub(crate) type RemedyWords<'w> = &'w dyn Fn(&Remedy) -> String;
+
 /// The longest of some stretches, in the order of time.
 fn longest(mut spans: Vec<[f64; 2]>, most: usize) -> Vec<[f64; 2]> {
     spans.sort_by(|a, b| (b[1] - b[0]).total_cmp(&(a[1] - a[0])));
@@ -173,21 +185,16 @@ fn seconds(time_s: f64) -> f64 {
 }
 
 impl fmt::Display for Finding {
-    /// The sentence, and in brackets what to paste, or else where it is so.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)?;
-        let more = self.remedy.as_ref().map(Remedy::to_string);
-        more.or_else(|| self.place())
-            .iter()
-            .try_for_each(|more| write!(f, " ({more})"))
+        f.write_str(&self.told(&Remedy::to_string))
     }
 }
 
 impl fmt::Display for Remedy {
-    /// `--leave-out run1.csv@4.2-5`, or `[columns] time = { column = "time", unit = "ms" }`.
+    /// `leave out run1.csv@4.2-5`, or `[columns] time = { column = "time", unit = "ms" }`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::LeaveOut(spans) => write!(f, "--leave-out {}", spans.join(" ")),
+            Self::LeaveOut(spans) => write!(f, "leave out {}", spans.join(" ")),
             Self::Columns(lines) => write!(f, "[columns] {}", lines.join("; ")),
         }
     }

@@ -14,26 +14,58 @@ const IDENTICAL: f64 = 1e-9;
 /// A log that is shorter than this share of another repeats no more than a part of it.
 const WHOLE: f64 = 0.8;
 
-/// Say of each log which one before it has the same motion: as a test of the other it tells how well torques repeat, and
-/// nothing of other motions.
-pub fn tell_repeats<'l>(logs: impl IntoIterator<Item = &'l Log>, audits: &mut [Audit]) {
-    let mut before: Vec<&Log> = Vec::new();
-    for (log, audit) in logs.into_iter().zip(audits) {
-        let moves = motion(log);
-        let mut alike = before
-            .iter()
-            .filter_map(|other| Some((other, difference(log, moves, other)?)));
-        if let Some((other, share)) = alike.next() {
-            let name = other.name();
-            audit.add(finding(&name, share));
-            audit.repeats = Some(name);
-        }
-        before.push(log);
+/// A log before another one that has the same motion.
+#[derive(Debug, Clone, Copy)]
+pub struct Repeated {
+    /// Its place among the logs.
+    pub place: usize,
+    /// The root mean square of what the angles differ by, as a share of the motion.
+    share: f64,
+}
+
+impl Repeated {
+    /// Whether the two are one log rather than two of the same motion.
+    pub fn is_identical(&self) -> bool {
+        self.share < IDENTICAL
     }
 }
 
-fn finding(name: &str, share: f64) -> Finding {
-    if share < IDENTICAL {
+/// Say of each log which one before it has the same motion, and return that one: as a test of the other it tells how well
+/// torques repeat, and nothing of other motions. A log that is the same comes before one that only moves alike.
+pub fn tell_repeats<'l>(
+    logs: impl IntoIterator<Item = &'l Log>,
+    audits: &mut [Audit],
+) -> Vec<Option<Repeated>> {
+    let logs: Vec<&Log> = logs.into_iter().collect();
+    let repeated: Vec<Option<Repeated>> = (0..logs.len())
+        .map(|place| repeated(&logs[..place], logs[place]))
+        .collect();
+    for (repeated, audit) in repeated.iter().zip(audits) {
+        if let Some(repeated) = repeated {
+            let name = logs[repeated.place].name();
+            audit.add(finding(&name, repeated));
+            audit.repeats = Some(name);
+        }
+    }
+    repeated
+}
+
+fn repeated(before: &[&Log], log: &Log) -> Option<Repeated> {
+    let moves = motion(log);
+    let alike = |(place, other): (usize, &&Log)| {
+        let share = difference(log, moves, other)?;
+        Some(Repeated { place, share })
+    };
+    let mut alike = before.iter().enumerate().filter_map(alike);
+    let first = alike.next()?;
+    let identical = std::iter::once(first)
+        .chain(alike)
+        .find(Repeated::is_identical);
+    Some(identical.unwrap_or(first))
+}
+
+fn finding(name: &str, repeated: &Repeated) -> Finding {
+    if repeated.is_identical() {
         let text = format!(
             "every angle is that of {name}: this is the same log once more, and no test of what was fitted to the other"
         );
@@ -42,7 +74,7 @@ fn finding(name: &str, share: f64) -> Finding {
     let text = format!(
         "the motion is that of {name} once more (the angles differ by {} % of it): one of the two as a test of the other tells \
          how well torques repeat, and nothing of other motions",
-        short(100.0 * share)
+        short(100.0 * repeated.share)
     );
     Finding::new(Severity::Warning, text)
 }
@@ -111,19 +143,35 @@ mod tests {
             log("c.csv", 0.0, 2.3, 0.0),
             log("d.csv", 0.0, 2.0, 0.1),
             log("e.csv", 7.0, 2.3, 0.0),
+            log("f.csv", 9.0, 2.0, 0.004),
         ];
         let mut audits: Vec<_> = logs
             .iter()
             .map(|log| audit(log, &Columns::default()))
             .collect();
-        tell_repeats(&logs, &mut audits);
+        let repeated = tell_repeats(&logs, &mut audits);
         let told = |words: &str| -> Vec<bool> {
             let says = |audit: &Audit| audit.findings.iter().any(|f| f.text.contains(words));
             audits.iter().map(says).collect()
         };
         let repeats = told("the motion is that of a.csv once more");
-        assert_eq!(repeats, [false, true, false, false, false]);
+        assert_eq!(repeats, [false, true, false, false, false, false]);
         let is_same = told("every angle is that of c.csv");
-        assert_eq!(is_same, [false, false, false, false, true]);
+        assert_eq!(is_same, [false, false, false, false, true, false]);
+        // Of a log that moves alike and one that is the same, the latter is named.
+        let is_same = told("every angle is that of b.csv");
+        assert_eq!(is_same, [false, false, false, false, false, true]);
+        let places = repeated
+            .iter()
+            .map(|repeated| repeated.map(|of| (of.place, of.is_identical())));
+        let found = [
+            None,
+            Some((0, false)),
+            None,
+            None,
+            Some((2, true)),
+            Some((1, true)),
+        ];
+        assert_eq!(places.collect::<Vec<_>>(), found);
     }
 }

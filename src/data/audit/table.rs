@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::channel::Channel;
-use super::quality::{Audit, Severity};
+use super::quality::{Audit, Remedy, RemedyWords, Severity};
 use crate::data::column::Quantity;
 use crate::layout::{LABEL, hanging, wrap};
 
@@ -14,14 +14,36 @@ impl fmt::Display for Audit {
     /// Sampling, one line a channel, one line a joint, and the findings; no line is longer than 80
     /// characters, but for a word that is and for what is to be pasted.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.write_sampling(f)?;
-        self.write_channels(f)?;
-        self.write_joints(f)?;
-        self.write_findings(f)
+        let words = |remedy: &Remedy| match remedy {
+            Remedy::LeaveOut(_) => remedy.to_string(),
+            Remedy::Columns(_) => format!("paste: {remedy}"),
+        };
+        self.write(f, &words)
+    }
+}
+
+/// An audit with what mends it in the words of the program that shows it.
+struct InWords<'a>(&'a Audit, RemedyWords<'a>);
+
+impl fmt::Display for InWords<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.write(f, self.1)
     }
 }
 
 impl Audit {
+    /// The same text, where these words say what mends a finding.
+    pub(crate) fn told(&self, words: RemedyWords<'_>) -> String {
+        InWords(self, words).to_string()
+    }
+
+    fn write(&self, f: &mut fmt::Formatter<'_>, words: RemedyWords<'_>) -> fmt::Result {
+        self.write_sampling(f)?;
+        self.write_channels(f)?;
+        self.write_joints(f)?;
+        self.write_findings(f, words)
+    }
+
     fn write_sampling(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let text = format!(
             "{}: {} rows in {} s; steps of {} ms ({} to {}), jitter {} %, {} gap(s)",
@@ -84,7 +106,7 @@ impl Audit {
         Ok(())
     }
 
-    fn write_findings(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write_findings(&self, f: &mut fmt::Formatter<'_>, words: RemedyWords<'_>) -> fmt::Result {
         if self.findings.is_empty() {
             return writeln!(f, "\nno findings");
         }
@@ -100,7 +122,7 @@ impl Audit {
                 f.write_str(&hanging("", &place, WIDTH))?;
             }
             if let Some(remedy) = &finding.remedy {
-                writeln!(f, "{:<LABEL$}  paste: {remedy}", "")?;
+                writeln!(f, "{:<LABEL$}  {}", "", words(remedy))?;
             }
         }
         Ok(())

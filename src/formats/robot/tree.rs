@@ -5,10 +5,10 @@ use nalgebra::Vector3;
 use crate::expr::{listed, suggestion};
 use crate::formats::xml::Source;
 use crate::limits::JOINTS;
-use crate::model::FileError;
 use crate::model::chain::{
     Drivetrain, Follows, Inertia, Joint, Pose, fault, with_z_along, without_inertia,
 };
+use crate::model::{FileError, FileRemedy};
 
 /// A joint in the frame of the body that it moves.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,10 +139,11 @@ fn longest<'b>(source: &Source<'_>, base: &'b Body) -> Result<Vec<&'b Body>, Fil
         };
         if let Some(other) = ends.next() {
             let message = format!(
-                "`{}` branches: both `{}` and `{}` move; name the last body of the chain with --tip, as `{}`",
+                "`{}` branches: both `{}` and `{}` move; name the last body of the chain, such as `{}`",
                 last.name, next.name, other.name, last.name
             );
-            return Err(source.error_at(other.at, message));
+            let error = source.error_at(other.at, message);
+            return Err(error.mended_by(FileRemedy::Tip));
         }
         path.push(next);
     }
@@ -178,10 +179,11 @@ impl<'t> Growth<'t, '_, '_> {
         for hinge in &body.joints {
             if self.joints.len() == JOINTS {
                 let message = format!(
-                    "joint `{}` is one too many: at most {JOINTS} are read; end the chain before it with --tip, or fix the joints that the rig does not use",
+                    "joint `{}` is one too many: at most {JOINTS} are read; end the chain before it, or fix the joints that the rig does not use",
                     hinge.name
                 );
-                return Err(self.source.error_at(hinge.at, message));
+                let error = self.source.error_at(hinge.at, message);
+                return Err(error.mended_by(FileRemedy::Tip));
             }
             let own = Pose {
                 rotation: with_z_along(hinge.axis),
@@ -236,10 +238,11 @@ impl<'t> Growth<'t, '_, '_> {
             let is_leader = |other: &&Hinge| other.name == mimics.leader && other.mimics.is_none();
             let Some(leader) = leaders.position(is_leader) else {
                 let message = format!(
-                    "joint `{}` follows `{}`, which is no joint of the chain that moves by itself; end the chain elsewhere with --tip, or fix the joint",
+                    "joint `{}` follows `{}`, which is no joint of the chain that moves by itself; end the chain elsewhere, or fix the joint",
                     hinge.name, mimics.leader
                 );
-                return Err(self.source.error_at(hinge.at, message));
+                let error = self.source.error_at(hinge.at, message);
+                return Err(error.mended_by(FileRemedy::Tip));
             };
             if hinge.drivetrain != Drivetrain::default() {
                 let note = format!(

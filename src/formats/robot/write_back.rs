@@ -8,8 +8,8 @@ use super::edit::same;
 use crate::data::Joint;
 use crate::formats::xml::Source;
 use crate::formats::{FORMATS, Format, xml};
-use crate::model::chain::{Chain, Drivetrain, Inertia, added, fault, model_text};
-use crate::model::{FileError, FittedEffect, Library, Model};
+use crate::model::chain::{Chain, Drivetrain, Inertia, ValuesError, added, fault, model_text};
+use crate::model::{FileError, FileRemedy, FittedEffect, Library, Model};
 
 /// What a model changes on a joint of the description and on the body that it moves.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,13 +48,10 @@ pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<Writt
     let format = format(file)?;
     let robots = format.robots.as_ref().expect("it was found by what it has");
     let chain = (robots.read)(file, tip)?;
-    let refused = |message: String| FileError {
-        path: file.to_owned(),
-        place: None,
-        message,
-    };
+    let refused = |message: String| FileError::new(file, None, message);
+    let of_other_file = |message| refused(message).mended_by(FileRemedy::Tip);
     let model = model.absorbed();
-    check_joints(&model, &chain).map_err(refused)?;
+    check_joints(&model, &chain).map_err(of_other_file)?;
     let library = Library::built_in();
     let declared = Model::from_text(file, &model_text(&chain), library.effects())?;
     let value = |name: &str| {
@@ -64,7 +61,10 @@ pub fn write_back(model: &Model, file: &Path, tip: Option<&str>) -> Result<Writt
             .find(|p| p.name == name)
             .map(|p| p.value)
     };
-    let added = added(&chain, value).map_err(|error| refused(error.to_string()))?;
+    let added = added(&chain, value).map_err(|error| match error {
+        ValuesError::Missing(_) => of_other_file(error.to_string()),
+        ValuesError::NoBodies => refused(error.to_string()),
+    })?;
     check_equations(&model, &declared).map_err(refused)?;
     let changes = changes(&model, &declared, &chain, &added);
     Ok(WrittenBack {
@@ -101,7 +101,7 @@ fn check_joints(model: &Model, chain: &Chain) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "the chain has the joints {}, {} has {}; give the file that the model was made from, and its --tip",
+        "the chain has the joints {}, {} has {}; give the file that the model was made from, and the same last body",
         of_file.join(", "),
         model.name,
         match of_model[..] {

@@ -15,11 +15,7 @@ pub(super) fn check(path: &Path, text: &str) -> Result<(), FileError> {
         let before = &text[..at];
         let line = before.matches('\n').count() + 1;
         let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
-        FileError {
-            path: path.to_owned(),
-            place: Some((line, column)),
-            message,
-        }
+        FileError::new(path, Some((line, column)), message)
     };
     let (mut at, mut depth, mut namespaces) = (0, 0_usize, 0);
     while let Some(next) = text[at..].find('<') {

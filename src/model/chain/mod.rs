@@ -28,5 +28,5 @@ pub use recursive::{Body, Links, Place};
 pub(crate) use series::rounded;
 pub use spatial::{Inertia, Pose};
 pub(crate) use spatial::{fault, turn, with_z_along};
-pub(crate) use values::added;
+pub(crate) use values::{ValuesError, added};
 pub(crate) use weightless::without_inertia;

@@ -15,7 +15,7 @@ use crate::data;
 #[derive(Debug, Error)]
 pub(crate) enum ValuesError {
     #[error(
-        "the model has no parameter `{0}`: it was not made from this file; give the file that `residyn new` read, and its --tip"
+        "the model has no parameter `{0}`: it was not made from this file; give the file that `residyn new` read, and the same last body"
     )]
     Missing(String),
     #[error(

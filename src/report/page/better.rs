@@ -6,8 +6,8 @@ use super::Section;
 use crate::closeloop::TestLog;
 use crate::data::Joint;
 use crate::report::accuracy::{
-    compared, compared_on_logs, diverged, position_unit, removed, removed_of_motion, repeated,
-    scored, scored_torques, uneven, zeroed_in_vain,
+    compared, compared_on_logs, diverged, fitted_tests, position_unit, removed, removed_of_motion,
+    repeated, scored, scored_torques, uneven, zeroed_in_vain,
 };
 use crate::report::schema::{Report, TorqueEntry};
 use crate::report::wording::{FITTED, WITH_EFFECTS, WITH_FRICTION, capitalised, small};
@@ -22,11 +22,15 @@ pub(super) fn section(report: &Report) -> Section {
         crate::closeloop::Space::Motion => [Some(motion), torque],
         crate::closeloop::Space::Torque => [torque, Some(motion)],
     };
+    let tested = fitted_tests(report).map_or_else(
+        || ", to which nothing was fitted.".to_owned(),
+        |fitted| format!(". {fitted}"),
+    );
     Section {
         id: "better",
         question: "How much better is it?",
         answer: html! {
-            p { "All errors are on the test logs, to which nothing was fitted. \u{201c}" (FITTED) "\u{201d} has its own parameters "
+            p { "All errors are on the test logs" (tested) " \u{201c}" (FITTED) "\u{201d} has its own parameters "
                 "fitted and no effect added: the fair \u{201c}before\u{201d} of every comparison. " (compared(report)) }
             @if report.error.with_friction.is_some() {
                 p { "\u{201c}" (capitalised(WITH_FRICTION)) "\u{201d} has Coulomb and viscous friction on every joint as well: what "

@@ -18,7 +18,7 @@ pub(super) fn section(report: &Report) -> Section {
                 }
                 li { "Use the model: " code { (report.files.model) } " holds the declared equations with fitted values and the effects. "
                     code { "residyn export" } " writes it as C, ONNX, FMU, MJCF and more." }
-                li { "Predict a log that is not among these: " code { "residyn evaluate --model " (report.files.model) " --test LOG" } "." }
+                li { "Predict a log that is not among these: " code { "residyn evaluate" } " takes " code { (report.files.model) } "." }
             }
         },
     }

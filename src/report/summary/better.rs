@@ -1,9 +1,9 @@
 //! How much better: errors on the test logs, one row a joint.
 
-use super::{cut, listed};
+use super::{listed, paragraph};
 use crate::closeloop::Space;
 use crate::data::Joint;
-use crate::report::accuracy::{is_some_reduction, position_unit};
+use crate::report::accuracy::{fitted_tests, is_some_reduction, position_unit};
 use crate::report::schema::{ModelError, Report, TorqueEntry};
 use crate::report::wording::{WITH_FRICTION, small};
 
@@ -13,10 +13,13 @@ const ROWS: usize = 7;
 const OTHERS: usize = 2;
 
 pub(super) fn lines(report: &Report) -> Vec<String> {
-    match (report.compared, &report.torque) {
+    let mut lines = match (report.compared, &report.torque) {
         (Space::Torque, Some(torque)) => of_torques(report, torque),
         _ => of_motion(report),
-    }
+    };
+    let fitted = fitted_tests(report).into_iter();
+    lines.extend(fitted.flat_map(|sentence| paragraph("  ", &sentence)));
+    lines
 }
 
 /// The title, the heads of the columns, the rows, and how much the effects remove.
@@ -38,9 +41,7 @@ fn table(title: &str, rows: Vec<String>, reduction: Option<[f64; 2]>) -> Vec<Str
 
 fn row(name: &str, numbers: [String; 3]) -> String {
     let [written, fitted, with] = numbers;
-    cut(&format!(
-        "  {name:<40.40}{written:>11}{fitted:>11}{with:>14}"
-    ))
+    format!("  {name:<40}{written:>11}{fitted:>11}{with:>14}")
 }
 
 fn of_torques(report: &Report, errors: &TorqueEntry) -> Vec<String> {
@@ -89,6 +90,10 @@ fn of_motion(report: &Report) -> Vec<String> {
     let others: Vec<String> = friction.chain(others).collect();
     let others = listed(others, OTHERS, "models");
     let rows = listed(rows, ROWS - others.len(), "joints");
+    let others = others
+        .iter()
+        .flat_map(|model| paragraph("  ", model))
+        .collect();
     let title = format!(
         "Open-loop errors on the test logs, {}",
         position_unit(report)
@@ -103,8 +108,5 @@ fn contender(report: &Report, name: &str, model: &ModelError) -> String {
         .iter()
         .map(|e| small(*e))
         .collect();
-    cut(&format!(
-        "  {name}, {horizon_s} s ahead: {}",
-        errors.join(", ")
-    ))
+    format!("{name}, {horizon_s} s ahead: {}", errors.join(", "))
 }

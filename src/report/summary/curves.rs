@@ -1,6 +1,6 @@
 //! Small curves of block characters.
 
-use super::cut;
+use super::paragraph;
 use crate::report::schema::Report;
 use crate::report::shown::TracksEntry;
 use crate::report::wording::small;
@@ -26,16 +26,20 @@ pub fn curves(report: &Report) -> Vec<String> {
     }
     let [start, end] =
         [stretch.time.first(), stretch.time.last()].map(|t| t.copied().unwrap_or(0.0));
-    vec![
-        cut(&format!(
-            "  error up to {} of {}, {start:.1} to {end:.1} s of {}:",
-            small(top),
-            errors.quantity,
-            stretch.log
-        )),
-        format!("  {:<14}{}", "fitted", curve(&errors.before, top)),
-        format!("  {:<14}{}", "with effects", curve(&errors.after, top)),
-    ]
+    let title = format!(
+        "error up to {} of {}, {start:.1} to {end:.1} s of {}:",
+        small(top),
+        errors.quantity,
+        stretch.log
+    );
+    let mut lines = paragraph("  ", &title);
+    lines.push(format!("  {:<14}{}", "fitted", curve(&errors.before, top)));
+    lines.push(format!(
+        "  {:<14}{}",
+        "with effects",
+        curve(&errors.after, top)
+    ));
+    lines
 }
 
 /// Distances of predictions from what was measured, where there are any.

@@ -1,4 +1,5 @@
-//! The answer for a terminal, in at most thirty lines of eighty characters: the story of `report.html`, question by question.
+//! The answer for a terminal, in some thirty lines of eighty characters: the story of `report.html`, question by question.
+//! Sentences are broken into lines and never cut; of many things the first are listed.
 
 mod better;
 mod curves;
@@ -10,15 +11,33 @@ use super::json::PAGE;
 use super::schema::{EffectEntry, Report};
 use super::wording::values;
 use crate::closeloop::Stage;
+use crate::data::Remedy;
 use crate::layout::wrap;
 
 pub use self::curves::curves;
 
 const WIDTH: usize = 80;
+/// With more lines than this no curves are drawn.
 const LINES: usize = 30;
-/// Lines about effects at most, and about what to do next.
+/// Lines about effects at most, beyond which they are listed in a line each.
 const EFFECTS: usize = 5;
-const NEXT: usize = 3;
+
+/// How the program that shows an answer calls what its reader can do.
+pub struct Words<'w> {
+    /// What mends a finding about a log.
+    pub remedy: &'w dyn Fn(&Remedy) -> String,
+    /// Predict another log with a model file.
+    pub predict: &'w dyn Fn(&Path) -> String,
+}
+
+impl Default for Words<'_> {
+    fn default() -> Self {
+        Self {
+            remedy: &Remedy::to_string,
+            predict: &|model| format!("predict another log with {}", model.display()),
+        }
+    }
+}
 
 /// The answer in a line.
 pub fn answer(report: &Report) -> String {
@@ -32,31 +51,35 @@ pub fn summary(
     seconds: &[(Stage, f64)],
     folder: &Path,
     drawn: &[String],
+    words: &Words<'_>,
 ) -> String {
-    let mut lines = [head(report), missing(report), better::lines(report)].concat();
-    let trust = trust::lines(report);
-    let room = LINES - 1 - lines.len() - trust.len();
-    let next = paragraph("", &next(report, folder), room.min(NEXT));
-    if drawn.len() + next.len() <= room {
+    let mut lines = [head(report, words), missing(report), better::lines(report)].concat();
+    let rest = [
+        trust::lines(report),
+        paragraph("", &next(report, folder, words)),
+        vec![files(seconds, folder)],
+    ]
+    .concat();
+    if lines.len() + drawn.len() + rest.len() <= LINES {
         lines.extend_from_slice(drawn);
     }
-    let rest = [trust, next, vec![files(seconds, folder)]].concat();
     lines.extend(rest);
     lines.join("\n") + "\n"
 }
 
 /// What is serious about the logs, then the answer.
-fn head(report: &Report) -> Vec<String> {
+fn head(report: &Report, words: &Words<'_>) -> Vec<String> {
     let mut serious = report.serious();
     let first = serious.next().map(|(log, finding)| {
         let more = match serious.count() {
             0 => String::new(),
             more => format!(" (and {more} more in report.md)"),
         };
-        format!("Serious, to be mended first{more}: {log}: {finding}")
+        let told = finding.told(words.remedy);
+        format!("Serious, to be mended first{more}: {log}: {told}")
     });
-    let first = first.map_or_else(Vec::new, |text| paragraph("", &text, 3));
-    [first, paragraph("", &answer(report), 3)].concat()
+    let first = first.map_or_else(Vec::new, |text| paragraph("", &text));
+    [first, paragraph("", &answer(report))].concat()
 }
 
 /// The effects with their sizes; one line each where there are many.
@@ -68,32 +91,29 @@ fn missing(report: &Report) -> Vec<String> {
     let named = |effect: &EffectEntry| format!("{} on joint {}", effect.title, effect.place);
     let whole = report.effects.iter().flat_map(|effect| {
         let added = format!("{}: {}", named(effect), effect.expression);
-        [
-            paragraph("  ", &added, 2),
-            paragraph("    ", &sizes(effect), EFFECTS),
-        ]
-        .concat()
+        [paragraph("  ", &added), paragraph("    ", &sizes(effect))].concat()
     });
     let mut lines: Vec<String> = whole.collect();
-    if lines.len() > EFFECTS {
-        let one = |effect: &EffectEntry| cut(&format!("  {}: {}", named(effect), sizes(effect)));
-        lines = listed(report.effects.iter().map(one).collect(), EFFECTS, "effects");
+    if report.effects.len() > 1 && lines.len() > EFFECTS {
+        let one = |effect: &EffectEntry| format!("{}: {}", named(effect), sizes(effect));
+        let each = report.effects.iter().map(one).collect();
+        let first = listed(each, EFFECTS, "effects");
+        lines = first
+            .iter()
+            .flat_map(|effect| paragraph("  ", effect))
+            .collect();
     }
     [vec!["What is missing?".to_owned()], lines].concat()
 }
 
 /// What to do next.
-fn next(report: &Report, folder: &Path) -> String {
+fn next(report: &Report, folder: &Path, words: &Words<'_>) -> String {
     let told = if report.serious().next().is_some() {
         "mend the logs; `residyn audit` says how".to_owned()
     } else if let Some(rival) = report.alternatives.first() {
         format!("to rule out {}: {}", rival.title, rival.experiment)
     } else {
-        let model = folder.join(&report.files.model);
-        format!(
-            "predict another log: residyn evaluate --model {} --test LOG",
-            model.display()
-        )
+        (words.predict)(&folder.join(&report.files.model))
     };
     format!("What next? {told}")
 }
@@ -108,54 +128,33 @@ fn files(seconds: &[(Stage, f64)], folder: &Path) -> String {
     )
 }
 
-/// At most this many lines, the last of which says how many more there are.
-fn listed(mut lines: Vec<String>, most: usize, what: &str) -> Vec<String> {
-    if lines.len() > most {
-        let more = lines.len() - (most - 1);
-        lines.truncate(most - 1);
-        lines.push(format!("  and {more} more {what} in report.md"));
+/// At most this many entries, the last of which says how many more there are.
+fn listed(mut entries: Vec<String>, most: usize, what: &str) -> Vec<String> {
+    if entries.len() > most {
+        let more = entries.len() - (most - 1);
+        entries.truncate(most - 1);
+        entries.push(format!("  and {more} more {what} in report.md"));
     }
-    lines
+    entries
 }
 
-/// A text in lines with an indent, of which the last ends in dots where there would be more than `most`.
-fn paragraph(indent: &str, text: &str, most: usize) -> Vec<String> {
-    let mut lines = wrap(text, WIDTH - indent.len());
-    if lines.len() > most {
-        let rest = lines.split_off(most - 1).join(" ");
-        lines.push(rest);
-    }
-    let lines = lines
-        .into_iter()
-        .map(|line| cut(&format!("{indent}{line}")));
-    lines.collect()
-}
-
-/// A line that ends in dots where it would be too long.
-fn cut(line: &str) -> String {
-    match line.chars().count() > WIDTH {
-        true => line.chars().take(WIDTH - 3).chain("...".chars()).collect(),
-        false => line.to_owned(),
-    }
+/// A text in lines with an indent.
+fn paragraph(indent: &str, text: &str) -> Vec<String> {
+    let lines = wrap(text, WIDTH - indent.len()).into_iter();
+    lines.map(|line| format!("{indent}{line}")).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{WIDTH, cut, listed, paragraph};
+    use super::{WIDTH, listed, paragraph};
 
     #[test]
-    fn what_is_too_long_ends_in_dots() {
-        assert_eq!(cut("short"), "short");
-        let long = cut(&"x".repeat(100));
-        assert!(
-            long.ends_with("x...") && long.chars().count() == WIDTH,
-            "{long}"
-        );
+    fn what_is_too_long_is_broken_and_not_cut() {
         let words = "word ".repeat(60);
-        let lines = paragraph("  ", &words, 2);
-        assert_eq!(lines.len(), 2);
-        assert!(lines[1].ends_with("..."), "{lines:?}");
-        assert_eq!(paragraph("", "one two", 2), ["one two"]);
+        let lines = paragraph("  ", &words);
+        assert!(lines.iter().all(|line| line.chars().count() <= WIDTH));
+        assert_eq!(lines.join(" ").split_whitespace().count(), 60);
+        assert_eq!(paragraph("", "one two"), ["one two"]);
         let numbered = |n: usize| (0..n).map(|k| k.to_string()).collect::<Vec<_>>();
         assert_eq!(listed(numbered(3), 3, "things"), ["0", "1", "2"]);
         let more = "  and 3 more things in report.md";

@@ -18,9 +18,9 @@ pub(super) fn lines(report: &Report) -> Vec<String> {
         proposal(report),
     ];
     let remarks = remarks.into_iter().flatten().take(REMARKS);
-    let remarks = remarks.flat_map(|text| paragraph("  ", &text, 1));
+    let remarks = remarks.flat_map(|text| paragraph("  ", &text));
     let title = vec!["May I trust it?".to_owned()];
-    [title, paragraph("  ", &structure(report), 2)]
+    [title, paragraph("  ", &structure(report))]
         .into_iter()
         .flatten()
         .chain(remarks)

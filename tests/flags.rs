@@ -1,0 +1,123 @@
+//! Flags belong to the command line: the library says what is wrong without them, and `src/cli` adds which flag mends it.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::hard::Scratch;
+use crate::support::{refuses, says, succeeds};
+
+/// The flags that a text names: `--train` and the like.
+fn flags(text: &str) -> BTreeSet<String> {
+    let named = text.split("--").skip(1).map(|rest| {
+        let is_name = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+        let end = rest.find(|c| !is_name(c)).unwrap_or(rest.len());
+        format!("--{}", &rest[..end])
+    });
+    named.filter(|flag| flag.len() > 2).collect()
+}
+
+/// The flags of all commands, without those that every program has.
+fn own_flags() -> BTreeSet<String> {
+    let mut own = flags(&succeeds(&["completions", "bash"]));
+    for general in ["--help", "--version"] {
+        assert!(own.remove(general), "{general}");
+    }
+    own
+}
+
+/// The Rust files below a folder but for one folder in it.
+fn sources(folder: &Path, but: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && path != but {
+            sources(&path, but, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn the_library_names_no_flag() {
+    let own = own_flags();
+    assert!(
+        own.contains("--train") && own.contains("--leave-out"),
+        "{own:?}"
+    );
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&src, &src.join("cli"), &mut files);
+    assert!(files.len() > 300, "{}", files.len());
+    for file in files {
+        let named = flags(&fs::read_to_string(&file).unwrap());
+        let named: Vec<&String> = named.intersection(&own).collect();
+        assert!(named.is_empty(), "{}: {named:?}", file.display());
+    }
+}
+
+#[test]
+fn the_command_line_says_which_flag_mends_an_error() {
+    let scratch = Scratch::new();
+    let short = scratch.log_at("short.csv", (0..9).map(|row| 0.01 * f64::from(row)), |_| {
+        [0.0; 3]
+    });
+    let (long, out) = (
+        scratch.log("long.csv", crate::hard::swinging),
+        scratch.out(),
+    );
+    let model = [
+        "closeloop",
+        "--model",
+        "pendulum",
+        "--out",
+        &out,
+        "--train",
+        &long,
+    ];
+    let told = refuses(&[&model[..], &["--test", &short]].concat());
+    says(
+        &told,
+        &["the test logs hold no window", "--test names the test logs"],
+    );
+    let told = refuses(&[&model[..], &["--errors", "torque"]].concat());
+    says(
+        &told,
+        &[
+            "no torques can be compared",
+            "--errors motion compares the motion",
+        ],
+    );
+    let branches = r#"<robot name="y"><link name="base"/><link name="a"/><link name="b"/>
+<joint name="ja" type="continuous"><parent link="base"/><child link="a"/></joint>
+<joint name="jb" type="continuous"><parent link="base"/><child link="b"/></joint></robot>"#;
+    let told = refuses(&["new", "--from-urdf", &scratch.file("y.urdf", branches)]);
+    says(&told, &["branches", "--tip names the last body"]);
+    let delay = "\n[[effect]]\nname = \"actuator_delay\"\njoint = 1\nd = 0.02\n";
+    let delayed = scratch.model("delayed.toml", "[energy]", &format!("{delay}\n[energy]"));
+    let line = [
+        "export", "--model", &delayed, "--format", "json", "--out", &out, "--step", "1e-9",
+    ];
+    says(
+        &refuses(&line),
+        &["steps of 1e-9 s are remembered", "--step gives it"],
+    );
+}
+
+#[test]
+fn a_finding_is_mended_by_a_flag_on_the_command_line_alone() {
+    let scratch = Scratch::new();
+    // The logger stopped for half a second.
+    let times = (0..600).map(|row| 0.01 * f64::from(row) + if row < 300 { 0.0 } else { 0.5 });
+    let log = scratch.log_at("gap.csv", times, crate::hard::swinging);
+    let output = crate::support::residyn(&["audit", &log]);
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(told.contains("paste: --leave-out gap.csv@"), "{told}");
+    let log = residyn::Log::read_standard(Path::new(&log)).unwrap();
+    let audit = residyn::data::audit(&log, &residyn::data::Columns::default());
+    let told = audit.to_string();
+    assert!(
+        told.contains("leave out gap.csv@") && !told.contains("--"),
+        "{told}"
+    );
+}
