@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::clients::{client, schema_path};
+use crate::support::clients::client;
+use crate::support::paths::schema_path;
 use crate::support::{refuses, succeeds, text};
 
 /// A scratch folder with logs of the demo rig and a model file of the true rig, friction included.

@@ -207,7 +207,7 @@ fn a_small_grid_gives_a_table_and_a_broken_run_goes_on() {
     assert!(error("told") < 0.2 * error("before"), "{errors}");
     let table = std::fs::read_to_string(out.join("table.md")).unwrap();
     assert!(table.contains("| one effect: exact |"), "{table}");
-    crate::page::look_at(&out.join("report.html"));
+    crate::support::clients::look_at(&out.join("report.html"));
 }
 
 #[test]

@@ -2,91 +2,19 @@
 
 use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use residyn::bench::rigs::{
     Fold, Line, LogErrors, Measured, Method, RigsError, Squares, Task, Tools, errors_on, read,
     summarise,
 };
-use residyn::bench::{Cell, Source, read as grid};
 use residyn::closeloop::Settings;
 use residyn::formats::ClientError;
 use residyn::model::Library;
 use serde_json::Value;
-use tempfile::TempDir;
 
-use crate::support::{refuses, residyn, succeeds, text};
-
-fn config(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("configs/bench")
-        .join(name)
-}
-
-/// Four logs of a pendulum with dry friction.
-fn record(folder: &Path) {
-    fs::create_dir_all(folder).unwrap();
-    let mut cell: Cell = grid(&config("smoke.toml")).unwrap().remove(0);
-    let Source::Simulated(simulation) = &mut cell.source else {
-        panic!("the grid's rigs are simulated")
-    };
-    simulation.condition.logs = 4;
-    let model = Library::built_in().model(&cell.model).unwrap();
-    for log in cell.record(&model).unwrap().0 {
-        log.write(folder.join(&log.path)).unwrap();
-    }
-}
-
-/// The rig's true values, without its friction, as the published set.
-pub const RIGS: &str = r#"
-plain = ["coulomb_friction"]
-
-[[rig]]
-name = "rig"
-folder = "logs"
-model = "pendulum"
-parameters = { C_i = 5.0 }
-logs = ["log1.csv", "log2.csv", "log3.csv"]
-test = "each_log"
-leave_out = ["log2.csv@7.5-8"]
-published = [{ name = "1.0", model = "pendulum", parameters = { C_g = -19.62, C_i = 6.6667 } }]
-also = { fourth = ["log4.csv"] }
-"#;
-
-/// A folder with a file of rigs and the logs.
-pub struct Bench {
-    folder: TempDir,
-}
-
-impl Bench {
-    pub fn new(rigs: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        record(&folder.path().join("logs"));
-        fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
-        Self { folder }
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// Run the command with these flags too.
-    fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
-        let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
-        let data = text(self.folder.path());
-        let rigs = [
-            "bench",
-            "rigs",
-            "--rigs",
-            text(&rigs),
-            "--data",
-            data,
-            "--out",
-            text(&out),
-        ];
-        run(&[rigs.as_slice(), more].concat());
-    }
-}
+use crate::support::bench::{Bench, RIGS};
+use crate::support::paths::config;
+use crate::support::{refuses, residyn, succeeds};
 
 /// Error of a model in a row, 0.5 s ahead \[rad\].
 fn error(row: &Value, model: &str) -> f64 {
@@ -174,7 +102,7 @@ fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
     });
     let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
     assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
-    crate::page::look_at(&bench.path("out/report.html"));
+    crate::support::clients::look_at(&bench.path("out/report.html"));
     assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
 }
 
@@ -232,7 +160,7 @@ fn results_of_other_logs_or_models_are_not_used_again() {
 
 #[test]
 fn the_rigs_of_the_repository_are_read() {
-    let rigs = read(&config("rigs.toml")).unwrap();
+    let rigs = read(config("bench/rigs.toml").as_ref()).unwrap();
     let names: Vec<&str> = rigs.iter().map(|rig| rig.name.as_str()).collect();
     assert_eq!(names.len(), 5, "{names:?}");
     let library = Library::built_in();

@@ -12,7 +12,9 @@ use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
 
-use super::train::{config, configs, json, kill_after, refused, residyn};
+use crate::support::clients::client;
+use crate::support::in_folder::{json, kill_after, refused, residyn};
+use crate::support::paths::{config, configs};
 
 fn shipped(name: &str) -> String {
     let checkpoints = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints");
@@ -281,7 +283,7 @@ fn a_killed_experiment_resumes_to_the_same_numbers() {
         serde_json::from_slice(&fs::read(killed.path().join("x/results.json")).unwrap()).unwrap();
     assert_eq!(written, found);
     assert!(killed.path().join("x/results.svg").is_file());
-    crate::page::look_at(&killed.path().join("x/report.html"));
+    crate::support::clients::look_at(&killed.path().join("x/report.html"));
     let stretch = killed.path().join("x/runs/hybrid-01/stretch-003.csv");
     assert_eq!(
         Log::read(&stretch, 1, &Columns::default()).unwrap().rows(),
@@ -373,7 +375,7 @@ fn a_single_run_reports_its_rounds() {
         .collect();
     let path = dir.path().join("expected.json");
     fs::write(&path, serde_json::to_string(&expected).unwrap()).unwrap();
-    super::clients::client(
+    client(
         "events.py",
         &[&dir.path().join("t"), &path, Path::new("return")],
     );

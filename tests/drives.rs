@@ -10,10 +10,9 @@ use residyn::sim::Integrator;
 use residyn::{Library, Model};
 use serde_json::Value;
 
-use crate::clients::client;
-use crate::common::{assert_near, points};
-use crate::mechanism;
-use crate::support::{refuses, succeeds, text};
+use crate::support::catalogue::{assert_near, points};
+use crate::support::clients::client;
+use crate::support::{mechanisms, refuses, succeeds, text};
 
 /// A pendulum arm on two position servos, as it is drawn or as it is built. Friction there hardens in half a millisecond: by
 /// default MuJoCo's acts some ten milliseconds ahead of the velocity.
@@ -218,7 +217,7 @@ fn faults_of_a_drive_are_told_with_their_place() {
 #[test]
 fn ready_drives_are_written_into_models() {
     let folder = tempfile::tempdir().unwrap();
-    let file = mechanism::fixture("planar_2r.urdf");
+    let file = mechanisms::fixture("planar_2r.urdf");
     for drive in Library::drives() {
         let out = folder.path().join(format!("{}.toml", drive.name));
         let flags = [
@@ -269,7 +268,7 @@ fn a_written_servo_reads_back_as_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("servo.xml");
     find("mjcf").unwrap().write(&model, &path).unwrap();
-    let text = model_text(&mechanism::read(&path));
+    let text = model_text(&mechanisms::read(&path));
     let back = Model::from_text(Path::new("back.toml"), &text, library.effects()).unwrap();
     let [back, own] = [back.dynamics(), servo.dynamics()];
     for point in points(&own, 50, 1) {

@@ -1,21 +1,17 @@
 //! Exported models, read by programs of their users.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use residyn::control::Task;
-use residyn::formats::{
-    Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
-};
+use residyn::formats::{Client, ExportModel, FORMATS, PythonClient, find};
 use residyn::model::Model;
 use residyn::sim::Integrator;
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
-use crate::clients::client;
-use crate::common::{USER_EFFECT, rng, system};
-use crate::models;
-use crate::support::{refuses, residyn, succeeds, text};
+use crate::support::catalogue::{USER_EFFECT, rng, system};
+use crate::support::clients::client;
+use crate::support::predictions::{agree, client_agrees, expected, predictions, written};
+use crate::support::{exported_models, refuses, residyn, succeeds, text};
 
 /// The client of descriptions that docs/export.md shows.
 const DESCRIPTION: PythonClient = PythonClient {
@@ -24,68 +20,10 @@ const DESCRIPTION: PythonClient = PythonClient {
     packages: "numpy safetensors",
 };
 
-/// What a client predicts; none, said loudly, without a client on this machine.
-pub fn predictions(
-    name: &str,
-    predict: impl FnOnce() -> Result<Predictions, ClientError>,
-) -> Option<Predictions> {
-    match predict() {
-        Ok(predictions) => Some(predictions),
-        Err(ClientError::Unavailable(reason)) => {
-            let required = std::env::var_os("RESIDYN_PYTHON").is_some();
-            assert!(!required, "{name}: {reason}");
-            // Not eprintln!, which the test harness swallows.
-            let _ = writeln!(std::io::stderr(), "SKIPPED {name}: {reason}; run tests/run");
-            None
-        }
-        Err(ClientError::Failed(said) | ClientError::NotFinite(said)) => panic!("{name}: {said}"),
-    }
-}
-
-/// Steps, derivatives and the rollout are all there and match the program's own.
-pub fn agree(name: &str, own: &Predictions, theirs: &Predictions, tolerance: f64) {
-    let difference = own.difference(theirs);
-    for (what, difference) in [
-        ("step", difference.next),
-        ("derivative", difference.derivative),
-        ("rollout", difference.rollout),
-    ] {
-        let difference = difference.unwrap_or_else(|| panic!("{name}: no prediction of a {what}"));
-        assert!(difference <= tolerance, "{name}, {what}: {difference:e}");
-    }
-}
-
-fn expected(model: &ExportModel) -> (Samples, Predictions) {
-    let samples = model.samples(&mut rng(1)).unwrap();
-    let own = model.predict(&samples).unwrap();
-    (samples, own)
-}
-
-/// A model written in a format to a folder of its own.
-fn written(format: &Format, name: &str, model: &ExportModel) -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name.replace(' ', "_"));
-    let path = path.with_extension(format.extension);
-    format.write(model, &path).unwrap();
-    (folder, path)
-}
-
-/// Every model in one format, as the format's client predicts it.
-pub fn client_agrees(format: &Format, models: &[(&str, ExportModel)]) {
-    for (name, model) in models {
-        let (_folder, path) = written(format, name, model);
-        let (samples, own) = expected(model);
-        let name = format!("{name} as {}", format.name);
-        if let Some(theirs) = predictions(&name, || format.predict(&path, &samples)) {
-            agree(&name, &own, &theirs, format.tolerance);
-        }
-    }
-}
-
 /// What holds for a new format without a test of its own.
 #[test]
 fn every_format_is_read_by_its_client_and_documented() {
-    let pendulum = models::all().swap_remove(0);
+    let pendulum = exported_models::all().swap_remove(0);
     let guide = include_str!("../docs/export.md");
     for format in FORMATS {
         if !matches!(format.client, Client::None(_)) {
@@ -103,23 +41,23 @@ fn every_format_is_read_by_its_client_and_documented() {
 
 #[test]
 fn onnxruntime_predicts_the_same() {
-    client_agrees(find("onnx").unwrap(), &models::all());
+    client_agrees(find("onnx").unwrap(), &exported_models::all());
 }
 
 #[test]
 fn a_python_module_predicts_the_same() {
-    client_agrees(find("python").unwrap(), &models::all());
+    client_agrees(find("python").unwrap(), &exported_models::all());
 }
 
 #[test]
 fn a_description_is_read_back_to_the_same_model() {
-    client_agrees(find("json").unwrap(), &models::all());
-    client_agrees(find("safetensors").unwrap(), &models::all());
+    client_agrees(find("json").unwrap(), &exported_models::all());
+    client_agrees(find("safetensors").unwrap(), &exported_models::all());
 }
 
 #[test]
 fn a_description_can_be_rebuilt_with_numpy() {
-    for (name, model) in models::all() {
+    for (name, model) in exported_models::all() {
         let (_folder, path) = written(find("json").unwrap(), name, &model);
         let (samples, own) = expected(&model);
         if let Some(theirs) = predictions(name, || DESCRIPTION.ask(&path, &samples)) {
@@ -130,7 +68,7 @@ fn a_description_can_be_rebuilt_with_numpy() {
 
 #[test]
 fn onnx_files_pass_the_checker_and_hold_metadata() {
-    for (name, model) in models::all() {
+    for (name, model) in exported_models::all() {
         let (folder, path) = written(find("onnx").unwrap(), name, &model);
         let parameters = model.equations.parameters.iter();
         let parameters: Vec<Value> = parameters
@@ -146,7 +84,7 @@ fn onnx_files_pass_the_checker_and_hold_metadata() {
 
 #[test]
 fn the_environment_of_a_module_works_in_gymnasium() {
-    for (name, model) in models::all() {
+    for (name, model) in exported_models::all() {
         let Some(task) = Task::of_system(model.name()) else {
             continue;
         };
@@ -306,7 +244,7 @@ fn the_folder_of_an_export_is_made() {
 
 #[test]
 fn latex_is_parsed_and_holds_equations_values_and_intervals() {
-    for (name, model) in models::all() {
+    for (name, model) in exported_models::all() {
         let (folder, path) = written(find("latex").unwrap(), name, &model);
         let mut pieces = Vec::new();
         let mut environments = vec!["document"];
@@ -343,7 +281,7 @@ joint = 1
 delta = 0.005
 driven = 1
 "#;
-    let system = models::system("pendulum", effects);
+    let system = exported_models::system("pendulum", effects);
     let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
         let limits = (find(name).unwrap().not_carried)(&model);

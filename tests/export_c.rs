@@ -14,8 +14,9 @@ use residyn::sim::{Commands, Hold, Integrator, StepTorque};
 use serde_json::json;
 use tempfile::TempDir;
 
-use crate::common::rng;
-use crate::{mechanism, models};
+use crate::support::catalogue::rng;
+use crate::support::clients::{succeeds, there_are};
+use crate::support::{exported_models, mechanisms};
 
 /// Every function of formulas, reserved names of C, and text that would end a comment.
 const ODD: &str = r#"
@@ -45,8 +46,8 @@ fn odd() -> ExportModel {
 
 /// A chain of five bodies with four joints.
 fn linkage() -> ExportModel {
-    let file = mechanism::fixture("linkage_4r.urdf");
-    let text = model_text(&mechanism::read_to(&file, Some("hand")));
+    let file = mechanisms::fixture("linkage_4r.urdf");
+    let text = model_text(&mechanisms::read_to(&file, Some("hand")));
     let system = Model::from_text(&file, &text, Library::built_in().effects()).unwrap();
     ExportModel::of_system(&system, Integrator::RK4, 0.005, json!({}))
 }
@@ -127,34 +128,13 @@ fn rows(mut program: Command, question: &str, what: &str) -> Vec<Vec<f64>> {
     said.lines().map(row).collect()
 }
 
-pub fn succeeds(command: &mut Command, what: &str) {
-    let run = command.output().unwrap();
-    let said = String::from_utf8_lossy(&run.stderr);
-    assert!(run.status.success(), "{what}: {command:?}\n{said}");
-}
-
-/// Whether these tools start; if one does not, print a prominent note.
-pub fn there_are(tools: &[&str]) -> bool {
-    let starts = |tool: &&str| Command::new(tool).arg("--version").output().is_ok();
-    let missing: Vec<&str> = tools.iter().copied().filter(|tool| !starts(tool)).collect();
-    if !missing.is_empty() {
-        let missing = missing.join(", ");
-        // Not eprintln!, which the test harness swallows.
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED a test of exported C: there is no {missing}"
-        );
-    }
-    missing.is_empty()
-}
-
 /// Every model's header, or none where a tool is missing.
 fn headers(tools: &[&str]) -> Vec<Header> {
     if !there_are(tools) {
         return Vec::new();
     }
     let odd = [("odd", odd())];
-    let all = models::all().into_iter().chain(odd);
+    let all = exported_models::all().into_iter().chain(odd);
     all.map(|(name, model)| written(name, model)).collect()
 }
 

@@ -7,14 +7,13 @@ use residyn::formats::{ExportModel, Format, find};
 use serde_json::{Value, json};
 use zip::ZipArchive;
 
-use crate::clients::client;
-use crate::common::rng;
-use crate::export::predictions;
-use crate::export_c::{succeeds, there_are};
-use crate::models;
+use crate::support::catalogue::rng;
+use crate::support::clients::{client, succeeds, there_are};
+use crate::support::exported_models;
+use crate::support::predictions::predictions;
 
 fn model(name: &str) -> ExportModel {
-    let mut models = models::all().into_iter();
+    let mut models = exported_models::all().into_iter();
     models.find(|(known, _)| *known == name).unwrap().1
 }
 
@@ -32,7 +31,7 @@ fn each<T: Clone>(all: Vec<T>) -> impl Iterator<Item = (T, &'static Format)> {
 #[test]
 fn a_simulator_predicts_what_the_program_does() {
     let folder = tempfile::tempdir().unwrap();
-    for ((name, model), format) in each(models::all()) {
+    for ((name, model), format) in each(exported_models::all()) {
         let name = &format!("{name} as {}", format.name);
         let path = folder.path().join("model.fmu");
         format.write(&model, &path).unwrap();
@@ -113,7 +112,7 @@ fn no_compiler_warns_of_its_sources() {
     if !there_are(&["cc"]) {
         return;
     }
-    for ((name, model), format) in each(models::all()) {
+    for ((name, model), format) in each(exported_models::all()) {
         let folder = tempfile::tempdir().unwrap();
         for (file, bytes) in unpacked(&model, format) {
             if let Some(file) = file.strip_prefix("sources/") {

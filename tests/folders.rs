@@ -11,10 +11,10 @@ use std::sync::OnceLock;
 
 use residyn::runs::RunFolder;
 
-use crate::bench_rigs::{Bench, RIGS};
-use crate::fuzz::exported;
+use crate::support::bench::{Bench, RIGS};
+use crate::support::exported_models::exported;
+use crate::support::paths::config;
 use crate::support::{refuses, says, text};
-use crate::train::config;
 
 /// The commands that work in the folder of `--out`.
 fn commands() -> Vec<Vec<String>> {

@@ -1,88 +1,18 @@
 //! Nothing that is given breaks the program: what is too deep, too large or without an end is refused at once, with the limit
 //! and the place, and what leaves the finite numbers is told.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use crate::support::paths::config;
 use crate::support::{
-    answers, refuses, residyn, residyn_within, says, succeeds, text, until_there,
+    Scratch, answers, ends_without, refuses, residyn, residyn_within, says, succeeds, swinging,
+    text, until_there,
 };
-use crate::train::config;
-
-const PENDULUM: &str = include_str!("../models/pendulum.toml");
-
-/// A scratch folder.
-pub struct Scratch(tempfile::TempDir);
-
-impl Scratch {
-    pub fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// A file with these contents.
-    pub fn file(&self, name: &str, contents: impl AsRef<[u8]>) -> String {
-        let path = self.path(name);
-        fs::write(&path, contents).unwrap();
-        text(&path).to_owned()
-    }
-
-    /// A log of 2 s of a pendulum, a row every 10 ms; `row` makes q, qd and tau of the time.
-    pub fn log(&self, name: &str, row: impl Fn(f64) -> [f64; 3]) -> String {
-        self.log_at(name, (0..200).map(|row| f64::from(row) * 0.01), row)
-    }
-
-    /// A log of a pendulum whose rows are at these times.
-    pub fn log_at(
-        &self,
-        name: &str,
-        times: impl Iterator<Item = f64>,
-        row: impl Fn(f64) -> [f64; 3],
-    ) -> String {
-        let mut log = "time,q1,qd1,tau1\n".to_owned();
-        for time in times {
-            let [q, qd, tau] = row(time);
-            writeln!(log, "{time:?},{q:?},{qd:?},{tau:?}").unwrap();
-        }
-        self.file(name, log)
-    }
-
-    /// The model of the pendulum with one text in place of another.
-    pub fn model(&self, name: &str, from: &str, to: &str) -> String {
-        assert!(PENDULUM.contains(from), "{from}");
-        self.file(name, PENDULUM.replacen(from, to, 1))
-    }
-
-    /// The pendulum with this acceleration.
-    pub fn moving_by(&self, name: &str, acceleration: &str) -> String {
-        self.model(name, "C_g * sin(q1) + C_i * tau1", acceleration)
-    }
-
-    /// A file of `configs` with one text in place of another, under its own name.
-    pub fn changed(&self, file: &str, from: &str, to: &str) -> String {
-        let text = fs::read_to_string(config(file)).unwrap();
-        assert!(text.contains(from), "{from}");
-        let (_, name) = file.rsplit_once('/').unwrap();
-        self.file(name, text.replacen(from, to, 1))
-    }
-
-    pub fn out(&self) -> String {
-        text(&self.path("out")).to_owned()
-    }
-}
-
-pub fn swinging(time: f64) -> [f64; 3] {
-    let torque = 0.3 * (3.0 * time).sin();
-    [(2.0 * time).sin(), 2.0 * (2.0 * time).cos(), torque]
-}
 
 /// What the program says that refuses its arguments while its memory is bounded.
 #[cfg(unix)]
@@ -91,14 +21,6 @@ fn refuses_in_little_memory(arguments: &[&str]) -> String {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{arguments:?}:\n{message}");
     assert!(message.len() < 3000, "{} bytes", message.len());
-    message
-}
-
-/// What the program says that ran and has no answer.
-pub fn ends_without(arguments: &[&str]) -> String {
-    let output = residyn(arguments);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}:\n{message}");
     message
 }
 

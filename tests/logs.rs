@@ -14,7 +14,8 @@ use residyn::report::{Report, summary};
 use residyn::{Library, Log, Model, Outcome, Request, Settings, Verdict, close_loop};
 use serde_json::Value;
 
-use crate::common::{catalog, rng, simulate};
+use crate::support::catalogue::{catalog, rng};
+use crate::support::logs::simulate;
 use crate::support::{measured, refuses, residyn, succeeds, text};
 
 /// A pendulum with dry friction, thrown so that it turns over.

@@ -12,9 +12,11 @@ use residyn::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
 
 use serde_json::Value;
 
-use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
-use crate::support::{evaluated, refuses, succeeds, text};
 use rand::RngExt;
+
+use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
+use crate::support::logs::{add_noise, simulate};
+use crate::support::{evaluated, refuses, succeeds, text};
 
 const DELAY_S: f64 = 0.0073;
 const LAG_S: f64 = 0.015;

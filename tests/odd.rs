@@ -10,9 +10,11 @@ use residyn::train::ResidualTrainer;
 use residyn::{Library, Origin, report};
 use serde_json::Value;
 
-use crate::common::{rng, simulate, system};
-use crate::hard::{Scratch, ends_without, swinging};
-use crate::support::{answers, refuses, residyn, says, succeeds, text};
+use crate::support::catalogue::{rng, system};
+use crate::support::logs::simulate;
+use crate::support::{
+    Scratch, answers, ends_without, refuses, residyn, says, succeeds, swinging, text,
+};
 
 const PENDULUM_OF_TORQUES: &str = r#"
 [system]

@@ -1,36 +1,11 @@
 //! The page of a report in a real browser.
 
 use std::fs;
-use std::io::Write;
-use std::path::Path;
 
-use crate::clients::{client, demo};
+use crate::support::clients::look_at;
+use crate::support::demo::demo;
+use crate::support::paths::configs;
 use crate::support::{refuses, succeeds, text};
-use crate::train::configs;
-
-/// Whether there is a browser; without one, say so loudly. CI must have it.
-fn has_browser() -> bool {
-    let is_there =
-        ["chromium", "chromedriver"].map(|name| Path::new("/usr/bin").join(name).exists());
-    if is_there == [true; 2] {
-        return true;
-    }
-    assert!(
-        std::env::var_os("CI").is_none(),
-        "CI needs chromium and chromium-driver"
-    );
-    let note = "SKIPPED page.py: chromium and chromium-driver are not installed\n";
-    // Not eprintln!, which the test harness swallows.
-    let _ = std::io::stderr().write_all(note.as_bytes());
-    false
-}
-
-/// Look at a page in a browser, where there is one.
-pub fn look_at(page: &Path) {
-    if has_browser() {
-        client("page.py", &[page]);
-    }
-}
 
 #[test]
 fn a_browser_shows_the_page_of_the_demo() {

@@ -11,10 +11,10 @@ use residyn::sim::Integrator;
 use residyn::sim::metric::torque_error;
 use serde_json::{Value, json};
 
-use crate::arms::{described, model, moved};
-use crate::clients::client;
-use crate::common::{fitted, rng};
-use crate::mechanism::{fixture, read_to};
+use crate::support::arms::{described, model, moved};
+use crate::support::catalogue::{fitted, rng};
+use crate::support::clients::client;
+use crate::support::mechanisms::{fixture, read_to};
 use crate::support::{measured, refuses, text};
 
 /// An arm of four joints as its description has it.

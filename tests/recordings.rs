@@ -2,28 +2,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
 use residyn::data::{Column, Columns, Log};
-use tempfile::TempDir;
 
-use crate::clients::client;
-use crate::log_formats::trajectory;
+use crate::support::log_files::recordings;
 use crate::support::measured;
-
-/// A folder with `run.csv` and recordings of it, made once; `None` without the clients that write them.
-pub fn recordings() -> Option<&'static Path> {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let run = folder.path().join("run.csv");
-        fs::write(&run, trajectory()).unwrap();
-        client("recordings.py", &[&run, folder.path()]);
-        folder
-    });
-    let is_written = folder.path().join("no_cdr.mcap").exists();
-    is_written.then(|| folder.path())
-}
 
 /// The messages name them in the other order.
 fn rig() -> Columns {

@@ -5,7 +5,7 @@ use std::path::Path;
 use residyn::expr::SignForm;
 use residyn::model::Library;
 
-use crate::common::{assert_near, dynamics};
+use crate::support::catalogue::{assert_near, dynamics};
 
 /// The file, then points: states and torques, and the accelerations there.
 type Case = (&'static str, &'static [(&'static [f64], &'static [f64])]);

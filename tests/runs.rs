@@ -7,8 +7,9 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use crate::support::in_folder::{json, refused, residyn, run};
+use crate::support::paths::config;
 use crate::support::{refuses, succeeds, text, until_there};
-use crate::train::{config, json, refused, residyn, run};
 
 #[test]
 fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {

@@ -5,10 +5,10 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use serde_json::Value;
-
+use crate::support::in_folder::{json, kill_after, refused, residyn, run};
+use crate::support::paths::config;
+use crate::support::run_folders::{ended_alike, files, read};
 use crate::support::{measured, text};
-use crate::train::{config, json, kill_after, refused, residyn, run};
 
 /// Do `command` in shards, one after the other, put them together in `merged`, and do what is left.
 fn in_shards(dir: &Path, command: &[&str], of: usize) {
@@ -25,30 +25,6 @@ fn merge(dir: &Path, parts: &[String]) {
     let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
     let told = json(dir, &[&["merge", "--out", "merged"], &parts[..]].concat());
     assert_eq!(told["missing"], serde_json::json!([]));
-}
-
-/// A JSON file without what tells the time and how the program was called.
-fn read(path: &Path, without: &[&str]) -> Value {
-    let mut value: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
-    for pointer in without {
-        assert_ne!(value.pointer_mut(pointer).unwrap().take(), Value::Null);
-    }
-    value
-}
-
-/// All files below a folder but those that only the run itself uses.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
-        let name = entry.file_name().into_string().unwrap();
-        if entry.path().is_dir() {
-            let inside = files(&entry.path()).into_iter();
-            found.extend(inside.map(|(path, bytes)| (format!("{name}/{path}"), bytes)));
-        } else if !name.starts_with('.') {
-            found.insert(name, fs::read(entry.path()).unwrap());
-        }
-    }
-    found
 }
 
 #[test]
@@ -178,24 +154,6 @@ fn killed_shards_of_an_experiment_end_with_the_bytes_of_one_machine() {
     }
     assert!(found == runs("merged"), "the shards had done all work");
     ended_alike(&dir.join("merged"), &dir.join("whole"));
-}
-
-/// The folders of two runs of an experiment hold the same, but for what tells the time.
-pub fn ended_alike(merged: &Path, whole: &Path) {
-    let clock = ["/wall_s", "/command"];
-    let results = |out: &Path| read(&out.join("results.json"), &clock);
-    assert_eq!(results(merged), results(whole));
-    let [mut merged, mut whole] = [merged, whole].map(files);
-    // Both say when and for how long they were computed.
-    for found in [&mut merged, &mut whole] {
-        found.remove("results.json").unwrap();
-        found.remove("report.html").unwrap();
-    }
-    let names = |files: &BTreeMap<String, Vec<u8>>| files.keys().cloned().collect::<Vec<_>>();
-    assert_eq!(names(&merged), names(&whole));
-    for (name, bytes) in &merged {
-        assert!(whole[name] == *bytes, "{name} differs");
-    }
 }
 
 /// What is evaluated after the learning is work of the shards, too.

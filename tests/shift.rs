@@ -6,7 +6,7 @@ use residyn::expr::SignForm;
 use residyn::model::{Library, Model};
 use serde_json::Value;
 
-use crate::common::{assert_near, dynamics, points};
+use crate::support::catalogue::{assert_near, dynamics, points};
 use crate::support::{succeeds, text};
 
 /// An arm in masses. The motor's inertia is known, so that a heavier arm is not a weaker motor.

@@ -9,11 +9,10 @@ use residyn::model::{Library, Model};
 use residyn::sim::Integrator;
 use serde_json::json;
 
-use crate::common::{assert_near, points, rng};
-use crate::export::{client_agrees, predictions};
-use crate::mechanism::{fixture, read, read_to};
-use crate::models;
-use crate::support::{refuses, residyn, text};
+use crate::support::catalogue::{assert_near, points, rng};
+use crate::support::mechanisms::{fixture, read, read_to};
+use crate::support::predictions::{client_agrees, predictions};
+use crate::support::{exported_models, refuses, residyn, text};
 
 /// An effect as in a model file.
 fn effect(name: &str, joint: usize, values: &str) -> String {
@@ -256,7 +255,7 @@ fn parts_that_are_not_carried_are_listed() {
 
 #[test]
 fn equations_of_no_mechanism_cannot_be_exported() {
-    let all = models::all();
+    let all = exported_models::all();
     let (_, data) = all
         .iter()
         .find(|(name, _)| *name == "pendulum_data")

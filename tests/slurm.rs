@@ -10,9 +10,10 @@ use std::process::{Child, Command, Output};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::shards::ended_alike;
+use crate::support::in_folder::json;
+use crate::support::paths::config;
+use crate::support::run_folders::ended_alike;
 use crate::support::text;
-use crate::train::{config, json};
 
 const SHARDS: usize = 8;
 /// Tasks that the node runs at a time.

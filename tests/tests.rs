@@ -12,7 +12,6 @@ mod bench;
 mod bench_rigs;
 mod check;
 mod clients;
-mod common;
 mod control;
 mod demo;
 mod drives;

@@ -7,7 +7,7 @@ use residyn::data::{Joint, Log};
 use residyn::model::{FittedEffect, Library, Model};
 use residyn::plant::Plant;
 
-use crate::common::rng;
+use crate::support::catalogue::rng;
 
 /// A pendulum that hangs at q1 = 0, driven by a geared motor; its encoder and its hidden effects are added.
 const RIG: &str = r#"

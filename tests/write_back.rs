@@ -8,7 +8,7 @@ use residyn::formats::write_back;
 use residyn::model::Model;
 use residyn::model::chain::{Chain, model_text};
 
-use crate::mechanism::{comparable, fixture, mujoco_agrees, read_to, system};
+use crate::support::mechanisms::{comparable, fixture, mujoco_agrees, read_to, system};
 use crate::support::{refuses, residyn, succeeds, text};
 
 /// Descriptions with the last link of the chain.
@@ -83,7 +83,7 @@ fn what_is_written_back_moves_like_the_model() {
         }
         let [found, wanted] = [&again, &values].map(|chain| comparable(&system(chain)));
         let n = wanted.joints;
-        for point in crate::common::points(&wanted, 100, 5) {
+        for point in crate::support::catalogue::points(&wanted, 100, 5) {
             let moving = &point[..3 * n + 1];
             let rates = |model: &residyn::model::Dynamics| {
                 model.program.eval(&[moving, &model.values()].concat())

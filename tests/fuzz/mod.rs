@@ -22,7 +22,6 @@ use residyn::files::content_hash;
 
 use self::edits::{Form, edited};
 use self::measure::{Cost, cost};
-pub use self::seeds::exported;
 use self::watch::Watch;
 
 /// A reader, and what it is tried on.

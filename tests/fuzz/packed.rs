@@ -11,6 +11,8 @@ use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use super::seeds;
+use crate::support::exported_models::CHECKPOINT;
+use crate::support::paths::ours;
 
 pub fn as_it_is(input: Vec<u8>, _: &mut ChaCha8Rng) -> Vec<u8> {
     input
@@ -63,7 +65,7 @@ pub fn mat(input: Vec<u8>, rng: &mut ChaCha8Rng) -> Vec<u8> {
 
 /// The description of tensors before the numbers of a checkpoint.
 pub fn tensors(input: Vec<u8>, _: &mut ChaCha8Rng) -> Vec<u8> {
-    let file = fs::read(seeds::ours(seeds::CHECKPOINT).join("weights.safetensors")).unwrap();
+    let file = fs::read(ours(CHECKPOINT).join("weights.safetensors")).unwrap();
     let numbers = &file[8 + seeds::tensors()[0].len()..];
     [
         &(input.len() as u64).to_le_bytes(),

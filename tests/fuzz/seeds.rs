@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
 use residyn::bench;
 use residyn::control::Task;
@@ -10,17 +9,11 @@ use residyn::experiment::{self, undeclared_effect};
 use residyn::expr::parse;
 use residyn::formats::{self, RobotReader};
 use residyn::train::recipe::Recipe;
-use tempfile::TempDir;
 
-use crate::clients::demo;
-use crate::log_formats::{formats, trajectory};
-use crate::recordings::recordings;
-use crate::support::{succeeds, text};
-
-/// A file or folder of the repository.
-pub fn ours(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
+use crate::support::demo::demo;
+use crate::support::exported_models::{CHECKPOINT, exported};
+use crate::support::log_files::{formats, recordings, trajectory};
+use crate::support::paths::ours;
 
 /// All files in a folder and the folders in it, in the order of their names.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -144,29 +137,6 @@ pub fn urdf() -> Vec<Vec<u8>> {
 pub fn mjcf() -> Vec<Vec<u8>> {
     contents(files(&ours("tests/fixtures/mechanisms")), ends("xml"))
 }
-
-/// A model that the program exported as JSON, with its weights beside it.
-pub fn exported() -> &'static Path {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let (from, to) = (ours(CHECKPOINT), folder.path().join("model.json"));
-        succeeds(&[
-            "export",
-            "--checkpoint",
-            text(&from),
-            "--format",
-            "json",
-            "--out",
-            text(&to),
-        ]);
-        folder
-    });
-    folder.path()
-}
-
-/// A checkpoint of a hybrid model.
-pub const CHECKPOINT: &str = "checkpoints/pendulum-sim";
 
 pub fn manifests() -> Vec<Vec<u8>> {
     named(Some(&ours(CHECKPOINT)), &["checkpoint.json"])

@@ -20,7 +20,9 @@ use serde_json::Value;
 
 use super::edits::Form;
 use super::{Target, packed, seeds};
-use crate::common::fitted;
+use crate::support::catalogue::fitted;
+use crate::support::exported_models::{CHECKPOINT, exported};
+use crate::support::paths::ours;
 
 /// Files shorter than this are put to all uses, also to those that take longer than reading \[bytes\].
 const SHORT: usize = 8000;
@@ -105,7 +107,7 @@ fn checkpoint_beside(path: &Path) -> bool {
 }
 
 fn in_checkpoint(folder: &Path, file: &str) -> PathBuf {
-    copy(&seeds::ours(seeds::CHECKPOINT), folder);
+    copy(&ours(CHECKPOINT), folder);
     folder.join(file)
 }
 
@@ -375,7 +377,7 @@ fn tensors() {
 #[test]
 fn description() {
     let place = |folder: &Path| {
-        copy(seeds::exported(), folder);
+        copy(exported(), folder);
         folder.join("model.json")
     };
     let read = |path: &Path| {

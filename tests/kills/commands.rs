@@ -5,7 +5,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::train::{config, json};
+use crate::support::in_folder::json;
+use crate::support::paths::config;
 
 /// A command that works in the folder `out`.
 pub struct Long {

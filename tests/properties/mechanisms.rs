@@ -11,8 +11,8 @@ use residyn::model::{Dynamics, Model};
 use residyn::sim::Integrator;
 
 use super::cases;
-use crate::common::points;
-use crate::mechanism::{comparable, system};
+use crate::support::catalogue::points;
+use crate::support::mechanisms::{comparable, system};
 
 fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3(-size..size).prop_map(Vector3::from)

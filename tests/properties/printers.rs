@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::cases;
 use super::formulas::{point, usual_formula};
-use crate::export_c::there_are;
+use crate::support::clients::there_are;
 
 /// Formulas of a model: as many as it has joints.
 const FORMULAS: usize = 12;

@@ -12,7 +12,8 @@ use tempfile::TempDir;
 use super::cases;
 use super::findings::Rig;
 use super::models::words;
-use crate::clients::{client, schema_path};
+use crate::support::clients::client;
+use crate::support::paths::schema_path;
 use crate::support::{answers, text};
 
 /// Folders of reports: of an effect that is found, and of none; of one joint and of two.

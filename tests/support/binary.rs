@@ -1,6 +1,6 @@
-//! Shared by several tests: the real binary, scratch folders, measured data.
+//! The real binary, and what it says.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output};
 use std::thread::sleep;
 use std::time::Duration;
@@ -82,28 +82,10 @@ pub fn text(path: &Path) -> &str {
     path.to_str().expect("scratch paths are UTF-8")
 }
 
-/// The folder of measured logs, `$RESIDYN_DATA` or beside the project; `None`, said loudly, where there is none.
-///
-/// # Panics
-/// Where `RESIDYN_REQUIRE_DATA` is set and there is none.
-pub fn measured(set: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("RESIDYN_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    let folder = root.join(set);
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let required = std::env::var_os("RESIDYN_REQUIRE_DATA").is_some();
-    assert!(
-        !required,
-        "measured data are required, and {} is missing",
-        folder.display()
-    );
-    eprintln!(
-        "SKIPPED: no measured data at {}; set RESIDYN_DATA (see README)",
-        folder.display()
-    );
-    None
+/// What the program says that ran and has no answer.
+pub fn ends_without(arguments: &[&str]) -> String {
+    let output = residyn(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}:\n{message}");
+    message
 }
