@@ -112,53 +112,6 @@ fn models_are_scored_as_they_are_on_the_same_windows() {
 }
 
 #[test]
-fn declared_values_that_the_logs_contradict_are_named_with_their_factor() {
-    let rig = rig();
-    let model = rig.folder.path().join("off.toml");
-    let off = fs::read_to_string(&rig.true_rig)
-        .unwrap()
-        .replace("4.6", "9.2");
-    fs::write(&model, off).unwrap();
-    let out = rig.folder.path().join("report");
-    let said = succeeds(&[
-        "closeloop",
-        "--model",
-        text(&model),
-        "--train",
-        text(&rig.train[0]),
-        text(&rig.train[1]),
-        "--test",
-        text(&rig.test),
-        "--out",
-        text(&out),
-    ]);
-    assert!(
-        said.contains("as written     fitted  with effects"),
-        "{said}"
-    );
-    let report: Value =
-        serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
-    let contradicted = report["contradicted"].as_array().unwrap();
-    let c_i = contradicted
-        .iter()
-        .find(|one| one["name"] == "C_i")
-        .unwrap();
-    assert_eq!(c_i["declared"], 9.2);
-    assert!((c_i["value"].as_f64().unwrap() - 4.6).abs() < 0.1, "{c_i}");
-    let written = fs::read_to_string(out.join("report.md")).unwrap();
-    let line = "- C_i: declared 9.2, fitted 4.";
-    assert!(
-        written.contains(line) && written.contains("): 0.50 times as large"),
-        "{written}"
-    );
-    // Whoever has the files finds out whether they are those that were read.
-    let files = report["call"]["inputs"].as_array().unwrap().iter();
-    let roles: Vec<&str> = files.map(|file| file["role"].as_str().unwrap()).collect();
-    assert_eq!(roles, ["model", "train", "train", "test"]);
-    client("report.py", &[&out, &schema_path()]);
-}
-
-#[test]
 fn models_of_other_rigs_and_files_that_cannot_be_read_are_refused() {
     let rig = rig();
     let out = rig.folder.path().join("out");
@@ -183,4 +136,55 @@ fn models_of_other_rigs_and_files_that_cannot_be_read_are_refused() {
         ],
     );
     says("drive", &["--against drive", "slide", "turn"]);
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn declared_values_that_the_logs_contradict_are_named_with_their_factor() {
+        let rig = rig();
+        let model = rig.folder.path().join("off.toml");
+        let off = fs::read_to_string(&rig.true_rig)
+            .unwrap()
+            .replace("4.6", "9.2");
+        fs::write(&model, off).unwrap();
+        let out = rig.folder.path().join("report");
+        let said = succeeds(&[
+            "closeloop",
+            "--model",
+            text(&model),
+            "--train",
+            text(&rig.train[0]),
+            text(&rig.train[1]),
+            "--test",
+            text(&rig.test),
+            "--out",
+            text(&out),
+        ]);
+        assert!(
+            said.contains("as written     fitted  with effects"),
+            "{said}"
+        );
+        let report: Value =
+            serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+        let contradicted = report["contradicted"].as_array().unwrap();
+        let c_i = contradicted
+            .iter()
+            .find(|one| one["name"] == "C_i")
+            .unwrap();
+        assert_eq!(c_i["declared"], 9.2);
+        assert!((c_i["value"].as_f64().unwrap() - 4.6).abs() < 0.1, "{c_i}");
+        let written = fs::read_to_string(out.join("report.md")).unwrap();
+        let line = "- C_i: declared 9.2, fitted 4.";
+        assert!(
+            written.contains(line) && written.contains("): 0.50 times as large"),
+            "{written}"
+        );
+        // Whoever has the files finds out whether they are those that were read.
+        let files = report["call"]["inputs"].as_array().unwrap().iter();
+        let roles: Vec<&str> = files.map(|file| file["role"].as_str().unwrap()).collect();
+        assert_eq!(roles, ["model", "train", "train", "test"]);
+        client("report.py", &[&out, &schema_path()]);
+    }
 }

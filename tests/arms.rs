@@ -37,56 +37,6 @@ fn off(found: &[f64], wanted: &[f64]) -> f64 {
     differences.fold(0.0, f64::max) / size
 }
 
-#[test]
-fn pinocchio_and_mujoco_find_the_same_torques_and_accelerations() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("arms.json");
-    client("arms.py", &[fixture("").as_path(), &file]);
-    let Ok(told) = fs::read_to_string(&file) else {
-        return;
-    };
-    let arms: Vec<Arm> = serde_json::from_str(&told).unwrap();
-    assert!(arms.len() > 10, "{} arms", arms.len());
-    for arm in arms {
-        let name = arm.file.display();
-        let chain = read_to(&arm.file, arm.tip.as_deref());
-        let joints: Vec<&str> = chain
-            .leaders()
-            .map(|(_, joint)| joint.name.as_str())
-            .collect();
-        assert_eq!(joints, arm.joints, "{name}");
-        let model = model(&chain);
-        let (inverse, forward) = (model.torque_balance().unwrap(), model.dynamics());
-        let [values, still] = [model.values(), vec![0.0; model.joints]];
-        for sample in &arm.samples {
-            let [q, qd, qdd] = ["q", "qd", "qdd"].map(|key| numbers(sample, key));
-            let inputs = |tau: &[f64]| [&q, &qd, tau, &[0.0], &values].concat();
-            let needed = |qdd: &[f64]| {
-                let inputs = [&inputs(&still)[..3 * model.joints + 1], qdd, &values].concat();
-                inverse.program.eval(&inputs)
-            };
-            let torques = needed(&qdd);
-            for peer in &arm.peers {
-                let wanted = numbers(sample, peer);
-                assert!(
-                    off(&torques, &wanted) < 1e-10,
-                    "{name}: {peer}: {torques:?}, {wanted:?}"
-                );
-                let found = forward.program.eval(&inputs(&wanted));
-                let found = &found[model.joints..];
-                // Where axes of a light wrist are in line, rounding of the torques moves it.
-                let moved = off(found, &qdd);
-                assert!(moved < 1e-7, "{name}: {peer}: {found:?}, {qdd:?}");
-                let torques = needed(found);
-                assert!(
-                    off(&torques, &wanted) < 1e-10,
-                    "{name}: {peer}: {torques:?}"
-                );
-            }
-        }
-    }
-}
-
 /// Energy changes by the power of the torques, with a joint that follows another as well.
 #[test]
 fn energy_of_a_linkage_changes_by_the_power() {
@@ -385,5 +335,59 @@ fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
             error < least_squares,
             "{arm}: {error} %, least squares {least_squares} %"
         );
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn pinocchio_and_mujoco_find_the_same_torques_and_accelerations() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("arms.json");
+        client("arms.py", &[fixture("").as_path(), &file]);
+        let Ok(told) = fs::read_to_string(&file) else {
+            return;
+        };
+        let arms: Vec<Arm> = serde_json::from_str(&told).unwrap();
+        assert!(arms.len() > 10, "{} arms", arms.len());
+        for arm in arms {
+            let name = arm.file.display();
+            let chain = read_to(&arm.file, arm.tip.as_deref());
+            let joints: Vec<&str> = chain
+                .leaders()
+                .map(|(_, joint)| joint.name.as_str())
+                .collect();
+            assert_eq!(joints, arm.joints, "{name}");
+            let model = model(&chain);
+            let (inverse, forward) = (model.torque_balance().unwrap(), model.dynamics());
+            let [values, still] = [model.values(), vec![0.0; model.joints]];
+            for sample in &arm.samples {
+                let [q, qd, qdd] = ["q", "qd", "qdd"].map(|key| numbers(sample, key));
+                let inputs = |tau: &[f64]| [&q, &qd, tau, &[0.0], &values].concat();
+                let needed = |qdd: &[f64]| {
+                    let inputs = [&inputs(&still)[..3 * model.joints + 1], qdd, &values].concat();
+                    inverse.program.eval(&inputs)
+                };
+                let torques = needed(&qdd);
+                for peer in &arm.peers {
+                    let wanted = numbers(sample, peer);
+                    assert!(
+                        off(&torques, &wanted) < 1e-10,
+                        "{name}: {peer}: {torques:?}, {wanted:?}"
+                    );
+                    let found = forward.program.eval(&inputs(&wanted));
+                    let found = &found[model.joints..];
+                    // Where axes of a light wrist are in line, rounding of the torques moves it.
+                    let moved = off(found, &qdd);
+                    assert!(moved < 1e-7, "{name}: {peer}: {found:?}, {qdd:?}");
+                    let torques = needed(found);
+                    assert!(
+                        off(&torques, &wanted) < 1e-10,
+                        "{name}: {peer}: {torques:?}"
+                    );
+                }
+            }
+        }
     }
 }

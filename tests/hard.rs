@@ -64,21 +64,6 @@ fn a_reading_that_no_sensor_has_is_refused_with_its_place() {
 }
 
 #[test]
-fn a_model_that_the_log_cannot_tell_anything_of_gets_an_answer() {
-    let scratch = Scratch::new();
-    let (log, out) = (scratch.log("log.csv", swinging), scratch.out());
-    let terms: Vec<String> = (0..300).map(|k| format!("C_g * {k} * q1")).collect();
-    let models = [
-        scratch.moving_by("terms.toml", &(terms.join(" + ") + " + C_i * tau1")),
-        scratch.model("stiff.toml", "value = 15.0", "value = 1e12"),
-    ];
-    for model in models {
-        let paths = ["--model", &model, "--train", &log, "--out", &out];
-        answers(&[&["closeloop", "--budget", "0s"], &paths[..]].concat());
-    }
-}
-
-#[test]
 #[cfg(unix)]
 fn formulas_that_are_too_deep_or_too_long_are_refused() {
     let scratch = Scratch::new();
@@ -496,27 +481,6 @@ fn packed_files_hold_no_more_than_is_read() {
 }
 
 #[test]
-fn two_runs_do_not_share_a_folder() {
-    let scratch = Scratch::new();
-    let out = scratch.out();
-    let first = Command::new(env!("CARGO_BIN_EXE_residyn"))
-        .args(["closeloop", "--calibrate", "1000", "--out", &out])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn();
-    let mut first = first.unwrap();
-    until_there(&scratch.path("out/report.json"), &mut first);
-    let process = format!("process {},", first.id());
-    let train = ["train", "--config", &config("smoke/train-pendulum.toml")];
-    for second in [&["closeloop"][..], &train] {
-        let told = refuses(&[second, &["--out", &out]].concat());
-        says(&told, &[&out, &process, "is working there", "--out"]);
-    }
-    first.kill().unwrap();
-    first.wait().unwrap();
-}
-
-#[test]
 fn malformed_xml_is_placed() {
     let scratch = Scratch::new();
     let head = "<robot name=\"a\">\n  <link name=\"b\"/>\n";
@@ -663,4 +627,44 @@ fn a_simulation_that_would_not_end_is_refused() {
         &told,
         &["slow.toml", "`recording.duration_s` is at most 1e5 s"],
     );
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn a_model_that_the_log_cannot_tell_anything_of_gets_an_answer() {
+        let scratch = Scratch::new();
+        let (log, out) = (scratch.log("log.csv", swinging), scratch.out());
+        let terms: Vec<String> = (0..300).map(|k| format!("C_g * {k} * q1")).collect();
+        let models = [
+            scratch.moving_by("terms.toml", &(terms.join(" + ") + " + C_i * tau1")),
+            scratch.model("stiff.toml", "value = 15.0", "value = 1e12"),
+        ];
+        for model in models {
+            let paths = ["--model", &model, "--train", &log, "--out", &out];
+            answers(&[&["closeloop", "--budget", "0s"], &paths[..]].concat());
+        }
+    }
+
+    #[test]
+    fn two_runs_do_not_share_a_folder() {
+        let scratch = Scratch::new();
+        let out = scratch.out();
+        let first = Command::new(env!("CARGO_BIN_EXE_residyn"))
+            .args(["closeloop", "--calibrate", "1000", "--out", &out])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut first = first.unwrap();
+        until_there(&scratch.path("out/report.json"), &mut first);
+        let process = format!("process {},", first.id());
+        let train = ["train", "--config", &config("smoke/train-pendulum.toml")];
+        for second in [&["closeloop"][..], &train] {
+            let told = refuses(&[second, &["--out", &out]].concat());
+            says(&told, &[&out, &process, "is working there", "--out"]);
+        }
+        first.kill().unwrap();
+        first.wait().unwrap();
+    }
 }

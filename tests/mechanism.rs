@@ -3,8 +3,8 @@
 use std::fs;
 
 use residyn::expr::SignForm;
+use residyn::model::Dynamics;
 use residyn::model::chain::{Chain, model_text};
-use residyn::model::{Dynamics, Model};
 
 use crate::support::catalogue::{dynamics, points};
 use crate::support::mechanisms::{comparable, fixture, format_of, mujoco_agrees, read, system};
@@ -21,13 +21,6 @@ const FILES: [&str; 6] = [
 
 fn chain(name: &str) -> Chain {
     read(&fixture(name))
-}
-
-#[test]
-fn mujoco_finds_the_same_torques() {
-    for name in FILES {
-        mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
-    }
 }
 
 /// Positions, velocities, torques, time, and the parameters at their values.
@@ -391,4 +384,15 @@ fn angles_that_were_rounded_are_taken_as_written_and_noted() {
     let text = model_text(&read(&file));
     let short = "M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\"";
     assert!(text.contains(short), "{text}");
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn mujoco_finds_the_same_torques() {
+        for name in FILES {
+            mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
+        }
+    }
 }

@@ -286,45 +286,6 @@ fn steps_of_any_length_are_exported_or_refused() {
 }
 
 #[test]
-#[cfg(unix)]
-fn equations_of_many_terms_are_printed_in_little_memory() {
-    let scratch = Scratch::new();
-    let sum = |first: usize| -> String {
-        let terms = (first..first + 15).map(|k| format!("q1 * {}", k + 2));
-        format!("sin({})", terms.collect::<Vec<_>>().join(" + "))
-    };
-    let sums: Vec<String> = (0..300).map(|k| sum(20 * k)).collect();
-    let model = scratch.moving_by("model.toml", &(sums.join(" + ") + " + C_i * tau1"));
-    for (format, out) in [
-        ("c", "model.h"),
-        ("python", "model.py"),
-        ("latex", "model.tex"),
-    ] {
-        let out = scratch.path(out);
-        // Without a compiler, which would take memory of its own.
-        let output = Command::new("bash")
-            .args(["-c", "ulimit -v 200000; exec \"$0\" \"$@\""])
-            .arg(env!("CARGO_BIN_EXE_residyn"))
-            .args([
-                "export",
-                "--model",
-                &model,
-                "--format",
-                format,
-                "--out",
-                text(&out),
-            ])
-            .envs([("CC", "none"), ("RESIDYN_PYTHON", "none")])
-            .envs([("MALLOC_ARENA_MAX", "1"), ("RAYON_NUM_THREADS", "2")])
-            .output()
-            .unwrap();
-        let told = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{format}: {told}");
-        assert!(fs::metadata(out).unwrap().len() < 2_000_000);
-    }
-}
-
-#[test]
 fn rigs_and_tasks_beyond_any_sensor_are_refused() {
     let scratch = Scratch::new();
     let out = scratch.out();
@@ -465,5 +426,48 @@ fn plans_that_are_no_finite_numbers_end_a_run_of_learning() {
             &ends_without(&[command, &run].concat()),
             &["no candidate of the plan at 0.000 s has a finite return"],
         );
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    #[cfg(unix)]
+    fn equations_of_many_terms_are_printed_in_little_memory() {
+        let scratch = Scratch::new();
+        let sum = |first: usize| -> String {
+            let terms = (first..first + 15).map(|k| format!("q1 * {}", k + 2));
+            format!("sin({})", terms.collect::<Vec<_>>().join(" + "))
+        };
+        let sums: Vec<String> = (0..300).map(|k| sum(20 * k)).collect();
+        let model = scratch.moving_by("model.toml", &(sums.join(" + ") + " + C_i * tau1"));
+        for (format, out) in [
+            ("c", "model.h"),
+            ("python", "model.py"),
+            ("latex", "model.tex"),
+        ] {
+            let out = scratch.path(out);
+            // Without a compiler, which would take memory of its own.
+            let output = Command::new("bash")
+                .args(["-c", "ulimit -v 200000; exec \"$0\" \"$@\""])
+                .arg(env!("CARGO_BIN_EXE_residyn"))
+                .args([
+                    "export",
+                    "--model",
+                    &model,
+                    "--format",
+                    format,
+                    "--out",
+                    text(&out),
+                ])
+                .envs([("CC", "none"), ("RESIDYN_PYTHON", "none")])
+                .envs([("MALLOC_ARENA_MAX", "1"), ("RAYON_NUM_THREADS", "2")])
+                .output()
+                .unwrap();
+            let told = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{format}: {told}");
+            assert!(fs::metadata(out).unwrap().len() < 2_000_000);
+        }
     }
 }

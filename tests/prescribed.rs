@@ -86,44 +86,6 @@ fn named(outcome: &Outcome) -> Vec<(usize, String)> {
         .collect()
 }
 
-#[test]
-fn effects_of_an_arm_are_named_on_their_joints_by_torques() {
-    let hidden: [(usize, &str, &[f64]); 5] = [
-        (0, "coulomb_friction", &[0.6]),
-        (0, "viscous_friction", &[0.8]),
-        (1, "stribeck_friction", &[0.5, 1.0, 0.1]),
-        (2, "degressive_friction", &[0.4, 0.05]),
-        (3, "constant_torque", &[0.3]),
-    ];
-    let outcome = closed(&rig(&hidden), None);
-    assert_eq!(outcome.space, Space::Torque);
-    let wanted: Vec<(usize, String)> = (hidden.iter())
-        .map(|(joint, name, _)| (*joint, (*name).to_owned()))
-        .collect();
-    let mut found = named(&outcome);
-    found.sort();
-    let mut wanted = wanted;
-    wanted.sort();
-    assert_eq!(found, wanted);
-    let torque = outcome.errors.torque.unwrap();
-    assert!(
-        torque.after.relative < 0.3 * torque.before.relative,
-        "{torque:?}"
-    );
-}
-
-#[test]
-fn an_arm_that_is_as_declared_but_for_its_bodies_lacks_no_effect() {
-    let outcome = closed(&rig(&[]), Some(Space::Torque));
-    assert_eq!(named(&outcome), []);
-    assert_eq!(
-        outcome.verdict,
-        Verdict::NoMissingEffect,
-        "{}",
-        outcome.reason
-    );
-}
-
 /// Whether an audit says this of a log.
 fn is_told(outcome: &Outcome, what: &str) -> bool {
     let audits = outcome.given.audits.iter();
@@ -134,33 +96,6 @@ fn is_told(outcome: &Outcome, what: &str) -> bool {
 /// Whether an audit says that a log's torques hold another gravity.
 fn contradicts_gravity(outcome: &Outcome) -> bool {
     is_told(outcome, "of the gravity that the declared bodies need")
-}
-
-#[test]
-fn torques_without_gravity_are_told() {
-    let rig = rig(&[(0, "viscous_friction", &[0.8])]);
-    let logs = [(20.0, 1), (10.0, 2)].map(|(seconds, seed)| recorded(&rig, seconds, seed));
-    assert!(!contradicts_gravity(&closed_on(
-        logs.clone(),
-        Some(Space::Torque)
-    )));
-    let balance = rig.torque_balance().unwrap();
-    let (values, zero) = (balance.values(), vec![0.0; rig.joints]);
-    let bare = logs.map(|mut log| {
-        for row in 0..log.rows() {
-            let q: Vec<f64> = log.q.iter().map(|q| q[row]).collect();
-            let inputs = [&q[..], &zero, &zero, &[0.0], &zero, &values].concat();
-            let gravity = balance.program.eval(&inputs);
-            for (tau, gravity) in log.tau.iter_mut().zip(gravity) {
-                tau[row] -= gravity;
-            }
-        }
-        log
-    });
-    let outcome = closed_on(bare, Some(Space::Torque));
-    assert!(contradicts_gravity(&outcome));
-    assert_eq!(outcome.verdict, Verdict::Inconclusive, "{}", outcome.reason);
-    assert_eq!(named(&outcome), []);
 }
 
 /// Rows of a log from one time on and before another.
@@ -203,17 +138,6 @@ fn of_measured(arm: &str, logs: [&str; 2], share: f64, most_percent: f64) -> Opt
     Some(outcome)
 }
 
-#[test]
-fn torques_of_a_measured_panda_are_explained_to_a_part_in_sixty() {
-    let log = "exciting_trajectory.csv";
-    let Some(outcome) = of_measured("panda", [log, log], 0.7, 1.53) else {
-        return;
-    };
-    // 7n - 6 for n joints that turn about axes in general position, the first along gravity (Mayeda et al., IEEE T-RA 1990).
-    assert_eq!(outcome.models.bodies.tellable, 43);
-    mujoco_follows(&outcome.models.after.model, "panda", log);
-}
-
 /// What MuJoCo has words for.
 const CARRIED: [&str; 5] = [
     "coulomb_friction",
@@ -249,35 +173,6 @@ fn mujoco_follows(model: &Model, arm: &str, log: &str) {
 }
 
 #[test]
-fn a_measured_kuka_is_explained_and_its_test_is_told_as_a_repeat() {
-    let logs = ["measurements_1.csv", "measurements_2.csv"];
-    let Some(outcome) = of_measured("kuka_lwr4", logs, 1.0, 3.0) else {
-        return;
-    };
-    assert!(is_told(
-        &outcome,
-        "the motion is that of measurements_1.csv once more"
-    ));
-    let told = report::text(&Report::new(&outcome, &Origin::of_seed(0)));
-    assert!(told.contains("The motion of measurements_2.csv is that of another log once more"));
-}
-
-#[test]
-fn the_shape_of_friction_in_the_first_joint_of_a_measured_ur10_is_named() {
-    let log = "ur10_exciting_trajectory.csv";
-    let Some(outcome) = of_measured("ur10", [log, log], 0.65, 6.0) else {
-        return;
-    };
-    assert!(
-        named(&outcome).contains(&(0, "degressive_friction".to_owned())),
-        "{:?}",
-        named(&outcome)
-    );
-    let bodies = &outcome.models.bodies;
-    assert!(bodies.tellable == 36 && bodies.told.len() < 36);
-}
-
-#[test]
 fn torques_of_a_model_that_gives_accelerations_cannot_be_compared() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("run.csv");
@@ -301,4 +196,113 @@ fn torques_of_a_model_that_gives_accelerations_cannot_be_compared() {
     ]);
     assert!(said.contains("pendulum gives accelerations"), "{said}");
     assert!(said.contains("--errors motion"), "{said}");
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn effects_of_an_arm_are_named_on_their_joints_by_torques() {
+        let hidden: [(usize, &str, &[f64]); 5] = [
+            (0, "coulomb_friction", &[0.6]),
+            (0, "viscous_friction", &[0.8]),
+            (1, "stribeck_friction", &[0.5, 1.0, 0.1]),
+            (2, "degressive_friction", &[0.4, 0.05]),
+            (3, "constant_torque", &[0.3]),
+        ];
+        let outcome = closed(&rig(&hidden), None);
+        assert_eq!(outcome.space, Space::Torque);
+        let wanted: Vec<(usize, String)> = (hidden.iter())
+            .map(|(joint, name, _)| (*joint, (*name).to_owned()))
+            .collect();
+        let mut found = named(&outcome);
+        found.sort();
+        let mut wanted = wanted;
+        wanted.sort();
+        assert_eq!(found, wanted);
+        let torque = outcome.errors.torque.unwrap();
+        assert!(
+            torque.after.relative < 0.3 * torque.before.relative,
+            "{torque:?}"
+        );
+    }
+
+    #[test]
+    fn an_arm_that_is_as_declared_but_for_its_bodies_lacks_no_effect() {
+        let outcome = closed(&rig(&[]), Some(Space::Torque));
+        assert_eq!(named(&outcome), []);
+        assert_eq!(
+            outcome.verdict,
+            Verdict::NoMissingEffect,
+            "{}",
+            outcome.reason
+        );
+    }
+
+    #[test]
+    fn torques_without_gravity_are_told() {
+        let rig = rig(&[(0, "viscous_friction", &[0.8])]);
+        let logs = [(20.0, 1), (10.0, 2)].map(|(seconds, seed)| recorded(&rig, seconds, seed));
+        assert!(!contradicts_gravity(&closed_on(
+            logs.clone(),
+            Some(Space::Torque)
+        )));
+        let balance = rig.torque_balance().unwrap();
+        let (values, zero) = (balance.values(), vec![0.0; rig.joints]);
+        let bare = logs.map(|mut log| {
+            for row in 0..log.rows() {
+                let q: Vec<f64> = log.q.iter().map(|q| q[row]).collect();
+                let inputs = [&q[..], &zero, &zero, &[0.0], &zero, &values].concat();
+                let gravity = balance.program.eval(&inputs);
+                for (tau, gravity) in log.tau.iter_mut().zip(gravity) {
+                    tau[row] -= gravity;
+                }
+            }
+            log
+        });
+        let outcome = closed_on(bare, Some(Space::Torque));
+        assert!(contradicts_gravity(&outcome));
+        assert_eq!(outcome.verdict, Verdict::Inconclusive, "{}", outcome.reason);
+        assert_eq!(named(&outcome), []);
+    }
+
+    #[test]
+    fn torques_of_a_measured_panda_are_explained_to_a_part_in_sixty() {
+        let log = "exciting_trajectory.csv";
+        let Some(outcome) = of_measured("panda", [log, log], 0.7, 1.53) else {
+            return;
+        };
+        // 7n - 6 for n joints that turn about axes in general position, the first along gravity (Mayeda et al., IEEE T-RA 1990).
+        assert_eq!(outcome.models.bodies.tellable, 43);
+        mujoco_follows(&outcome.models.after.model, "panda", log);
+    }
+
+    #[test]
+    fn a_measured_kuka_is_explained_and_its_test_is_told_as_a_repeat() {
+        let logs = ["measurements_1.csv", "measurements_2.csv"];
+        let Some(outcome) = of_measured("kuka_lwr4", logs, 1.0, 3.0) else {
+            return;
+        };
+        assert!(is_told(
+            &outcome,
+            "the motion is that of measurements_1.csv once more"
+        ));
+        let told = report::text(&Report::new(&outcome, &Origin::of_seed(0)));
+        assert!(told.contains("The motion of measurements_2.csv is that of another log once more"));
+    }
+
+    #[test]
+    fn the_shape_of_friction_in_the_first_joint_of_a_measured_ur10_is_named() {
+        let log = "ur10_exciting_trajectory.csv";
+        let Some(outcome) = of_measured("ur10", [log, log], 0.65, 6.0) else {
+            return;
+        };
+        assert!(
+            named(&outcome).contains(&(0, "degressive_friction".to_owned())),
+            "{:?}",
+            named(&outcome)
+        );
+        let bodies = &outcome.models.bodies;
+        assert!(bodies.tellable == 36 && bodies.told.len() < 36);
+    }
 }

@@ -35,69 +35,6 @@ const RIG: &str = "model = \"arm.toml\"\nparameters = { m = 1.2 }\n\
     excitation = { amplitude = [4.0], band_hz = [0.15, 2.0], tones = 8 }\n\
     recording = { logs = 1, duration_s = 12, start = [0, 0] }\n";
 
-#[test]
-fn a_wrong_mass_is_named_with_its_right_value() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    std::fs::write(at("arm.toml"), ARM).unwrap();
-    std::fs::write(at("rig.toml"), RIG).unwrap();
-    let logs: Vec<_> = (1..5).map(|k| at(&format!("run{k}.csv"))).collect();
-    let logs: Vec<&str> = logs.iter().map(|log| text(log)).collect();
-    for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
-        let rig = at("rig.toml");
-        succeeds(&[
-            "simulate",
-            "--plant",
-            text(&rig),
-            "--seed",
-            seed,
-            "--out",
-            log,
-        ]);
-    }
-    let (arm, out) = (at("arm.toml"), at("report"));
-    let all = [
-        &["closeloop", "--json", "--model", text(&arm), "--train"],
-        &logs[..3],
-        &["--test", logs[3], "--out", text(&out)],
-    ];
-    let report: Value = serde_json::from_str(&succeeds(&all.concat())).unwrap();
-    assert_eq!(report["verdict"], "explained");
-    let effects = report["effects"].as_array().unwrap();
-    assert_eq!(effects.len(), 1, "{effects:?}");
-    assert_eq!(effects[0]["name"], "parameter_shift");
-    assert_eq!(effects[0]["expression"], "m = 1.2 (declared 1)");
-    let parameter = &effects[0]["parameters"][0];
-    assert_eq!(parameter["name"], "m");
-    assert_eq!(parameter["unit"], "kg");
-    let number = |value: &Value| value.as_f64().unwrap();
-    let [low, high] = [0, 1].map(|end| number(&parameter["ci95"][end]));
-    assert!(
-        (number(&parameter["value"]) - TRUE_M).abs() < high - low,
-        "{parameter}"
-    );
-    assert!(high - low < 0.01, "{parameter}");
-    // The written model has it in its place, and predicts the same, as does the checkpoint's.
-    let written = Model::read(&out.join("model.toml"), Library::built_in().effects()).unwrap();
-    assert!(written.effects.is_empty());
-    assert_eq!(written.parameters[0].value, number(&parameter["value"]));
-    let error = |model: &[&str]| {
-        let all = [&["evaluate", "--json", "--test", logs[3]], model].concat();
-        let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
-        number(&value["position_rmse"][1][0])
-    };
-    let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
-    let after = number(&report["error"]["after"]["position_rmse"][1][0]);
-    assert_near(error(&["--model", text(&model)]), after, 1e-9, "model.toml");
-    let hybrid = number(&report["error"]["hybrid"]["position_rmse"][1][0]);
-    assert_near(
-        error(&["--checkpoint", text(&checkpoint)]),
-        hybrid,
-        1e-6,
-        "checkpoint",
-    );
-}
-
 fn read(text: &str) -> Model {
     Model::from_text(Path::new("model.toml"), text, Library::built_in().effects()).unwrap()
 }
@@ -150,4 +87,71 @@ fn a_shift_equals_a_file_with_the_shifted_value() {
     let other = arm.shifts().remove(1);
     assert!(arm.check_effect(&other, &[shift.clone()]).is_ok());
     assert!(arm.check_effect(&shift, &[other, shift.clone()]).is_err());
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn a_wrong_mass_is_named_with_its_right_value() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("arm.toml"), ARM).unwrap();
+        std::fs::write(at("rig.toml"), RIG).unwrap();
+        let logs: Vec<_> = (1..5).map(|k| at(&format!("run{k}.csv"))).collect();
+        let logs: Vec<&str> = logs.iter().map(|log| text(log)).collect();
+        for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
+            let rig = at("rig.toml");
+            succeeds(&[
+                "simulate",
+                "--plant",
+                text(&rig),
+                "--seed",
+                seed,
+                "--out",
+                log,
+            ]);
+        }
+        let (arm, out) = (at("arm.toml"), at("report"));
+        let all = [
+            &["closeloop", "--json", "--model", text(&arm), "--train"],
+            &logs[..3],
+            &["--test", logs[3], "--out", text(&out)],
+        ];
+        let report: Value = serde_json::from_str(&succeeds(&all.concat())).unwrap();
+        assert_eq!(report["verdict"], "explained");
+        let effects = report["effects"].as_array().unwrap();
+        assert_eq!(effects.len(), 1, "{effects:?}");
+        assert_eq!(effects[0]["name"], "parameter_shift");
+        assert_eq!(effects[0]["expression"], "m = 1.2 (declared 1)");
+        let parameter = &effects[0]["parameters"][0];
+        assert_eq!(parameter["name"], "m");
+        assert_eq!(parameter["unit"], "kg");
+        let number = |value: &Value| value.as_f64().unwrap();
+        let [low, high] = [0, 1].map(|end| number(&parameter["ci95"][end]));
+        assert!(
+            (number(&parameter["value"]) - TRUE_M).abs() < high - low,
+            "{parameter}"
+        );
+        assert!(high - low < 0.01, "{parameter}");
+        // The written model has it in its place, and predicts the same, as does the checkpoint's.
+        let written = Model::read(&out.join("model.toml"), Library::built_in().effects()).unwrap();
+        assert!(written.effects.is_empty());
+        assert_eq!(written.parameters[0].value, number(&parameter["value"]));
+        let error = |model: &[&str]| {
+            let all = [&["evaluate", "--json", "--test", logs[3]], model].concat();
+            let value: Value = serde_json::from_str(&succeeds(&all)).unwrap();
+            number(&value["position_rmse"][1][0])
+        };
+        let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
+        let after = number(&report["error"]["after"]["position_rmse"][1][0]);
+        assert_near(error(&["--model", text(&model)]), after, 1e-9, "model.toml");
+        let hybrid = number(&report["error"]["hybrid"]["position_rmse"][1][0]);
+        assert_near(
+            error(&["--checkpoint", text(&checkpoint)]),
+            hybrid,
+            1e-6,
+            "checkpoint",
+        );
+    }
 }

@@ -1,4 +1,8 @@
 //! One binary for all integration tests: Burn is linked once.
+//!
+//! A test that computes for more than a few seconds, needs other programs than a shell, or kills what it starts stands in a
+//! module called `slow`: in the folder of that name, or at the end of the file of its subject. `tests/run --quick` leaves
+//! these out, by their paths alone, and is told of a test that needs another program by its failure.
 
 // In tests a panic is the message.
 #![allow(clippy::unwrap_used)]

@@ -40,44 +40,6 @@ fn worst(outcome: &TrainingResults) -> f64 {
 }
 
 #[test]
-fn a_killed_run_resumes_to_the_same_numbers() {
-    let config = config("train-pendulum.toml");
-    let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let command = [
-        "train",
-        "--config",
-        &config,
-        "--save-every",
-        "20",
-        "--out",
-        "c",
-    ];
-    let expected = json(whole.path(), &command);
-
-    let manifest = killed.path().join("c/checkpoint.json");
-    for _ in 0..2 {
-        let mut command = residyn(killed.path(), &command);
-        kill_after(&mut command, &manifest, Duration::from_millis(120));
-    }
-    let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
-    let notes = String::from_utf8(output.stderr).unwrap();
-    assert!(notes.contains("note: c goes on from epoch"), "{notes}");
-    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(found, expected);
-    for file in [
-        "weights.safetensors",
-        "last.safetensors",
-        "checkpoint.json",
-        "model.toml",
-    ] {
-        let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
-        assert!(read(whole.path()) == read(killed.path()), "{file}");
-    }
-    let left = std::fs::read_dir(killed.path()).unwrap().count();
-    assert_eq!(left, 1, "only the checkpoint is left");
-}
-
-#[test]
 fn a_checkpoint_of_another_run_is_not_overwritten() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -264,4 +226,46 @@ fn the_published_settings_recover_the_acrobot_parameters() {
         outcome.test_error.unwrap().after < 1e-3 * outcome.error.before,
         "{outcome:?}"
     );
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn a_killed_run_resumes_to_the_same_numbers() {
+        let config = config("train-pendulum.toml");
+        let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let command = [
+            "train",
+            "--config",
+            &config,
+            "--save-every",
+            "20",
+            "--out",
+            "c",
+        ];
+        let expected = json(whole.path(), &command);
+
+        let manifest = killed.path().join("c/checkpoint.json");
+        for _ in 0..2 {
+            let mut command = residyn(killed.path(), &command);
+            kill_after(&mut command, &manifest, Duration::from_millis(120));
+        }
+        let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
+        let notes = String::from_utf8(output.stderr).unwrap();
+        assert!(notes.contains("note: c goes on from epoch"), "{notes}");
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(found, expected);
+        for file in [
+            "weights.safetensors",
+            "last.safetensors",
+            "checkpoint.json",
+            "model.toml",
+        ] {
+            let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
+            assert!(read(whole.path()) == read(killed.path()), "{file}");
+        }
+        let left = std::fs::read_dir(killed.path()).unwrap().count();
+        assert_eq!(left, 1, "only the checkpoint is left");
+    }
 }

@@ -21,11 +21,14 @@ pub struct Rig {
     logs: Vec<Log>,
 }
 
-const PENDULUM: &str = include_str!("../../models/pendulum.toml");
-const ACROBOT: &str = include_str!("../../models/acrobot.toml");
+const PENDULUM: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/models/pendulum.toml"));
+const ACROBOT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/models/acrobot.toml"));
 
 /// The acrobot with its joints numbered the other way round.
-const RENUMBERED: &str = include_str!("../fixtures/acrobot-renumbered.toml");
+const RENUMBERED: &str = include_str!(concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/tests/fixtures/acrobot-renumbered.toml"
+));
 
 /// Rigs of one joint and of two that are recorded in seconds; sizes of effects are drawn.
 const ONE: &str = "model = \"pendulum\"\nparameters = { C_g = -17.4, C_i = 4.6 }\n\

@@ -6,8 +6,17 @@ use std::process::Command;
 
 use super::paths::ours;
 
+/// What `tests/run --quick` runs needs no other programs.
+pub fn not_in_a_quick_run() {
+    assert!(
+        std::env::var_os("RESIDYN_QUICK").is_none(),
+        "a test that needs another program stands in a module `slow`: see tests/tests.rs"
+    );
+}
+
 /// Run one of the scripts in `tests/clients`; without an interpreter, print a prominent note.
 pub fn client(script: &str, arguments: &[&Path]) {
+    not_in_a_quick_run();
     let Some(python) = std::env::var_os("RESIDYN_PYTHON") else {
         let note = format!("SKIPPED {script}: RESIDYN_PYTHON is not set; run tests/run\n");
         // Not eprintln!, which the test harness swallows.
@@ -42,6 +51,7 @@ fn has_browser() -> bool {
 
 /// Look at a page in a browser, where there is one.
 pub fn look_at(page: &Path) {
+    not_in_a_quick_run();
     if has_browser() {
         client("page.py", &[page]);
     }
@@ -49,6 +59,7 @@ pub fn look_at(page: &Path) {
 
 /// Whether these tools start; if one does not, print a prominent note.
 pub fn there_are(tools: &[&str]) -> bool {
+    not_in_a_quick_run();
     let starts = |tool: &&str| Command::new(tool).arg("--version").output().is_ok();
     let missing: Vec<&str> = tools.iter().copied().filter(|tool| !starts(tool)).collect();
     if !missing.is_empty() {

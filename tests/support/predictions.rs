@@ -7,12 +7,14 @@ use residyn::formats::{ClientError, ExportModel, Format, Predictions, Samples};
 use tempfile::TempDir;
 
 use super::catalogue::rng;
+use super::clients::not_in_a_quick_run;
 
 /// What a client predicts; none, said loudly, without a client on this machine.
 pub fn predictions(
     name: &str,
     predict: impl FnOnce() -> Result<Predictions, ClientError>,
 ) -> Option<Predictions> {
+    not_in_a_quick_run();
     match predict() {
         Ok(predictions) => Some(predictions),
         Err(ClientError::Unavailable(reason)) => {
