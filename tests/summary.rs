@@ -6,6 +6,7 @@ use std::path::Path;
 use residyn::report::{Report, summary};
 use serde_json::{Value, json};
 
+use crate::support::paths::ours;
 use crate::support::{succeeds, text};
 
 const BLOCKS: [char; 2] = ['█', '▁'];
@@ -20,7 +21,10 @@ fn fits(said: &str) {
 fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("r");
-    let said = succeeds(&["closeloop", "--curves", "--out", text(&out)]);
+    let log = ours("tests/fixtures/logs/pendulum.csv");
+    let rig = ["--model", "pendulum", "--train", text(&log)];
+    let closed = ["closeloop", "--curves", "--out", text(&out)];
+    let said = succeeds(&[&closed[..], &rig].concat());
     fits(said.rsplit_once("\nTook ").unwrap().0);
     for words in [
         "The model lacks coulomb_friction on joint 1",

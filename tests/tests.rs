@@ -29,6 +29,7 @@ mod folders;
 mod front_door;
 mod functions;
 mod fuzz;
+mod golden;
 mod gradients;
 mod guide;
 mod hard;

@@ -1,5 +1,6 @@
 //! Measured logs, which are not part of the repository.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use super::paths::ours;
@@ -21,7 +22,9 @@ pub fn measured(set: &str) -> Option<PathBuf> {
         "measured data are required, and {} is missing",
         folder.display()
     );
-    eprintln!(
+    // Not eprintln!, which the test harness swallows.
+    let _ = writeln!(
+        std::io::stderr(),
         "SKIPPED: no measured data at {}; set RESIDYN_DATA (see README)",
         folder.display()
     );

@@ -5,6 +5,7 @@ pub mod bench;
 mod binary;
 pub mod catalogue;
 pub mod clients;
+pub mod committed;
 pub mod demo;
 pub mod exported_models;
 pub mod in_folder;
