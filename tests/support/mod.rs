@@ -9,6 +9,7 @@ pub mod committed;
 pub mod demo;
 pub mod exported_models;
 pub mod in_folder;
+pub mod interface;
 pub mod log_files;
 pub mod logs;
 mod measured;
