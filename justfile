@@ -15,6 +15,10 @@ lint:
 test *arguments:
     tests/run {{arguments}}
 
+# The tests that answer within two minutes once all is built
+quick *arguments:
+    tests/run --quick {{arguments}}
+
 # The library's documentation
 doc:
     RUSTDOCFLAGS="-D warnings" cargo doc --release --workspace --no-deps

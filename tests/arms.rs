@@ -1,20 +1,19 @@
 //! Chains of many joints: their equations beside those of Pinocchio and MuJoCo.
 
-use std::f64::consts::TAU;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use rand::RngExt;
-use residyn::data::{Interval, Joint, Log};
+use residyn::data::{Interval, Joint};
 use residyn::identify::fit_torques;
-use residyn::model::chain::{Chain, Inertia, model_text};
+use residyn::model::chain::Inertia;
 use residyn::model::{FittedEffect, Library, Model};
 use residyn::sim::metric::torque_error;
 use serde::Deserialize;
 use serde_json::Value;
 
-use crate::clients::client;
-use crate::mechanism::{fixture, read_to};
+use crate::support::arms::{model, moved};
+use crate::support::clients::client;
+use crate::support::mechanisms::{fixture, read_to};
 use crate::support::{measured, refuses, succeeds, text};
 
 /// What Pinocchio and MuJoCo say of an arm.
@@ -25,18 +24,6 @@ struct Arm {
     joints: Vec<String>,
     peers: Vec<String>,
     samples: Vec<Value>,
-}
-
-/// As `residyn new` writes it.
-pub fn described(chain: &Chain) -> Model {
-    let library = Library::built_in();
-    let path = Path::new(&chain.name);
-    Model::from_text(path, &model_text(chain), library.effects()).unwrap()
-}
-
-/// Its bodies alone, without what acts on the joints.
-pub fn model(chain: &Chain) -> Model {
-    described(chain).with_effects(Vec::new())
 }
 
 fn numbers(sample: &Value, key: &str) -> Vec<f64> {
@@ -50,62 +37,12 @@ fn off(found: &[f64], wanted: &[f64]) -> f64 {
     differences.fold(0.0, f64::max) / size
 }
 
-#[test]
-fn pinocchio_and_mujoco_find_the_same_torques_and_accelerations() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("arms.json");
-    client("arms.py", &[fixture("").as_path(), &file]);
-    let Ok(told) = fs::read_to_string(&file) else {
-        return;
-    };
-    let arms: Vec<Arm> = serde_json::from_str(&told).unwrap();
-    assert!(arms.len() > 10, "{} arms", arms.len());
-    for arm in arms {
-        let name = arm.file.display();
-        let chain = read_to(&arm.file, arm.tip.as_deref());
-        let joints: Vec<&str> = chain
-            .leaders()
-            .map(|(_, joint)| joint.name.as_str())
-            .collect();
-        assert_eq!(joints, arm.joints, "{name}");
-        let model = model(&chain);
-        let (inverse, forward) = (model.torque_balance().unwrap(), model.dynamics());
-        let [values, still] = [model.values(), vec![0.0; model.joints]];
-        for sample in &arm.samples {
-            let [q, qd, qdd] = ["q", "qd", "qdd"].map(|key| numbers(sample, key));
-            let inputs = |tau: &[f64]| [&q, &qd, tau, &[0.0], &values].concat();
-            let needed = |qdd: &[f64]| {
-                let inputs = [&inputs(&still)[..3 * model.joints + 1], qdd, &values].concat();
-                inverse.program.eval(&inputs)
-            };
-            let torques = needed(&qdd);
-            for peer in &arm.peers {
-                let wanted = numbers(sample, peer);
-                assert!(
-                    off(&torques, &wanted) < 1e-10,
-                    "{name}: {peer}: {torques:?}, {wanted:?}"
-                );
-                let found = forward.program.eval(&inputs(&wanted));
-                let found = &found[model.joints..];
-                // Where axes of a light wrist are in line, rounding of the torques moves it.
-                let moved = off(found, &qdd);
-                assert!(moved < 1e-7, "{name}: {peer}: {found:?}, {qdd:?}");
-                let torques = needed(found);
-                assert!(
-                    off(&torques, &wanted) < 1e-10,
-                    "{name}: {peer}: {torques:?}"
-                );
-            }
-        }
-    }
-}
-
 /// Energy changes by the power of the torques, with a joint that follows another as well.
 #[test]
 fn energy_of_a_linkage_changes_by_the_power() {
     let model = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
     let (dynamics, energy) = (model.dynamics(), model.energy_program().unwrap());
-    for point in crate::common::points(&dynamics, 100, 3) {
+    for point in crate::support::catalogue::points(&dynamics, 100, 3) {
         let point = [&point[..13], &model.values()].concat();
         let (rates, energy) = (dynamics.program.eval(&point), energy.eval(&point));
         let parts: Vec<f64> = energy[2..].iter().zip(&rates).map(|(s, r)| s * r).collect();
@@ -256,48 +193,6 @@ fn torques_need_a_model_of_torques_and_a_log_of_a_second() {
     assert!(said.contains("pendulum gives accelerations"), "{said}");
 }
 
-/// A log of sines of several frequencies in each joint, with the torques that a model needs for them.
-pub fn moved(model: &Model, seconds: f64, seed: u64) -> Log {
-    let mut rng = crate::common::rng(seed);
-    let mut waves = || -> Vec<[f64; 3]> {
-        let wave = |f: usize| {
-            let phase = rng.random_range(0.0..TAU);
-            [0.5 / (1.0 + f as f64), TAU * 0.13 * (1.0 + f as f64), phase]
-        };
-        (0..5).map(wave).collect()
-    };
-    let joints: Vec<Vec<[f64; 3]>> = (0..model.joints).map(|_| waves()).collect();
-    let balance = model.torque_balance().unwrap();
-    let (values, n) = (balance.values(), model.joints);
-    let mut log = Log::empty(n);
-    for row in 0..(200.0 * seconds) as usize {
-        let t = 0.005 * row as f64;
-        let sum = |wave: &dyn Fn(&[f64; 3]) -> f64| -> Vec<f64> {
-            joints
-                .iter()
-                .map(|waves| waves.iter().map(wave).sum())
-                .collect()
-        };
-        let q = sum(&|[a, w, p]| a * (w * t + p).sin());
-        let qd = sum(&|[a, w, p]| a * w * (w * t + p).cos());
-        let qdd = sum(&|[a, w, p]| -a * w * w * (w * t + p).sin());
-        let mut tau = vec![0.0; n];
-        // What depends on the torque makes the difference one to first order.
-        for _ in 0..3 {
-            let inputs = [&q, &qd, &tau, &vec![t][..], &qdd, &values].concat();
-            let off = balance.program.eval(&inputs);
-            tau.iter_mut().zip(off).for_each(|(tau, off)| *tau += off);
-        }
-        log.time.push(t);
-        for j in 0..n {
-            log.q[j].push(q[j]);
-            log.qd[j].push(qd[j]);
-            log.tau[j].push(tau[j]);
-        }
-    }
-    log
-}
-
 /// The parameters of bodies that are off by a tenth or two come back from torques, as far as the motion tells them, and
 /// friction with them; what it does not tell stays, and every body stays one.
 #[test]
@@ -305,7 +200,11 @@ fn torques_of_a_linkage_tell_its_bodies_and_its_friction() {
     let declared = model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
     let friction = |level: f64| -> Vec<FittedEffect> {
         let effect = |joint: usize, name: &str, value: f64| {
-            crate::common::fitted(Library::built_in().effect(name).unwrap(), joint, &[value])
+            crate::support::catalogue::fitted(
+                Library::built_in().effect(name).unwrap(),
+                joint,
+                &[value],
+            )
         };
         (0..4)
             .flat_map(|j| {
@@ -436,5 +335,59 @@ fn fitted_torques_of_measured_arms_are_as_near_as_by_least_squares() {
             error < least_squares,
             "{arm}: {error} %, least squares {least_squares} %"
         );
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn pinocchio_and_mujoco_find_the_same_torques_and_accelerations() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("arms.json");
+        client("arms.py", &[fixture("").as_path(), &file]);
+        let Ok(told) = fs::read_to_string(&file) else {
+            return;
+        };
+        let arms: Vec<Arm> = serde_json::from_str(&told).unwrap();
+        assert!(arms.len() > 10, "{} arms", arms.len());
+        for arm in arms {
+            let name = arm.file.display();
+            let chain = read_to(&arm.file, arm.tip.as_deref());
+            let joints: Vec<&str> = chain
+                .leaders()
+                .map(|(_, joint)| joint.name.as_str())
+                .collect();
+            assert_eq!(joints, arm.joints, "{name}");
+            let model = model(&chain);
+            let (inverse, forward) = (model.torque_balance().unwrap(), model.dynamics());
+            let [values, still] = [model.values(), vec![0.0; model.joints]];
+            for sample in &arm.samples {
+                let [q, qd, qdd] = ["q", "qd", "qdd"].map(|key| numbers(sample, key));
+                let inputs = |tau: &[f64]| [&q, &qd, tau, &[0.0], &values].concat();
+                let needed = |qdd: &[f64]| {
+                    let inputs = [&inputs(&still)[..3 * model.joints + 1], qdd, &values].concat();
+                    inverse.program.eval(&inputs)
+                };
+                let torques = needed(&qdd);
+                for peer in &arm.peers {
+                    let wanted = numbers(sample, peer);
+                    assert!(
+                        off(&torques, &wanted) < 1e-10,
+                        "{name}: {peer}: {torques:?}, {wanted:?}"
+                    );
+                    let found = forward.program.eval(&inputs(&wanted));
+                    let found = &found[model.joints..];
+                    // Where axes of a light wrist are in line, rounding of the torques moves it.
+                    let moved = off(found, &qdd);
+                    assert!(moved < 1e-7, "{name}: {peer}: {found:?}, {qdd:?}");
+                    let torques = needed(found);
+                    assert!(
+                        off(&torques, &wanted) < 1e-10,
+                        "{name}: {peer}: {torques:?}"
+                    );
+                }
+            }
+        }
     }
 }

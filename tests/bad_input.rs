@@ -1,41 +1,26 @@
 //! Bad input gets one clear error that names the place and the remedy, exit status 2, and nothing half written.
 
 use std::fs;
-use std::path::PathBuf;
 
-use crate::support::{refuses, residyn, says, succeeds, text};
+use crate::support::{Scratch, refuses, residyn, says, succeeds, text};
 
 const GOOD: &str = "time,q1,qd1,tau1\n0,0.1,0,0\n0.01,0.1,0,0\n0.02,0.1,0,0\n";
 
-/// A scratch folder with one file in it.
-struct Scratch {
-    folder: tempfile::TempDir,
-    file: PathBuf,
-}
-
-fn scratch(name: &str, contents: &str) -> Scratch {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join(name);
-    fs::write(&file, contents).unwrap();
-    Scratch { folder, file }
-}
-
-impl Scratch {
-    /// What closing the loop on this log says; no folder may come of it.
-    fn closeloop(&self, model: &str) -> String {
-        let out = self.folder.path().join("out");
-        let message = refuses(&[
-            "closeloop",
-            "--model",
-            model,
-            "--train",
-            text(&self.file),
-            "--out",
-            text(&out),
-        ]);
-        assert!(!out.exists(), "a folder was left behind");
-        message
-    }
+/// What closing the loop on a log says; no folder may come of it.
+fn closeloop(model: &str, log: &str) -> String {
+    let scratch = Scratch::new();
+    let (log, out) = (scratch.file("log.csv", log), scratch.out());
+    let message = refuses(&[
+        "closeloop",
+        "--model",
+        model,
+        "--train",
+        &log,
+        "--out",
+        &out,
+    ]);
+    assert!(!scratch.path("out").exists(), "a folder was left behind");
+    message
 }
 
 #[test]
@@ -70,7 +55,7 @@ fn a_log_that_cannot_be_read_is_refused_with_its_place() {
         ("time,q1,qd1,tau1\n0,0,0\n1,0,0,0\n", &["log.csv, line 2"]),
     ];
     for (contents, parts) in cases {
-        says(&scratch("log.csv", contents).closeloop("pendulum"), parts);
+        says(&closeloop("pendulum", contents), parts);
     }
 }
 
@@ -84,19 +69,12 @@ fn a_log_that_is_not_there_is_named() {
 
 #[test]
 fn a_log_that_is_too_short_to_fit_says_so() {
-    says(
-        &scratch("log.csv", GOOD).closeloop("pendulum"),
-        &["too short", "--test"],
-    );
+    says(&closeloop("pendulum", GOOD), &["too short", "--test"]);
 }
 
 /// What a model file with this change of the pendulum's says.
 fn model_message(from: &str, to: &str) -> String {
-    let pendulum = include_str!("../models/pendulum.toml");
-    assert!(pendulum.contains(from));
-    let model = scratch("model.toml", &pendulum.replacen(from, to, 1));
-    let log = scratch("log.csv", GOOD);
-    log.closeloop(text(&model.file))
+    closeloop(&Scratch::new().model("model.toml", from, to), GOOD)
 }
 
 #[test]
@@ -205,10 +183,10 @@ fn an_effect_that_cannot_act_is_refused() {
 fn per_takes_no_value_but_log() {
     let contents = "[effect]\nname = \"zero\"\nabout = \"zero\"\nangle = \"q - z\"\n\n[parameters]\n\
                 z = { unit = \"rad\", typical = 0.1, per = \"week\" }\n";
-    let effect = scratch("zero.toml", contents);
-    let folder = effect.folder.path();
+    let scratch = Scratch::new();
+    scratch.file("zero.toml", contents);
     says(
-        &refuses(&["list", "effects", "--effects", text(folder)]),
+        &refuses(&["list", "effects", "--effects", text(&scratch.path(""))]),
         &[
             "zero.toml, line 7, column 42",
             "`per` is \"log\"",
@@ -233,7 +211,7 @@ fn only_parameters_per_log_take_values_of_single_logs() {
 #[test]
 fn a_missing_model_is_answered_with_the_known_ones() {
     says(
-        &scratch("log.csv", GOOD).closeloop("pendulun"),
+        &closeloop("pendulun", GOOD),
         &[
             "pendulun",
             "acrobot, cartpole, drive, motor, pendulum, servo",
@@ -278,14 +256,15 @@ fn unknown_effects_and_parameters_of_a_simulation_are_named() {
 
 #[test]
 fn leave_out_must_name_a_log_and_a_time() {
-    let log = scratch("log.csv", GOOD);
+    let scratch = Scratch::new();
+    let log = scratch.file("log.csv", GOOD);
     let ask = |span: &str| {
         refuses(&[
             "evaluate",
             "--model",
             "pendulum",
             "--test",
-            text(&log.file),
+            &log,
             "--leave-out",
             span,
         ])
@@ -297,12 +276,12 @@ fn leave_out_must_name_a_log_and_a_time() {
 
 #[test]
 fn a_folder_that_is_no_checkpoint_is_refused() {
-    let log = scratch("log.csv", GOOD);
-    let evaluate =
-        |dir: &str| refuses(&["evaluate", "--checkpoint", dir, "--test", text(&log.file)]);
+    let scratch = Scratch::new();
+    let log = scratch.file("log.csv", GOOD);
+    let evaluate = |dir: &str| refuses(&["evaluate", "--checkpoint", dir, "--test", &log]);
     says(&evaluate("nowhere"), &["nowhere"]);
-    let broken = scratch("checkpoint.json", "{ not json");
-    says(&evaluate(text(broken.folder.path())), &["checkpoint.json"]);
+    scratch.file("checkpoint.json", "{ not json");
+    says(&evaluate(text(&scratch.path(""))), &["checkpoint.json"]);
 }
 
 /// Results that cannot be written, as on a full disk: every write fails with an error.
@@ -332,14 +311,15 @@ fn a_full_disk_leaves_nothing_half_written() {
 
 #[test]
 fn a_folder_that_cannot_be_written_is_refused_before_the_work() {
-    let file = scratch("a-file", "");
-    let inside = file.file.join("report");
+    let scratch = Scratch::new();
+    let file = scratch.file("a-file", "");
+    let inside = scratch.path("a-file").join("report");
     says(
         &refuses(&["closeloop", "--out", text(&inside)]),
         &["a-file", "--out"],
     );
     says(
-        &refuses(&["closeloop", "--out", text(&file.file)]),
+        &refuses(&["closeloop", "--out", &file]),
         &["is a file", "--out"],
     );
     let log = inside.join("log.csv");
@@ -353,15 +333,10 @@ fn a_folder_that_cannot_be_written_is_refused_before_the_work() {
 fn a_rig_that_diverges_is_reported() {
     let pendulum = include_str!("../models/pendulum.toml")
         .replace("C_i * tau1", "C_i * tau1 + exp(abs(q1))^4");
-    let model = scratch("model.toml", &pendulum);
-    let out = model.folder.path().join("log.csv");
-    let output = residyn(&[
-        "simulate",
-        "--plant",
-        text(&model.file),
-        "--out",
-        text(&out),
-    ]);
+    let scratch = Scratch::new();
+    let model = scratch.file("model.toml", pendulum);
+    let out = scratch.path("log.csv");
+    let output = residyn(&["simulate", "--plant", &model, "--out", text(&out)]);
     assert_eq!(output.status.code(), Some(1));
     says(&String::from_utf8_lossy(&output.stderr), &["diverges"]);
     assert!(!out.exists());

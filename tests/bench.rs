@@ -69,51 +69,6 @@ const NOT_IN_THE_EQUATIONS: [&str; 6] = [
 const NEAR: f64 = 1e-4;
 
 #[test]
-fn bench_rigs_and_effect_files_agree_on_every_effect() {
-    let library = Library::built_in();
-    let mut compared = 0;
-    for mut cell in read(&path("effects.toml")).unwrap() {
-        let in_equations = |hidden: &Hidden| !NOT_IN_THE_EQUATIONS.contains(&hidden.name.as_str());
-        let plain = cell.condition == "base" && cell.group == Group::Single;
-        if !(plain && cell.effects.iter().all(in_equations)) {
-            continue;
-        }
-        let Source::Simulated(simulation) = &mut cell.source else {
-            panic!("the grid's rigs are simulated")
-        };
-        let mechanics = simulation.mechanics.clone();
-        let condition = &mut simulation.condition;
-        condition.noise = 0.0;
-        condition.rate_hz = 500.0;
-        condition.logs = 2;
-        condition.seconds = 6.0;
-        let system = library.model(&cell.model).unwrap();
-        let (logs, _) = cell.record(&system).unwrap();
-        let error = |effects: &[FittedEffect]| {
-            let rig = system.with_effects(effects.to_vec());
-            let mut rig = rig.with_sign_widths(vec![1e-4; system.joints]);
-            for parameter in &mut rig.parameters {
-                parameter.value = true_value(&mechanics, &parameter.name).expect("the rig has it");
-            }
-            assess(&rig.dynamics(), &logs, &[0.5]).position_rms()
-        };
-        let effects: Option<Vec<FittedEffect>> = cell
-            .effects
-            .iter()
-            .map(|hidden| known(&library, hidden))
-            .collect();
-        let (with, without) = (error(&effects.expect("the library knows it")), error(&[]));
-        assert!(
-            with < NEAR && with < 0.02 * without,
-            "{}: {with} rad with it, {without} without",
-            cell.id
-        );
-        compared += 1;
-    }
-    assert!(compared > 50, "{compared}");
-}
-
-#[test]
 fn rigs_are_drawn_by_their_rules_and_the_same_each_time() {
     let cells = read(&path("real.toml")).unwrap();
     let named = |part: &str| cells.iter().filter(|c| c.id.starts_with(part)).count();
@@ -146,68 +101,6 @@ fn rigs_are_drawn_by_their_rules_and_the_same_each_time() {
         assert!((0.0..=0.03).contains(&condition.flaws.dropped));
         assert_eq!(condition.drive.len(), 2);
     }
-}
-
-#[test]
-fn a_drawn_rig_starts_off_and_is_the_same_each_time() {
-    let library = Library::built_in();
-    let cells = read(&path("real.toml")).unwrap();
-    for (id, effects) in [("real/none/1", 0), ("real/one/1", 2)] {
-        let cell = cells.iter().find(|cell| cell.id == id).unwrap();
-        let settled = cell.settled(&library).unwrap();
-        assert_eq!(settled, cell.settled(&library).unwrap());
-        assert_eq!((settled.id.as_str(), settled.effects.len()), (id, effects));
-        let model = settled.declared(&library).unwrap();
-        let (logs, truth) = settled.record(&model).unwrap();
-        assert_eq!(logs, settled.record(&model).unwrap().0);
-        for parameter in &model.parameters {
-            let off = parameter.value / truth.declared[&parameter.name];
-            assert!((0.2..=5.0).contains(&off), "{}: {off}", parameter.name);
-            assert_ne!(off, 1.0);
-        }
-    }
-}
-
-#[test]
-fn a_small_grid_gives_a_table_and_a_broken_run_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let (grid, out) = (path("smoke.toml"), folder.path());
-    let run = |only: &[&str]| {
-        let mut arguments = vec![
-            "bench",
-            "effects",
-            "--grid",
-            text(&grid),
-            "--out",
-            text(out),
-        ];
-        arguments.extend(["--json", "--only"]);
-        arguments.extend(only);
-        let summary: serde_json::Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
-        summary
-    };
-    let lines = || {
-        let text = std::fs::read_to_string(out.join("cells.jsonl")).unwrap();
-        text.lines()
-            .filter(|line| !line.is_empty())
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(run(&["none"])["cells"], 1);
-    // A line that was broken off is no result, and is cut off.
-    let first = lines();
-    std::fs::write(out.join("cells.jsonl"), format!("{}\n{{\"conf", first[0])).unwrap();
-    let summary = run(&["none", "coulomb"]);
-    assert_eq!((summary["cells"].as_u64(), lines().len()), (Some(2), 2));
-    assert_eq!(lines()[0], first[0], "the first cell is not run again");
-    let coulomb: serde_json::Value = serde_json::from_str(&lines()[1]).unwrap();
-    let errors = &coulomb["findings"]["Ok"]["errors"];
-    let error = |which: &str| errors[which].as_f64().unwrap();
-    // Whoever is told of the friction predicts far better than who is not.
-    assert!(error("told") < 0.2 * error("before"), "{errors}");
-    let table = std::fs::read_to_string(out.join("table.md")).unwrap();
-    assert!(table.contains("| one effect: exact |"), "{table}");
-    crate::page::look_at(&out.join("report.html"));
 }
 
 #[test]
@@ -254,4 +147,117 @@ fn logs_recorded_by_another_program_are_cells() {
         message.contains("cell.json: missing field `group`"),
         "{message}"
     );
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn bench_rigs_and_effect_files_agree_on_every_effect() {
+        let library = Library::built_in();
+        let mut compared = 0;
+        for mut cell in read(&path("effects.toml")).unwrap() {
+            let in_equations =
+                |hidden: &Hidden| !NOT_IN_THE_EQUATIONS.contains(&hidden.name.as_str());
+            let plain = cell.condition == "base" && cell.group == Group::Single;
+            if !(plain && cell.effects.iter().all(in_equations)) {
+                continue;
+            }
+            let Source::Simulated(simulation) = &mut cell.source else {
+                panic!("the grid's rigs are simulated")
+            };
+            let mechanics = simulation.mechanics.clone();
+            let condition = &mut simulation.condition;
+            condition.noise = 0.0;
+            condition.rate_hz = 500.0;
+            condition.logs = 2;
+            condition.seconds = 6.0;
+            let system = library.model(&cell.model).unwrap();
+            let (logs, _) = cell.record(&system).unwrap();
+            let error = |effects: &[FittedEffect]| {
+                let rig = system.with_effects(effects.to_vec());
+                let mut rig = rig.with_sign_widths(vec![1e-4; system.joints]);
+                for parameter in &mut rig.parameters {
+                    parameter.value =
+                        true_value(&mechanics, &parameter.name).expect("the rig has it");
+                }
+                assess(&rig.dynamics(), &logs, &[0.5]).position_rms()
+            };
+            let effects: Option<Vec<FittedEffect>> = cell
+                .effects
+                .iter()
+                .map(|hidden| known(&library, hidden))
+                .collect();
+            let (with, without) = (error(&effects.expect("the library knows it")), error(&[]));
+            assert!(
+                with < NEAR && with < 0.02 * without,
+                "{}: {with} rad with it, {without} without",
+                cell.id
+            );
+            compared += 1;
+        }
+        assert!(compared > 50, "{compared}");
+    }
+
+    #[test]
+    fn a_drawn_rig_starts_off_and_is_the_same_each_time() {
+        let library = Library::built_in();
+        let cells = read(&path("real.toml")).unwrap();
+        for (id, effects) in [("real/none/1", 0), ("real/one/1", 2)] {
+            let cell = cells.iter().find(|cell| cell.id == id).unwrap();
+            let settled = cell.settled(&library).unwrap();
+            assert_eq!(settled, cell.settled(&library).unwrap());
+            assert_eq!((settled.id.as_str(), settled.effects.len()), (id, effects));
+            let model = settled.declared(&library).unwrap();
+            let (logs, truth) = settled.record(&model).unwrap();
+            assert_eq!(logs, settled.record(&model).unwrap().0);
+            for parameter in &model.parameters {
+                let off = parameter.value / truth.declared[&parameter.name];
+                assert!((0.2..=5.0).contains(&off), "{}: {off}", parameter.name);
+                assert_ne!(off, 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_small_grid_gives_a_table_and_a_broken_run_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let (grid, out) = (path("smoke.toml"), folder.path());
+        let run = |only: &[&str]| {
+            let mut arguments = vec![
+                "bench",
+                "effects",
+                "--grid",
+                text(&grid),
+                "--out",
+                text(out),
+            ];
+            arguments.extend(["--json", "--only"]);
+            arguments.extend(only);
+            let summary: serde_json::Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
+            summary
+        };
+        let lines = || {
+            let text = std::fs::read_to_string(out.join("cells.jsonl")).unwrap();
+            text.lines()
+                .filter(|line| !line.is_empty())
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(run(&["none"])["cells"], 1);
+        // A line that was broken off is no result, and is cut off.
+        let first = lines();
+        std::fs::write(out.join("cells.jsonl"), format!("{}\n{{\"conf", first[0])).unwrap();
+        let summary = run(&["none", "coulomb"]);
+        assert_eq!((summary["cells"].as_u64(), lines().len()), (Some(2), 2));
+        assert_eq!(lines()[0], first[0], "the first cell is not run again");
+        let coulomb: serde_json::Value = serde_json::from_str(&lines()[1]).unwrap();
+        let errors = &coulomb["findings"]["Ok"]["errors"];
+        let error = |which: &str| errors[which].as_f64().unwrap();
+        // Whoever is told of the friction predicts far better than who is not.
+        assert!(error("told") < 0.2 * error("before"), "{errors}");
+        let table = std::fs::read_to_string(out.join("table.md")).unwrap();
+        assert!(table.contains("| one effect: exact |"), "{table}");
+        crate::support::clients::look_at(&out.join("report.html"));
+    }
 }

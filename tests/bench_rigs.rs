@@ -2,212 +2,25 @@
 
 use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 use residyn::bench::rigs::{
     Fold, Line, LogErrors, Measured, Method, RigsError, Squares, Task, Tools, errors_on, read,
     summarise,
 };
-use residyn::bench::{Cell, Source, read as grid};
 use residyn::closeloop::Settings;
 use residyn::formats::ClientError;
 use residyn::model::Library;
 use serde_json::Value;
-use tempfile::TempDir;
 
-use crate::support::{refuses, residyn, succeeds, text};
-
-fn config(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("configs/bench")
-        .join(name)
-}
-
-/// Four logs of a pendulum with dry friction.
-fn record(folder: &Path) {
-    fs::create_dir_all(folder).unwrap();
-    let mut cell: Cell = grid(&config("smoke.toml")).unwrap().remove(0);
-    let Source::Simulated(simulation) = &mut cell.source else {
-        panic!("the grid's rigs are simulated")
-    };
-    simulation.condition.logs = 4;
-    let model = Library::built_in().model(&cell.model).unwrap();
-    for log in cell.record(&model).unwrap().0 {
-        log.write(folder.join(&log.path)).unwrap();
-    }
-}
-
-/// The rig's true values, without its friction, as the published set.
-pub const RIGS: &str = r#"
-plain = ["coulomb_friction"]
-
-[[rig]]
-name = "rig"
-folder = "logs"
-model = "pendulum"
-parameters = { C_i = 5.0 }
-logs = ["log1.csv", "log2.csv", "log3.csv"]
-test = "each_log"
-leave_out = ["log2.csv@7.5-8"]
-published = [{ name = "1.0", model = "pendulum", parameters = { C_g = -19.62, C_i = 6.6667 } }]
-also = { fourth = ["log4.csv"] }
-"#;
-
-/// A folder with a file of rigs and the logs.
-pub struct Bench {
-    folder: TempDir,
-}
-
-impl Bench {
-    pub fn new(rigs: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        record(&folder.path().join("logs"));
-        fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
-        Self { folder }
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// Run the command with these flags too.
-    fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
-        let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
-        let data = text(self.folder.path());
-        let rigs = [
-            "bench",
-            "rigs",
-            "--rigs",
-            text(&rigs),
-            "--data",
-            data,
-            "--out",
-            text(&out),
-        ];
-        run(&[rigs.as_slice(), more].concat());
-    }
-}
+use crate::support::bench::{Bench, RIGS};
+use crate::support::paths::config;
+use crate::support::{refuses, residyn, succeeds};
 
 /// Error of a model in a row, 0.5 s ahead \[rad\].
 fn error(row: &Value, model: &str) -> f64 {
     let models = row["models"].as_array().unwrap();
     let entry = models.iter().find(|entry| entry["model"] == model).unwrap();
     entry["pooled"][1]["position_rms"].as_f64().unwrap()
-}
-
-#[test]
-fn each_log_is_left_out_in_turn_and_the_errors_are_pooled() {
-    let bench = Bench::new(RIGS);
-    let library = Library::built_in();
-    let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
-    let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
-    let tools = Tools {
-        library: &library,
-        learner: None,
-        seed: 0,
-    };
-    let run = |(fold, method): (&Fold, Method)| Line {
-        rig: rig.rig.name.clone(),
-        fold: fold.name.clone(),
-        method,
-        fingerprint: method.fingerprint(&rig, fold, 0, ""),
-        seconds: 1.0,
-        found: Ok(method.run(&rig, fold, &tools, &mut |_| ()).unwrap()),
-    };
-    // Python has a test of its own.
-    let here = Method::ALL
-        .into_iter()
-        .filter(|method| *method != Method::MujocoSysid);
-    let work = rig
-        .folds
-        .iter()
-        .flat_map(|fold| here.clone().map(move |method| (fold, method)));
-    let lines: Vec<Line> = work.map(run).collect();
-    let summary = summarise(std::slice::from_ref(&rig), &lines, [].into());
-    let summary = serde_json::to_value(summary).unwrap();
-    let rows = summary["rows"].as_array().unwrap();
-    assert_eq!(
-        (rows.len(), &rows[0]["folds"], &rows[1]["folds"]),
-        (2, &3.into(), &1.into())
-    );
-    assert_eq!(rows[1]["group"], "fourth");
-    for row in rows {
-        assert_eq!(row["named"]["coulomb_friction@1"], row["folds"], "{row}");
-        let (after, plain) = (error(row, "after"), error(row, "plain structure"));
-        assert!(after < 1.02 * plain, "{after} {plain}");
-        for frictionless in ["declared, fitted", "published 1.0"] {
-            assert!(after < 0.2 * error(row, frictionless), "{row}");
-        }
-        assert_eq!(
-            (&row["best"][0], &row["hybrid_ratio"]),
-            (&"plain structure".into(), &1.0.into())
-        );
-    }
-    let logs = &rows[0]["models"][0]["logs"];
-    assert_eq!(
-        (&logs[0][0], &logs[1][0]),
-        (&"log1.csv".into(), &"log2.csv".into())
-    );
-    let windows = |log: usize| logs[log][1][1]["windows"].as_u64().unwrap();
-    assert!(windows(1) < windows(0), "left-out windows are not scored");
-}
-
-#[test]
-fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
-    let bench = Bench::new(&RIGS.replace("each_log", "halves").replace("also", "#"));
-    bench.command(&["--json"], |arguments| {
-        let summary: Value = serde_json::from_str(&succeeds(arguments)).unwrap();
-        assert_eq!(summary["rows"].as_array().unwrap().len(), 1);
-        assert_eq!(summary["rows"][0]["folds"], 2);
-    });
-    let path = bench.path("out/rig/first half/closeloop.json");
-    let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
-    line["found"] = serde_json::json!({"Err": "the fit diverged"});
-    fs::write(&path, line.to_string()).unwrap();
-    // Stored results are used again.
-    bench.command(&["--json"], |arguments| {
-        let output = residyn(arguments);
-        assert_eq!(output.status.code(), Some(1));
-        let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(summary["failures"][0][2], "the fit diverged");
-        assert_eq!(summary["rows"][0]["ratio"], Value::Null);
-    });
-    let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
-    assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
-    crate::page::look_at(&bench.path("out/report.html"));
-    assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
-}
-
-#[test]
-fn mujoco_predicts_as_the_program_does_and_its_toolbox_finds_the_friction() {
-    let bench = Bench::new(RIGS);
-    let library = Library::built_in();
-    let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
-    let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
-    let (fold, (_, model)) = (&rig.folds[0], &rig.published[0]);
-    let rms = |errors: &[LogErrors]| errors[0].iter().map(Squares::rms).collect::<Vec<f64>>();
-    let task = Task::new(model, &[], &fold.test).unwrap();
-    let predicted = match task.run() {
-        Err(error) if error.is::<ClientError>() && env::var_os("RESIDYN_PYTHON").is_none() => {
-            eprintln!("SKIPPED mujoco.sysid: {error}");
-            return;
-        }
-        predicted => rms(&predicted.unwrap()),
-    };
-    let expected = rms(&errors_on(&model.dynamics(), &fold.test));
-    // MuJoCo's integrator is of first order: over a time t its steps h err by a h t / 2, here by gravity's largest
-    // acceleration in steps of 2 ms.
-    let horizons_s = Settings::default().score.horizons_s;
-    for ((predicted, expected), horizon_s) in predicted.iter().zip(&expected).zip(horizons_s) {
-        let stepping = 0.5 * 19.62 * 2e-3 * horizon_s;
-        assert!(
-            (predicted - expected).abs() < 0.02 * expected + stepping.min(0.1 * expected),
-            "{predicted} {expected}"
-        );
-    }
-    let fitted = Task::new(&rig.declared, &fold.train, &fold.test).unwrap();
-    let fitted = rms(&fitted.run().unwrap());
-    assert!(fitted[1] < 0.3 * expected[1], "{fitted:?} {expected:?}");
 }
 
 #[test]
@@ -232,7 +45,7 @@ fn results_of_other_logs_or_models_are_not_used_again() {
 
 #[test]
 fn the_rigs_of_the_repository_are_read() {
-    let rigs = read(&config("rigs.toml")).unwrap();
+    let rigs = read(config("bench/rigs.toml").as_ref()).unwrap();
     let names: Vec<&str> = rigs.iter().map(|rig| rig.name.as_str()).collect();
     assert_eq!(names.len(), 5, "{names:?}");
     let library = Library::built_in();
@@ -337,4 +150,123 @@ fn what_the_models_and_logs_of_a_rig_lack_is_told() {
         "nothing-of-the-kind",
     ]);
     assert!(message.contains("no rig's name contains"), "{message}");
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn each_log_is_left_out_in_turn_and_the_errors_are_pooled() {
+        let bench = Bench::new(RIGS);
+        let library = Library::built_in();
+        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+        let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
+        let tools = Tools {
+            library: &library,
+            learner: None,
+            seed: 0,
+        };
+        let run = |(fold, method): (&Fold, Method)| Line {
+            rig: rig.rig.name.clone(),
+            fold: fold.name.clone(),
+            method,
+            fingerprint: method.fingerprint(&rig, fold, 0, ""),
+            seconds: 1.0,
+            found: Ok(method.run(&rig, fold, &tools, &mut |_| ()).unwrap()),
+        };
+        // Python has a test of its own.
+        let here = Method::ALL
+            .into_iter()
+            .filter(|method| *method != Method::MujocoSysid);
+        let work = rig
+            .folds
+            .iter()
+            .flat_map(|fold| here.clone().map(move |method| (fold, method)));
+        let lines: Vec<Line> = work.map(run).collect();
+        let summary = summarise(std::slice::from_ref(&rig), &lines, [].into());
+        let summary = serde_json::to_value(summary).unwrap();
+        let rows = summary["rows"].as_array().unwrap();
+        assert_eq!(
+            (rows.len(), &rows[0]["folds"], &rows[1]["folds"]),
+            (2, &3.into(), &1.into())
+        );
+        assert_eq!(rows[1]["group"], "fourth");
+        for row in rows {
+            assert_eq!(row["named"]["coulomb_friction@1"], row["folds"], "{row}");
+            let (after, plain) = (error(row, "after"), error(row, "plain structure"));
+            assert!(after < 1.02 * plain, "{after} {plain}");
+            for frictionless in ["declared, fitted", "published 1.0"] {
+                assert!(after < 0.2 * error(row, frictionless), "{row}");
+            }
+            assert_eq!(
+                (&row["best"][0], &row["hybrid_ratio"]),
+                (&"plain structure".into(), &1.0.into())
+            );
+        }
+        let logs = &rows[0]["models"][0]["logs"];
+        assert_eq!(
+            (&logs[0][0], &logs[1][0]),
+            (&"log1.csv".into(), &"log2.csv".into())
+        );
+        let windows = |log: usize| logs[log][1][1]["windows"].as_u64().unwrap();
+        assert!(windows(1) < windows(0), "left-out windows are not scored");
+    }
+
+    #[test]
+    fn halves_train_and_test_and_a_failed_fold_is_never_a_success() {
+        let bench = Bench::new(&RIGS.replace("each_log", "halves").replace("also", "#"));
+        bench.command(&["--json"], |arguments| {
+            let summary: Value = serde_json::from_str(&succeeds(arguments)).unwrap();
+            assert_eq!(summary["rows"].as_array().unwrap().len(), 1);
+            assert_eq!(summary["rows"][0]["folds"], 2);
+        });
+        let path = bench.path("out/rig/first half/closeloop.json");
+        let mut line: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        line["found"] = serde_json::json!({"Err": "the fit diverged"});
+        fs::write(&path, line.to_string()).unwrap();
+        // Stored results are used again.
+        bench.command(&["--json"], |arguments| {
+            let output = residyn(arguments);
+            assert_eq!(output.status.code(), Some(1));
+            let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert_eq!(summary["failures"][0][2], "the fit diverged");
+            assert_eq!(summary["rows"][0]["ratio"], Value::Null);
+        });
+        let table = fs::read_to_string(bench.path("out/rigs.md")).unwrap();
+        assert!(table.contains("| 1 failed | 1 failed | - |"), "{table}");
+        crate::support::clients::look_at(&bench.path("out/report.html"));
+        assert!(table.contains("in 0, at most 0.9 of it in 0"), "{table}");
+    }
+
+    #[test]
+    fn mujoco_predicts_as_the_program_does_and_its_toolbox_finds_the_friction() {
+        let bench = Bench::new(RIGS);
+        let library = Library::built_in();
+        let rig = read(&bench.path("rigs.toml")).unwrap().remove(0);
+        let rig = Measured::open(rig, bench.folder.path(), &library).unwrap();
+        let (fold, (_, model)) = (&rig.folds[0], &rig.published[0]);
+        let rms = |errors: &[LogErrors]| errors[0].iter().map(Squares::rms).collect::<Vec<f64>>();
+        let task = Task::new(model, &[], &fold.test).unwrap();
+        let predicted = match task.run() {
+            Err(error) if error.is::<ClientError>() && env::var_os("RESIDYN_PYTHON").is_none() => {
+                eprintln!("SKIPPED mujoco.sysid: {error}");
+                return;
+            }
+            predicted => rms(&predicted.unwrap()),
+        };
+        let expected = rms(&errors_on(&model.dynamics(), &fold.test));
+        // MuJoCo's integrator is of first order: over a time t its steps h err by a h t / 2, here by gravity's largest
+        // acceleration in steps of 2 ms.
+        let horizons_s = Settings::default().score.horizons_s;
+        for ((predicted, expected), horizon_s) in predicted.iter().zip(&expected).zip(horizons_s) {
+            let stepping = 0.5 * 19.62 * 2e-3 * horizon_s;
+            assert!(
+                (predicted - expected).abs() < 0.02 * expected + stepping.min(0.1 * expected),
+                "{predicted} {expected}"
+            );
+        }
+        let fitted = Task::new(&rig.declared, &fold.train, &fold.test).unwrap();
+        let fitted = rms(&fitted.run().unwrap());
+        assert!(fitted[1] < 0.3 * expected[1], "{fitted:?} {expected:?}");
+    }
 }

@@ -12,7 +12,9 @@ use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 use serde_json::Value;
 
-use super::train::{config, configs, json, kill_after, refused, residyn};
+use crate::support::clients::client;
+use crate::support::in_folder::{json, kill_after, refused, residyn};
+use crate::support::paths::{config, configs};
 
 fn shipped(name: &str) -> String {
     let checkpoints = Path::new(env!("CARGO_MANIFEST_DIR")).join("checkpoints");
@@ -208,18 +210,6 @@ fn least_return(name: &str) -> f64 {
 }
 
 #[test]
-fn the_shipped_pendulum_checkpoint_is_reproduced_and_swings_up() {
-    comes_again("pendulum-sim", "train-pendulum-sim.toml", 1e-6);
-    assert!(least_return("pendulum-sim") > 290.0);
-}
-
-#[test]
-fn the_shipped_acrobot_checkpoint_is_reproduced_and_swings_up() {
-    comes_again("acrobot-sim", "train-acrobot-sim.toml", 1e-4);
-    assert!(least_return("acrobot-sim") > 3400.0);
-}
-
-#[test]
 fn every_experiment_is_sound() {
     let library = Library::built_in();
     let mut count = 0;
@@ -237,56 +227,6 @@ fn every_experiment_is_sound() {
         }
     }
     assert!(count >= 8);
-}
-
-#[test]
-fn a_killed_experiment_resumes_to_the_same_numbers() {
-    let config = config("smoke/physics-prior-pendulum.toml");
-    let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let command = experiment("physics-prior", &config, "x");
-    let expected = json(whole.path(), &command);
-    for file in ["hybrid-00/rounds.jsonl", "data_driven-00/rounds.jsonl"] {
-        let file = killed.path().join("x/runs").join(file);
-        kill_after(&mut residyn(killed.path(), &command), &file, Duration::ZERO);
-    }
-    let found = json(killed.path(), &command);
-    assert_eq!(found["methods"], expected["methods"]);
-    assert_eq!(found["reached"], expected["reached"]);
-    for name in ["prior", "data_driven", "hybrid", "perfect"] {
-        let course = &found["methods"][name];
-        let entries = course["transitions"].as_array().unwrap().len();
-        for key in ["return_mean", "return_std", "returns", "success"] {
-            assert_eq!(
-                course[key].as_array().unwrap().len(),
-                entries,
-                "{name} {key}"
-            );
-        }
-        assert_eq!(course["returns"][0].as_array().unwrap().len(), 2);
-        let [a, b] = [0, 1].map(|seed| course["returns"][0][seed].as_f64().unwrap());
-        let mean = course["return_mean"][0].as_f64().unwrap();
-        assert!((mean - 0.5 * (a + b)).abs() < 1e-9);
-    }
-    assert_eq!(
-        found["methods"]["hybrid"]["transitions"],
-        serde_json::json!([50, 100, 150, 200])
-    );
-    assert!(found["wall_s"].as_f64().unwrap() > 0.0);
-    let command_told = found["command"].as_str().unwrap();
-    assert!(
-        command_told.starts_with("residyn experiment physics-prior --config "),
-        "{command_told}"
-    );
-    let written: Value =
-        serde_json::from_slice(&fs::read(killed.path().join("x/results.json")).unwrap()).unwrap();
-    assert_eq!(written, found);
-    assert!(killed.path().join("x/results.svg").is_file());
-    crate::page::look_at(&killed.path().join("x/report.html"));
-    let stretch = killed.path().join("x/runs/hybrid-01/stretch-003.csv");
-    assert_eq!(
-        Log::read(&stretch, 1, &Columns::default()).unwrap().rows(),
-        51
-    );
 }
 
 #[test]
@@ -345,48 +285,115 @@ fn a_checkpoint_serves_as_prior_in_its_own_experiment_alone() {
     );
 }
 
-#[test]
-fn a_single_run_reports_its_rounds() {
-    let dir = tempfile::tempdir().unwrap();
-    let config = config("smoke/physics-prior-pendulum.toml");
-    let command = [
-        "mbrl",
-        "--config",
-        &config,
-        "--out",
-        "r",
-        "--tensorboard",
-        "t",
-        "--seed",
-        "3",
-    ];
-    let found = json(dir.path(), &command);
-    let lines = fs::read_to_string(dir.path().join("r/rounds.jsonl")).unwrap();
-    let lines: Vec<Value> = lines
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
-    assert_eq!(found["rounds"].as_array().unwrap(), &lines);
-    assert_eq!(lines.len(), 4);
-    let expected: Vec<Value> = (lines.iter())
-        .map(|line| serde_json::json!(["return", line["transitions"], null, line["return"]]))
-        .collect();
-    let path = dir.path().join("expected.json");
-    fs::write(&path, serde_json::to_string(&expected).unwrap()).unwrap();
-    super::clients::client(
-        "events.py",
-        &[&dir.path().join("t"), &path, Path::new("return")],
-    );
-    let again = json(dir.path(), &[&command[..5], &command[7..]].concat());
-    assert_eq!(again["rounds"], found["rounds"], "nothing is left to do");
-    let unknown = refused(
-        dir.path(),
-        &[
-            "mbrl", "--config", &config, "--method", "mine", "--out", "s",
-        ],
-    );
-    assert!(
-        unknown.contains("it has no method `mine`; choose from hybrid, data_driven"),
-        "{unknown}"
-    );
+mod slow {
+    use super::*;
+
+    #[test]
+    fn the_shipped_pendulum_checkpoint_is_reproduced_and_swings_up() {
+        comes_again("pendulum-sim", "train-pendulum-sim.toml", 1e-6);
+        assert!(least_return("pendulum-sim") > 290.0);
+    }
+
+    #[test]
+    fn the_shipped_acrobot_checkpoint_is_reproduced_and_swings_up() {
+        comes_again("acrobot-sim", "train-acrobot-sim.toml", 1e-4);
+        assert!(least_return("acrobot-sim") > 3400.0);
+    }
+
+    #[test]
+    fn a_killed_experiment_resumes_to_the_same_numbers() {
+        let config = config("smoke/physics-prior-pendulum.toml");
+        let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let command = experiment("physics-prior", &config, "x");
+        let expected = json(whole.path(), &command);
+        for file in ["hybrid-00/rounds.jsonl", "data_driven-00/rounds.jsonl"] {
+            let file = killed.path().join("x/runs").join(file);
+            kill_after(&mut residyn(killed.path(), &command), &file, Duration::ZERO);
+        }
+        let found = json(killed.path(), &command);
+        assert_eq!(found["methods"], expected["methods"]);
+        assert_eq!(found["reached"], expected["reached"]);
+        for name in ["prior", "data_driven", "hybrid", "perfect"] {
+            let course = &found["methods"][name];
+            let entries = course["transitions"].as_array().unwrap().len();
+            for key in ["return_mean", "return_std", "returns", "success"] {
+                assert_eq!(
+                    course[key].as_array().unwrap().len(),
+                    entries,
+                    "{name} {key}"
+                );
+            }
+            assert_eq!(course["returns"][0].as_array().unwrap().len(), 2);
+            let [a, b] = [0, 1].map(|seed| course["returns"][0][seed].as_f64().unwrap());
+            let mean = course["return_mean"][0].as_f64().unwrap();
+            assert!((mean - 0.5 * (a + b)).abs() < 1e-9);
+        }
+        assert_eq!(
+            found["methods"]["hybrid"]["transitions"],
+            serde_json::json!([50, 100, 150, 200])
+        );
+        assert!(found["wall_s"].as_f64().unwrap() > 0.0);
+        let command_told = found["command"].as_str().unwrap();
+        assert!(
+            command_told.starts_with("residyn experiment physics-prior --config "),
+            "{command_told}"
+        );
+        let written: Value =
+            serde_json::from_slice(&fs::read(killed.path().join("x/results.json")).unwrap())
+                .unwrap();
+        assert_eq!(written, found);
+        assert!(killed.path().join("x/results.svg").is_file());
+        crate::support::clients::look_at(&killed.path().join("x/report.html"));
+        let stretch = killed.path().join("x/runs/hybrid-01/stretch-003.csv");
+        assert_eq!(
+            Log::read(&stretch, 1, &Columns::default()).unwrap().rows(),
+            51
+        );
+    }
+
+    #[test]
+    fn a_single_run_reports_its_rounds() {
+        let dir = tempfile::tempdir().unwrap();
+        let config = config("smoke/physics-prior-pendulum.toml");
+        let command = [
+            "mbrl",
+            "--config",
+            &config,
+            "--out",
+            "r",
+            "--tensorboard",
+            "t",
+            "--seed",
+            "3",
+        ];
+        let found = json(dir.path(), &command);
+        let lines = fs::read_to_string(dir.path().join("r/rounds.jsonl")).unwrap();
+        let lines: Vec<Value> = lines
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        assert_eq!(found["rounds"].as_array().unwrap(), &lines);
+        assert_eq!(lines.len(), 4);
+        let expected: Vec<Value> = (lines.iter())
+            .map(|line| serde_json::json!(["return", line["transitions"], null, line["return"]]))
+            .collect();
+        let path = dir.path().join("expected.json");
+        fs::write(&path, serde_json::to_string(&expected).unwrap()).unwrap();
+        client(
+            "events.py",
+            &[&dir.path().join("t"), &path, Path::new("return")],
+        );
+        let again = json(dir.path(), &[&command[..5], &command[7..]].concat());
+        assert_eq!(again["rounds"], found["rounds"], "nothing is left to do");
+        let unknown = refused(
+            dir.path(),
+            &[
+                "mbrl", "--config", &config, "--method", "mine", "--out", "s",
+            ],
+        );
+        assert!(
+            unknown.contains("it has no method `mine`; choose from hybrid, data_driven"),
+            "{unknown}"
+        );
+    }
 }

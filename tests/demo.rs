@@ -1,5 +1,7 @@
 //! The demo: an effect that the model does not declare is named, sized and worth its place.
 
+use std::sync::OnceLock;
+
 use serde_json::Value;
 
 use crate::support::{evaluated, refuses, residyn, succeeds, text};
@@ -9,6 +11,12 @@ fn demo(seed: &str) -> (Value, tempfile::TempDir) {
     let out = folder.path().join("report");
     let json = succeeds(&["closeloop", "--json", "--seed", seed, "--out", text(&out)]);
     (serde_json::from_str(&json).unwrap(), folder)
+}
+
+/// The demo's report of seed 0, made once for all tests of this file.
+fn first_report() -> &'static Value {
+    static REPORT: OnceLock<Value> = OnceLock::new();
+    REPORT.get_or_init(|| demo("0").0)
 }
 
 /// A report but for when and how it was made.
@@ -22,32 +30,8 @@ fn without_call(mut report: Value) -> Value {
 const TRUE_F_C: f64 = 0.16;
 
 #[test]
-fn the_demo_names_the_hidden_effect_with_its_size() {
-    for seed in ["0", "1", "2"] {
-        let (report, _folder) = demo(seed);
-        assert_eq!(report["verdict"], "explained", "seed {seed}");
-        let effects = report["effects"].as_array().unwrap();
-        assert_eq!(effects.len(), 1, "seed {seed}: {effects:?}");
-        assert_eq!(effects[0]["name"], "coulomb_friction");
-        assert_eq!(effects[0]["expression"], "-F_c1 * sign(qd1)");
-        let parameter = &effects[0]["parameters"][0];
-        let value = parameter["value"].as_f64().unwrap();
-        assert!(
-            (value - TRUE_F_C).abs() < 0.01 * TRUE_F_C,
-            "seed {seed}: {value}"
-        );
-        let rmse = |model: &str| {
-            report["error"][model]["position_rmse"][1][0]
-                .as_f64()
-                .unwrap()
-        };
-        assert!(rmse("after") <= 0.25 * rmse("before"), "seed {seed}");
-    }
-}
-
-#[test]
 fn the_true_value_lies_inside_its_interval() {
-    let (report, _folder) = demo("0");
+    let report = first_report();
     let ci: Vec<f64> =
         serde_json::from_value(report["effects"][0]["parameters"][0]["ci95"].clone()).unwrap();
     assert!(ci[0] < TRUE_F_C && TRUE_F_C < ci[1], "{ci:?}");
@@ -55,7 +39,7 @@ fn the_true_value_lies_inside_its_interval() {
 
 #[test]
 fn the_effect_is_drawn_by_its_formula_with_its_interval() {
-    let (report, _folder) = demo("0");
+    let report = first_report();
     let parameter = &report["effects"][0]["parameters"][0];
     let curve = &report["shown"]["residuals"][0]["effects"][0];
     assert_eq!(
@@ -82,7 +66,7 @@ fn the_effect_is_drawn_by_its_formula_with_its_interval() {
 
 #[test]
 fn the_pendulum_is_drawn_at_its_logged_angles() {
-    let (report, _folder) = demo("0");
+    let report = first_report();
     let numbers = |of: &Value| -> Vec<f64> { serde_json::from_value(of.clone()).unwrap() };
     let (motion, stretch) = (&report["shown"]["motion"], &report["shown"]["stretches"][0]);
     let (logged_s, angles) = (
@@ -108,96 +92,6 @@ fn the_pendulum_is_drawn_at_its_logged_angles() {
         }
     }
     assert!(sides.len() > 50 && sides.iter().all(|side| *side == sides[0]));
-}
-
-#[test]
-fn the_same_seed_gives_the_same_report() {
-    let [(first, _a), (second, _b)] = ["3", "3"].map(demo);
-    assert_eq!(without_call(first), without_call(second));
-}
-
-#[test]
-fn a_search_whose_time_is_spent_stops_and_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let closed = |budget: &str| -> Value {
-        let out = folder.path().join(budget);
-        let json = residyn(&[
-            "closeloop",
-            "--json",
-            "--budget",
-            budget,
-            "--out",
-            text(&out),
-        ]);
-        serde_json::from_slice(&json.stdout).unwrap()
-    };
-    let report = closed("1us");
-    assert_eq!(
-        (&report["stopped"], &report["verdict"]),
-        (&true.into(), &"inconclusive".into())
-    );
-    assert_eq!(report["effects"], serde_json::json!([]));
-    assert_eq!(report["configuration"]["budget"], "1us");
-    let report = closed("5min");
-    assert_eq!(
-        (&report["stopped"], &report["verdict"]),
-        (&false.into(), &"explained".into())
-    );
-    let timings = std::fs::read(folder.path().join("5min/timings.json")).unwrap();
-    let timings: Value = serde_json::from_slice(&timings).unwrap();
-    let stages: Vec<&Value> = (timings.as_array().unwrap().iter())
-        .map(|t| &t["stage"])
-        .collect();
-    assert!(stages.len() >= 7 && stages[0] == "audit", "{timings}");
-    let error = refuses(&["closeloop", "--budget", "soon"]);
-    assert!(error.contains("--budget <TIME>"), "{error}");
-}
-
-#[test]
-fn calibration_reports_false_alarms_and_detection_limits() {
-    let folder = tempfile::tempdir().unwrap();
-    let calibrated = |seed: &str, name: &str| {
-        let out = folder.path().join(name);
-        let out = text(&out);
-        let arguments = [
-            "closeloop",
-            "--json",
-            "--seed",
-            seed,
-            "--calibrate",
-            "2",
-            "--out",
-            out,
-        ];
-        let report: Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
-        for (file, heading) in [
-            ("report.md", "## What these logs could show"),
-            ("report.html", "<h3>What these logs could show</h3>"),
-        ] {
-            let written = std::fs::read_to_string(folder.path().join(name).join(file)).unwrap();
-            assert!(written.contains(heading), "{file}");
-        }
-        report
-    };
-    let (first, second) = (calibrated("3", "first"), calibrated("3", "second"));
-    let [first, second] = [first, second].map(without_call);
-    assert_eq!(first, second);
-    let calibration = &first["calibration"];
-    assert_eq!(
-        (&calibration["runs"], &calibration["alarms"]),
-        (&2.into(), &0.into())
-    );
-    let smallest = calibration["smallest"].as_array().unwrap();
-    let of = |name: &str| smallest.iter().find(|entry| entry["effect"] == name);
-    // What was found belongs to the model; what is hidden beside it is found.
-    assert!(of("coulomb_friction").is_none());
-    let drag = of("viscous_friction").unwrap();
-    assert!(drag["value"].as_f64().unwrap() > 0.0);
-    assert_eq!(drag["verified"], true);
-    // The rest of the report is what it is without.
-    let (plain, _folder) = demo("3");
-    assert!(plain["calibration"].is_null());
-    assert_eq!(plain["error"], first["error"]);
 }
 
 #[test]
@@ -275,4 +169,122 @@ fn a_checkpoint_of_another_model_is_refused() {
         message.contains("pendulum") && message.contains("drive"),
         "{message}"
     );
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn the_demo_names_the_hidden_effect_with_its_size() {
+        for seed in ["0", "1", "2"] {
+            let (report, _folder) = demo(seed);
+            assert_eq!(report["verdict"], "explained", "seed {seed}");
+            let effects = report["effects"].as_array().unwrap();
+            assert_eq!(effects.len(), 1, "seed {seed}: {effects:?}");
+            assert_eq!(effects[0]["name"], "coulomb_friction");
+            assert_eq!(effects[0]["expression"], "-F_c1 * sign(qd1)");
+            let parameter = &effects[0]["parameters"][0];
+            let value = parameter["value"].as_f64().unwrap();
+            assert!(
+                (value - TRUE_F_C).abs() < 0.01 * TRUE_F_C,
+                "seed {seed}: {value}"
+            );
+            let rmse = |model: &str| {
+                report["error"][model]["position_rmse"][1][0]
+                    .as_f64()
+                    .unwrap()
+            };
+            assert!(rmse("after") <= 0.25 * rmse("before"), "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_report() {
+        let [(first, _a), (second, _b)] = ["3", "3"].map(demo);
+        assert_eq!(without_call(first), without_call(second));
+    }
+
+    #[test]
+    fn a_search_whose_time_is_spent_stops_and_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let closed = |budget: &str| -> Value {
+            let out = folder.path().join(budget);
+            let json = residyn(&[
+                "closeloop",
+                "--json",
+                "--budget",
+                budget,
+                "--out",
+                text(&out),
+            ]);
+            serde_json::from_slice(&json.stdout).unwrap()
+        };
+        let report = closed("1us");
+        assert_eq!(
+            (&report["stopped"], &report["verdict"]),
+            (&true.into(), &"inconclusive".into())
+        );
+        assert_eq!(report["effects"], serde_json::json!([]));
+        assert_eq!(report["configuration"]["budget"], "1us");
+        let report = closed("5min");
+        assert_eq!(
+            (&report["stopped"], &report["verdict"]),
+            (&false.into(), &"explained".into())
+        );
+        let timings = std::fs::read(folder.path().join("5min/timings.json")).unwrap();
+        let timings: Value = serde_json::from_slice(&timings).unwrap();
+        let stages: Vec<&Value> = (timings.as_array().unwrap().iter())
+            .map(|t| &t["stage"])
+            .collect();
+        assert!(stages.len() >= 7 && stages[0] == "audit", "{timings}");
+        let error = refuses(&["closeloop", "--budget", "soon"]);
+        assert!(error.contains("--budget <TIME>"), "{error}");
+    }
+
+    #[test]
+    fn calibration_reports_false_alarms_and_detection_limits() {
+        let folder = tempfile::tempdir().unwrap();
+        let calibrated = |seed: &str, name: &str| {
+            let out = folder.path().join(name);
+            let out = text(&out);
+            let arguments = [
+                "closeloop",
+                "--json",
+                "--seed",
+                seed,
+                "--calibrate",
+                "2",
+                "--out",
+                out,
+            ];
+            let report: Value = serde_json::from_str(&succeeds(&arguments)).unwrap();
+            for (file, heading) in [
+                ("report.md", "## What these logs could show"),
+                ("report.html", "<h3>What these logs could show</h3>"),
+            ] {
+                let written = std::fs::read_to_string(folder.path().join(name).join(file)).unwrap();
+                assert!(written.contains(heading), "{file}");
+            }
+            report
+        };
+        let (first, second) = (calibrated("3", "first"), calibrated("3", "second"));
+        let [first, second] = [first, second].map(without_call);
+        assert_eq!(first, second);
+        let calibration = &first["calibration"];
+        assert_eq!(
+            (&calibration["runs"], &calibration["alarms"]),
+            (&2.into(), &0.into())
+        );
+        let smallest = calibration["smallest"].as_array().unwrap();
+        let of = |name: &str| smallest.iter().find(|entry| entry["effect"] == name);
+        // What was found belongs to the model; what is hidden beside it is found.
+        assert!(of("coulomb_friction").is_none());
+        let drag = of("viscous_friction").unwrap();
+        assert!(drag["value"].as_f64().unwrap() > 0.0);
+        assert_eq!(drag["verified"], true);
+        // The rest of the report is what it is without.
+        let (plain, _folder) = demo("3");
+        assert!(plain["calibration"].is_null());
+        assert_eq!(plain["error"], first["error"]);
+    }
 }

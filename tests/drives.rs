@@ -10,10 +10,9 @@ use residyn::sim::Integrator;
 use residyn::{Library, Model};
 use serde_json::Value;
 
-use crate::clients::client;
-use crate::common::{assert_near, points};
-use crate::mechanism;
-use crate::support::{refuses, succeeds, text};
+use crate::support::catalogue::{assert_near, points};
+use crate::support::clients::client;
+use crate::support::{mechanisms, refuses, succeeds, text};
 
 /// A pendulum arm on two position servos, as it is drawn or as it is built. Friction there hardens in half a millisecond: by
 /// default MuJoCo's acts some ten milliseconds ahead of the velocity.
@@ -70,110 +69,6 @@ fn close_the_loop(model: &Path, train: &[PathBuf], test: &Path, out: &Path) -> V
 }
 
 #[test]
-fn what_a_drawing_of_a_servo_arm_lacks_is_named() {
-    if std::env::var_os("RESIDYN_PYTHON").is_none() {
-        eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    fs::write(at("drawn.xml"), arm("", "")).unwrap();
-    let friction = |level: f64, rotor: f64| {
-        format!("armature=\"{rotor}\" frictionloss=\"{level}\" solreffriction=\"0.0005 1\"")
-    };
-    fs::write(
-        at("built.xml"),
-        arm(&friction(0.4, 0.02), &friction(0.15, 0.01)),
-    )
-    .unwrap();
-    let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
-    let (built, delay) = (at("built.xml"), PathBuf::from("0.014"));
-    let mut arguments: Vec<&Path> = vec![&built, &delay];
-    arguments.extend(logs.iter().map(PathBuf::as_path));
-    client("servo.py", &arguments);
-    let model = at("arm.toml");
-    succeeds(&[
-        "new",
-        "--from-mjcf",
-        text(&at("drawn.xml")),
-        "--tip",
-        "fore",
-        "--out",
-        text(&model),
-    ]);
-    // The gains of the loops are set, and known.
-    let declared = fs::read_to_string(&model).unwrap();
-    let known = declared.replace(
-        "unit = \"N m/rad\", positive = true",
-        "unit = \"N m/rad\", fixed = true",
-    );
-    assert_eq!(known.matches("fixed = true").count(), 5, "{known}");
-    fs::write(&model, known).unwrap();
-    let report = close_the_loop(&model, &logs[..3], &logs[3], &at("out"));
-    assert_eq!(report["verdict"], "explained", "{report:#}");
-    // MuJoCo moves positions by the new velocities: half a step ahead.
-    let truth = [
-        ("actuator_delay", 1, 0.014 - 2.5e-5),
-        ("actuator_delay", 2, 0.014 - 2.5e-5),
-        ("coulomb_friction", 1, 0.4),
-        ("coulomb_friction", 2, 0.15),
-        ("rotor_inertia", 2, 0.01),
-    ];
-    assert_eq!(report["effects"].as_array().unwrap().len(), truth.len());
-    for (name, joint, value) in truth {
-        let estimate = found(&report, name, joint).unwrap();
-        assert!(holds(estimate, value), "{name} {joint}: {estimate:?}");
-    }
-    // The rotor of the shoulder is part of the upper arm's inertia.
-    let inertia = &report["parameters"][0];
-    assert_eq!(inertia["name"], "zz_1");
-    let estimate = estimate(inertia).unwrap();
-    assert!(holds(estimate, 0.061 + 0.02), "{estimate:?}");
-}
-
-#[test]
-fn what_a_servo_hides_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
-    for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
-        succeeds(&[
-            "simulate",
-            "--plant",
-            "servo-real",
-            "--out",
-            text(log),
-            "--seed",
-            seed,
-        ]);
-    }
-    let header = fs::read_to_string(&logs[0]).unwrap();
-    assert!(header.starts_with("time,q1,qd1,cmd1\n"));
-    let report = close_the_loop(Path::new("servo"), &logs[..3], &logs[3], &at("out"));
-    assert_eq!(report["verdict"], "explained");
-    assert_eq!(report["effects"].as_array().unwrap().len(), 2);
-    for (name, value) in [("coulomb_friction", 0.12), ("actuator_delay", 0.012)] {
-        let estimate = found(&report, name, 1).unwrap();
-        assert!(holds(estimate, value), "{name}: {estimate:?}");
-    }
-    let text = fs::read_to_string(at("out/report.md")).unwrap();
-    assert!(text.contains("under the logged commands"));
-    assert!(text.contains("`cmd1(t - d1)`"));
-    // No torque is in the logs, and none can be compared.
-    assert!(report["torque"].is_null());
-    let said = refuses(&[
-        "closeloop",
-        "--model",
-        "servo",
-        "--train",
-        self::text(&logs[0]),
-        "--errors",
-        "torque",
-    ]);
-    assert!(said.contains("servo is driven by commands"), "{said}");
-}
-
-#[test]
 fn a_log_of_commands_needs_a_drive() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("log.csv");
@@ -218,7 +113,7 @@ fn faults_of_a_drive_are_told_with_their_place() {
 #[test]
 fn ready_drives_are_written_into_models() {
     let folder = tempfile::tempdir().unwrap();
-    let file = mechanism::fixture("planar_2r.urdf");
+    let file = mechanisms::fixture("planar_2r.urdf");
     for drive in Library::drives() {
         let out = folder.path().join(format!("{}.toml", drive.name));
         let flags = [
@@ -269,7 +164,7 @@ fn a_written_servo_reads_back_as_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("servo.xml");
     find("mjcf").unwrap().write(&model, &path).unwrap();
-    let text = model_text(&mechanism::read(&path));
+    let text = model_text(&mechanisms::read(&path));
     let back = Model::from_text(Path::new("back.toml"), &text, library.effects()).unwrap();
     let [back, own] = [back.dynamics(), servo.dynamics()];
     for point in points(&own, 50, 1) {
@@ -392,4 +287,112 @@ fn a_servo_is_trained_and_planned_with() {
     let targets: Vec<f64> = targets.collect();
     assert!(targets.len() == 61 && targets.iter().all(|target| target.abs() <= 2.0));
     assert!(targets.iter().copied().fold(f64::MIN, f64::max) > 0.8);
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn what_a_drawing_of_a_servo_arm_lacks_is_named() {
+        if std::env::var_os("RESIDYN_PYTHON").is_none() {
+            eprintln!("SKIPPED: RESIDYN_PYTHON is not set; run tests/run");
+            return;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("drawn.xml"), arm("", "")).unwrap();
+        let friction = |level: f64, rotor: f64| {
+            format!("armature=\"{rotor}\" frictionloss=\"{level}\" solreffriction=\"0.0005 1\"")
+        };
+        fs::write(
+            at("built.xml"),
+            arm(&friction(0.4, 0.02), &friction(0.15, 0.01)),
+        )
+        .unwrap();
+        let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
+        let (built, delay) = (at("built.xml"), PathBuf::from("0.014"));
+        let mut arguments: Vec<&Path> = vec![&built, &delay];
+        arguments.extend(logs.iter().map(PathBuf::as_path));
+        client("servo.py", &arguments);
+        let model = at("arm.toml");
+        succeeds(&[
+            "new",
+            "--from-mjcf",
+            text(&at("drawn.xml")),
+            "--tip",
+            "fore",
+            "--out",
+            text(&model),
+        ]);
+        // The gains of the loops are set, and known.
+        let declared = fs::read_to_string(&model).unwrap();
+        let known = declared.replace(
+            "unit = \"N m/rad\", positive = true",
+            "unit = \"N m/rad\", fixed = true",
+        );
+        assert_eq!(known.matches("fixed = true").count(), 5, "{known}");
+        fs::write(&model, known).unwrap();
+        let report = close_the_loop(&model, &logs[..3], &logs[3], &at("out"));
+        assert_eq!(report["verdict"], "explained", "{report:#}");
+        // MuJoCo moves positions by the new velocities: half a step ahead.
+        let truth = [
+            ("actuator_delay", 1, 0.014 - 2.5e-5),
+            ("actuator_delay", 2, 0.014 - 2.5e-5),
+            ("coulomb_friction", 1, 0.4),
+            ("coulomb_friction", 2, 0.15),
+            ("rotor_inertia", 2, 0.01),
+        ];
+        assert_eq!(report["effects"].as_array().unwrap().len(), truth.len());
+        for (name, joint, value) in truth {
+            let estimate = found(&report, name, joint).unwrap();
+            assert!(holds(estimate, value), "{name} {joint}: {estimate:?}");
+        }
+        // The rotor of the shoulder is part of the upper arm's inertia.
+        let inertia = &report["parameters"][0];
+        assert_eq!(inertia["name"], "zz_1");
+        let estimate = estimate(inertia).unwrap();
+        assert!(holds(estimate, 0.061 + 0.02), "{estimate:?}");
+    }
+
+    #[test]
+    fn what_a_servo_hides_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let logs: Vec<PathBuf> = (1..=4).map(|k| at(&format!("log{k}.csv"))).collect();
+        for (log, seed) in logs.iter().zip(["1", "2", "3", "4"]) {
+            succeeds(&[
+                "simulate",
+                "--plant",
+                "servo-real",
+                "--out",
+                text(log),
+                "--seed",
+                seed,
+            ]);
+        }
+        let header = fs::read_to_string(&logs[0]).unwrap();
+        assert!(header.starts_with("time,q1,qd1,cmd1\n"));
+        let report = close_the_loop(Path::new("servo"), &logs[..3], &logs[3], &at("out"));
+        assert_eq!(report["verdict"], "explained");
+        assert_eq!(report["effects"].as_array().unwrap().len(), 2);
+        for (name, value) in [("coulomb_friction", 0.12), ("actuator_delay", 0.012)] {
+            let estimate = found(&report, name, 1).unwrap();
+            assert!(holds(estimate, value), "{name}: {estimate:?}");
+        }
+        let text = fs::read_to_string(at("out/report.md")).unwrap();
+        assert!(text.contains("under the logged commands"));
+        assert!(text.contains("`cmd1(t - d1)`"));
+        // No torque is in the logs, and none can be compared.
+        assert!(report["torque"].is_null());
+        let said = refuses(&[
+            "closeloop",
+            "--model",
+            "servo",
+            "--train",
+            self::text(&logs[0]),
+            "--errors",
+            "torque",
+        ]);
+        assert!(said.contains("servo is driven by commands"), "{said}");
+    }
 }

@@ -1,15 +1,16 @@
 //! Every effect against its meaning, written by hand; exact sign.
 
+use rand::RngExt;
 use residyn::data::Joint;
 use residyn::expr::SignForm;
 use residyn::model::{Effect, Library};
 
-use crate::common::{
+use crate::support::arms;
+use crate::support::catalogue::{
     USER_EFFECT, assert_near, dynamics, fitted, library_with_user_effect, points, rng, system,
 };
-use crate::mechanism::{fixture, read_to};
-use crate::oracles::ORACLES;
-use rand::RngExt;
+use crate::support::mechanisms::{fixture, read_to};
+use crate::support::oracles::ORACLES;
 
 /// As for the systems: rounding of some dozens of operations.
 const ROUNDING: f64 = 1e-12;
@@ -278,7 +279,7 @@ fn a_coupled_motor_takes_from_both_joints() {
 fn a_payload_is_part_of_the_last_body() {
     let library = Library::built_in();
     let payload = library.effect("payload").unwrap();
-    let arm = crate::arms::model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
+    let arm = arms::model(&read_to(&fixture("linkage_4r.urdf"), Some("hand")));
     assert!(arm.can_carry(payload, Joint::at(2)).is_err());
     let [m, x, y, z] = [1.3, 0.1, -0.2, 0.15];
     let loaded = arm.with_effects(vec![fitted(payload, 3, &[m, x, y, z])]);

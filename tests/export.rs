@@ -1,21 +1,17 @@
 //! Exported models, read by programs of their users.
 
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use residyn::control::Task;
-use residyn::formats::{
-    Client, ClientError, ExportModel, FORMATS, Format, Predictions, PythonClient, Samples, find,
-};
+use residyn::formats::{Client, ExportModel, FORMATS, PythonClient, find};
 use residyn::model::Model;
 use residyn::sim::Integrator;
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
-use crate::clients::client;
-use crate::common::{USER_EFFECT, rng, system};
-use crate::models;
-use crate::support::{refuses, residyn, succeeds, text};
+use crate::support::catalogue::{USER_EFFECT, rng, system};
+use crate::support::clients::client;
+use crate::support::predictions::{agree, client_agrees, expected, predictions, written};
+use crate::support::{exported_models, refuses, residyn, succeeds, text};
 
 /// The client of descriptions that docs/export.md shows.
 const DESCRIPTION: PythonClient = PythonClient {
@@ -23,147 +19,6 @@ const DESCRIPTION: PythonClient = PythonClient {
     script: include_str!("../docs/clients/description.py"),
     packages: "numpy safetensors",
 };
-
-/// What a client predicts; none, said loudly, without a client on this machine.
-pub fn predictions(
-    name: &str,
-    predict: impl FnOnce() -> Result<Predictions, ClientError>,
-) -> Option<Predictions> {
-    match predict() {
-        Ok(predictions) => Some(predictions),
-        Err(ClientError::Unavailable(reason)) => {
-            let required = std::env::var_os("RESIDYN_PYTHON").is_some();
-            assert!(!required, "{name}: {reason}");
-            // Not eprintln!, which the test harness swallows.
-            let _ = writeln!(std::io::stderr(), "SKIPPED {name}: {reason}; run tests/run");
-            None
-        }
-        Err(ClientError::Failed(said) | ClientError::NotFinite(said)) => panic!("{name}: {said}"),
-    }
-}
-
-/// Steps, derivatives and the rollout are all there and match the program's own.
-pub fn agree(name: &str, own: &Predictions, theirs: &Predictions, tolerance: f64) {
-    let difference = own.difference(theirs);
-    for (what, difference) in [
-        ("step", difference.next),
-        ("derivative", difference.derivative),
-        ("rollout", difference.rollout),
-    ] {
-        let difference = difference.unwrap_or_else(|| panic!("{name}: no prediction of a {what}"));
-        assert!(difference <= tolerance, "{name}, {what}: {difference:e}");
-    }
-}
-
-fn expected(model: &ExportModel) -> (Samples, Predictions) {
-    let samples = model.samples(&mut rng(1)).unwrap();
-    let own = model.predict(&samples).unwrap();
-    (samples, own)
-}
-
-/// A model written in a format to a folder of its own.
-fn written(format: &Format, name: &str, model: &ExportModel) -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name.replace(' ', "_"));
-    let path = path.with_extension(format.extension);
-    format.write(model, &path).unwrap();
-    (folder, path)
-}
-
-/// Every model in one format, as the format's client predicts it.
-pub fn client_agrees(format: &Format, models: &[(&str, ExportModel)]) {
-    for (name, model) in models {
-        let (_folder, path) = written(format, name, model);
-        let (samples, own) = expected(model);
-        let name = format!("{name} as {}", format.name);
-        if let Some(theirs) = predictions(&name, || format.predict(&path, &samples)) {
-            agree(&name, &own, &theirs, format.tolerance);
-        }
-    }
-}
-
-/// What holds for a new format without a test of its own.
-#[test]
-fn every_format_is_read_by_its_client_and_documented() {
-    let pendulum = models::all().swap_remove(0);
-    let guide = include_str!("../docs/export.md");
-    for format in FORMATS {
-        if !matches!(format.client, Client::None(_)) {
-            client_agrees(format, std::slice::from_ref(&pendulum));
-        }
-        let mut headings = guide.lines().filter_map(|line| line.strip_prefix("## "));
-        let has_section = headings.any(|heading| heading.split(' ').any(|w| w == format.name));
-        assert!(
-            has_section,
-            "docs/export.md has no section on {}",
-            format.name
-        );
-    }
-}
-
-#[test]
-fn onnxruntime_predicts_the_same() {
-    client_agrees(find("onnx").unwrap(), &models::all());
-}
-
-#[test]
-fn a_python_module_predicts_the_same() {
-    client_agrees(find("python").unwrap(), &models::all());
-}
-
-#[test]
-fn a_description_is_read_back_to_the_same_model() {
-    client_agrees(find("json").unwrap(), &models::all());
-    client_agrees(find("safetensors").unwrap(), &models::all());
-}
-
-#[test]
-fn a_description_can_be_rebuilt_with_numpy() {
-    for (name, model) in models::all() {
-        let (_folder, path) = written(find("json").unwrap(), name, &model);
-        let (samples, own) = expected(&model);
-        if let Some(theirs) = predictions(name, || DESCRIPTION.ask(&path, &samples)) {
-            agree(name, &own, &theirs, 1e-9);
-        }
-    }
-}
-
-#[test]
-fn onnx_files_pass_the_checker_and_hold_metadata() {
-    for (name, model) in models::all() {
-        let (folder, path) = written(find("onnx").unwrap(), name, &model);
-        let parameters = model.equations.parameters.iter();
-        let parameters: Vec<Value> = parameters
-            .map(|p| json!([p.name, p.value, p.unit]))
-            .collect();
-        let expected =
-            json!({"system": model.name(), "step_s": model.step_s, "parameters": parameters});
-        let file = folder.path().join("expected.json");
-        std::fs::write(&file, expected.to_string()).unwrap();
-        client("onnx_checker.py", &[&path, &file]);
-    }
-}
-
-#[test]
-fn the_environment_of_a_module_works_in_gymnasium() {
-    for (name, model) in models::all() {
-        let Some(task) = Task::of_system(model.name()) else {
-            continue;
-        };
-        let (folder, path) = written(find("python").unwrap(), name, &model);
-        let samples = model.samples(&mut rng(1)).unwrap();
-        let objective = task.objective();
-        let points = samples.states.iter().zip(&samples.torques);
-        let rewards: Vec<f64> = points
-            .map(|(state, tau)| objective.value(state, tau, 0.0))
-            .collect();
-        let expected =
-            json!({"states": samples.states, "torques": samples.torques, "rewards": rewards});
-        let file = folder.path().join("expected.json");
-        std::fs::write(&file, expected.to_string()).unwrap();
-        client("environment.py", &[&path, &file]);
-    }
-}
 
 #[test]
 fn an_exported_description_imports_as_a_checkpoint() {
@@ -305,31 +160,6 @@ fn the_folder_of_an_export_is_made() {
 }
 
 #[test]
-fn latex_is_parsed_and_holds_equations_values_and_intervals() {
-    for (name, model) in models::all() {
-        let (folder, path) = written(find("latex").unwrap(), name, &model);
-        let mut pieces = Vec::new();
-        let mut environments = vec!["document"];
-        if model.prior.is_none() {
-            environments.extend(["align*", "tabular"]);
-        }
-        if name == "pendulum_effects" {
-            environments.push("itemize");
-            pieces.extend([
-                r"\ddot{q}_{1} &= C_{g} \,\sin\left(q_{1}\right) + C_{i} \,\tau_{1}",
-                r"-F_{\mathrm{c1}} \,\operatorname{sign}\left(\dot{q}_{1}\right)",
-                r"$F_{\mathrm{c1}}$ & $0.160$ & $\mathrm{N\,m}$ & $0.150$ to $0.170$",
-                r"$C_{i}$ & $3$ & $\mathrm{1/(kg\,m^{2})}$ & not fitted",
-            ]);
-        }
-        let expected = folder.path().join("expected.json");
-        let json = json!({"environments": environments, "pieces": pieces});
-        std::fs::write(&expected, json.to_string()).unwrap();
-        client("latex.py", &[&path, &expected]);
-    }
-}
-
-#[test]
 fn sensor_effects_are_listed_as_not_carried() {
     let effects = r#"
 [[effect]]
@@ -343,7 +173,7 @@ joint = 1
 delta = 0.005
 driven = 1
 "#;
-    let system = models::system("pendulum", effects);
+    let system = exported_models::system("pendulum", effects);
     let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, Value::Null);
     for name in ["c", "fmu", "onnx", "python", "mjcf", "urdf"] {
         let limits = (find(name).unwrap().not_carried)(&model);
@@ -351,23 +181,6 @@ driven = 1
             let said = limits.iter().any(|limit| limit.starts_with(piece));
             assert!(said, "{name}: {piece:?} is not in {limits:?}");
         }
-    }
-}
-
-#[test]
-fn unusual_names_and_units_give_a_valid_module() {
-    let text = "[system]\nname = 'a \"\"\" \\ b'\nabout = \"two\\nlines \\\"\\\"\\\"\"\njoints = 1\n[parameters]\n\
-                lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
-                [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
-    let system = Model::from_text(Path::new("odd.toml"), text, &[]).unwrap();
-    let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("\"\"\"\n\\"));
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("odd.module");
-    let format = find("python").unwrap();
-    format.write(&model, &path).unwrap();
-    let (samples, own) = expected(&model);
-    if let Some(theirs) = predictions("odd", || format.predict(&path, &samples)) {
-        agree("odd", &own, &theirs, format.tolerance);
     }
 }
 
@@ -407,4 +220,133 @@ fn a_description_needs_no_effect_files_to_be_read() {
     let unknown = refuses(&import);
     assert!(unknown.contains("unknown effect `eddy_brake`"), "{unknown}");
     succeeds(&[&import[..], &["--effects", &at("effects")]].concat());
+}
+
+mod slow {
+    use super::*;
+
+    /// What holds for a new format without a test of its own.
+    #[test]
+    fn every_format_is_read_by_its_client_and_documented() {
+        let pendulum = exported_models::all().swap_remove(0);
+        let guide = include_str!("../docs/export.md");
+        for format in FORMATS {
+            if !matches!(format.client, Client::None(_)) {
+                client_agrees(format, std::slice::from_ref(&pendulum));
+            }
+            let mut headings = guide.lines().filter_map(|line| line.strip_prefix("## "));
+            let has_section = headings.any(|heading| heading.split(' ').any(|w| w == format.name));
+            assert!(
+                has_section,
+                "docs/export.md has no section on {}",
+                format.name
+            );
+        }
+    }
+
+    #[test]
+    fn onnxruntime_predicts_the_same() {
+        client_agrees(find("onnx").unwrap(), &exported_models::all());
+    }
+
+    #[test]
+    fn a_python_module_predicts_the_same() {
+        client_agrees(find("python").unwrap(), &exported_models::all());
+    }
+
+    #[test]
+    fn a_description_is_read_back_to_the_same_model() {
+        client_agrees(find("json").unwrap(), &exported_models::all());
+        client_agrees(find("safetensors").unwrap(), &exported_models::all());
+    }
+
+    #[test]
+    fn a_description_can_be_rebuilt_with_numpy() {
+        for (name, model) in exported_models::all() {
+            let (_folder, path) = written(find("json").unwrap(), name, &model);
+            let (samples, own) = expected(&model);
+            if let Some(theirs) = predictions(name, || DESCRIPTION.ask(&path, &samples)) {
+                agree(name, &own, &theirs, 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn onnx_files_pass_the_checker_and_hold_metadata() {
+        for (name, model) in exported_models::all() {
+            let (folder, path) = written(find("onnx").unwrap(), name, &model);
+            let parameters = model.equations.parameters.iter();
+            let parameters: Vec<Value> = parameters
+                .map(|p| json!([p.name, p.value, p.unit]))
+                .collect();
+            let expected =
+                json!({"system": model.name(), "step_s": model.step_s, "parameters": parameters});
+            let file = folder.path().join("expected.json");
+            std::fs::write(&file, expected.to_string()).unwrap();
+            client("onnx_checker.py", &[&path, &file]);
+        }
+    }
+
+    #[test]
+    fn the_environment_of_a_module_works_in_gymnasium() {
+        for (name, model) in exported_models::all() {
+            let Some(task) = Task::of_system(model.name()) else {
+                continue;
+            };
+            let (folder, path) = written(find("python").unwrap(), name, &model);
+            let samples = model.samples(&mut rng(1)).unwrap();
+            let objective = task.objective();
+            let points = samples.states.iter().zip(&samples.torques);
+            let rewards: Vec<f64> = points
+                .map(|(state, tau)| objective.value(state, tau, 0.0))
+                .collect();
+            let expected =
+                json!({"states": samples.states, "torques": samples.torques, "rewards": rewards});
+            let file = folder.path().join("expected.json");
+            std::fs::write(&file, expected.to_string()).unwrap();
+            client("environment.py", &[&path, &file]);
+        }
+    }
+
+    #[test]
+    fn latex_is_parsed_and_holds_equations_values_and_intervals() {
+        for (name, model) in exported_models::all() {
+            let (folder, path) = written(find("latex").unwrap(), name, &model);
+            let mut pieces = Vec::new();
+            let mut environments = vec!["document"];
+            if model.prior.is_none() {
+                environments.extend(["align*", "tabular"]);
+            }
+            if name == "pendulum_effects" {
+                environments.push("itemize");
+                pieces.extend([
+                    r"\ddot{q}_{1} &= C_{g} \,\sin\left(q_{1}\right) + C_{i} \,\tau_{1}",
+                    r"-F_{\mathrm{c1}} \,\operatorname{sign}\left(\dot{q}_{1}\right)",
+                    r"$F_{\mathrm{c1}}$ & $0.160$ & $\mathrm{N\,m}$ & $0.150$ to $0.170$",
+                    r"$C_{i}$ & $3$ & $\mathrm{1/(kg\,m^{2})}$ & not fitted",
+                ]);
+            }
+            let expected = folder.path().join("expected.json");
+            let json = json!({"environments": environments, "pieces": pieces});
+            std::fs::write(&expected, json.to_string()).unwrap();
+            client("latex.py", &[&path, &expected]);
+        }
+    }
+
+    #[test]
+    fn unusual_names_and_units_give_a_valid_module() {
+        let text = "[system]\nname = 'a \"\"\" \\ b'\nabout = \"two\\nlines \\\"\\\"\\\"\"\njoints = 1\n[parameters]\n\
+                lambda = { value = -2.0, unit = \"N\\nm\" }\n[dynamics.let]\np = \"q1 + 1\"\n\
+                [dynamics]\nqdd1 = \"lambda * p + tau1\"\n";
+        let system = Model::from_text(Path::new("odd.toml"), text, &[]).unwrap();
+        let model = ExportModel::of_system(&system, Integrator::RK4, 0.01, json!("\"\"\"\n\\"));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("odd.module");
+        let format = find("python").unwrap();
+        format.write(&model, &path).unwrap();
+        let (samples, own) = expected(&model);
+        if let Some(theirs) = predictions("odd", || format.predict(&path, &samples)) {
+            agree("odd", &own, &theirs, format.tolerance);
+        }
+    }
 }

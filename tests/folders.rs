@@ -11,10 +11,10 @@ use std::sync::OnceLock;
 
 use residyn::runs::RunFolder;
 
-use crate::bench_rigs::{Bench, RIGS};
-use crate::fuzz::exported;
+use crate::support::bench::{Bench, RIGS};
+use crate::support::exported_models::exported;
+use crate::support::paths::config;
 use crate::support::{refuses, says, text};
-use crate::train::config;
 
 /// The commands that work in the folder of `--out`.
 fn commands() -> Vec<Vec<String>> {
@@ -113,7 +113,10 @@ fn a_full_disk_is_told_before_the_work() {
 fn without_rights(scratch: &Path, arguments: &[&str]) -> Output {
     let program = scratch.join("residyn");
     if !program.exists() {
-        fs::copy(env!("CARGO_BIN_EXE_residyn"), &program).unwrap();
+        // By a process of its own: a file that a child of another thread still holds open for writing cannot be started.
+        let mut copy = Command::new("cp");
+        let copied = copy.arg(env!("CARGO_BIN_EXE_residyn")).arg(&program);
+        assert!(copied.status().unwrap().success());
     }
     let mut command = Command::new(program);
     if fs::metadata(scratch).unwrap().uid() == 0 {

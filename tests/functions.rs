@@ -3,8 +3,10 @@
 use residyn::expr::{Graph, Program, Scope, SignForm, parse};
 use residyn::train::replay;
 
-use crate::common::{assert_near, column, devices, in_f32, numbers, rng, tensor};
 use rand::RngExt;
+
+use crate::support::catalogue::{assert_near, column, in_f32, rng};
+use crate::support::tensors::{devices, numbers, tensor};
 
 /// A formula of x and y, its value and its slopes, written by hand.
 struct Case {

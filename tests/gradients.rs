@@ -6,10 +6,10 @@ use residyn::expr::{Program, SignForm};
 use residyn::model::Dynamics;
 use residyn::train::replay;
 
-use crate::common::{
-    Case, assert_near, catalog, column, devices, in_f32, jacobian, numbers, point, points, rng,
-    tensor,
+use crate::support::catalogue::{
+    Case, assert_near, catalog, column, in_f32, jacobian, point, points, rng,
 };
+use crate::support::tensors::{devices, numbers, tensor};
 
 /// Wide enough that third derivatives of tanh(v / width) leave central differences four digits.
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.3 }];

@@ -8,7 +8,8 @@ use residyn::identify::{
 };
 use residyn::model::{Dynamics, Library};
 
-use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
+use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
+use crate::support::logs::{add_noise, simulate};
 
 /// Windows in s.
 const WINDOW_S: f64 = 0.5;
@@ -279,7 +280,7 @@ fn a_log_without_windows_has_no_value_of_its_own() {
 /// 20 s at irregular steps of 5 to 15 ms with three pauses and three intervals left out.
 fn broken_log(seed: u64) -> Log {
     let mut rng = rng(seed);
-    let mut log = crate::common::empty_log("broken", 1);
+    let mut log = crate::support::logs::empty_log("broken", 1);
     let pauses: Vec<f64> = (0..3).map(|_| rng.random_range(1.0..19.0)).collect();
     let (mut time, mut paused) = (0.0, [false; 3]);
     while time < 20.0 {

@@ -2,174 +2,13 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::OnceLock;
 
 use residyn::data::{Columns, Log, Quantity};
-use tempfile::TempDir;
 
-use crate::clients::client;
-
-/// A trajectory of two joints as CSV.
-pub fn trajectory() -> String {
-    let row = |k: u32| {
-        let t = f64::from(k) / 250.0;
-        let (q, qd) = (
-            [t.sin(), 0.5 * (2.0 * t).cos()],
-            [t.cos(), -(2.0 * t).sin()],
-        );
-        format!(
-            "{t},{},{},{},{},{},{}\n",
-            q[0],
-            q[1],
-            qd[0],
-            qd[1],
-            0.1 * t,
-            -0.2 * t
-        )
-    };
-    let rows: String = (0..50).map(row).collect();
-    format!("time,q1,q2,qd1,qd2,tau1,tau2\n{rows}")
-}
+use crate::support::log_files::formats;
 
 fn read(path: &Path) -> Result<Log, String> {
     Log::read(path, 2, &Columns::default()).map_err(|error| error.to_string())
-}
-
-/// A folder with `run.csv` and the same in every format, made once; `None` without the clients that write them.
-pub fn formats() -> Option<&'static Path> {
-    static FOLDER: OnceLock<TempDir> = OnceLock::new();
-    let folder = FOLDER.get_or_init(|| {
-        let folder = tempfile::tempdir().unwrap();
-        let run = folder.path().join("run.csv");
-        fs::write(&run, trajectory()).unwrap();
-        client("logs.py", &[&run, folder.path()]);
-        folder
-    });
-    let is_written = folder.path().join("pickled.npz").exists();
-    is_written.then(|| folder.path())
-}
-
-#[test]
-fn every_format_holds_the_same_trajectory() {
-    let Some(folder) = formats() else { return };
-    let wanted = read(&folder.join("run.csv")).unwrap();
-    for name in [
-        "packed.csv.gz",
-        "german.csv",
-        "tabs.tsv",
-        "matrices.npz",
-        "columns.npz",
-        "fortran.npz",
-        "plain.mat",
-        "packed.mat",
-        "columns.mat",
-        "snappy.parquet",
-        "gzip.parquet",
-        "zstd.parquet",
-        "lz4.parquet",
-        "none.parquet",
-        "lists.parquet",
-    ] {
-        let found = read(&folder.join(name)).unwrap();
-        let channels = |log: &Log| {
-            (
-                log.time.clone(),
-                log.q.clone(),
-                log.qd.clone(),
-                log.tau.clone(),
-            )
-        };
-        assert!(channels(&found) == channels(&wanted), "{name}");
-    }
-    for name in ["integers.npz", "integers.mat"] {
-        let counts = read(&folder.join(name)).unwrap();
-        assert_eq!((counts.time[7], counts.q[0][1]), (7.0, 4.0), "{name}");
-    }
-    for (name, wanted) in [
-        ("short.npz", "short.npz, row 48, column \"tau1\": is empty"),
-        ("gap.npz", "row 5, column \"q2\": \"NaN\" is not a finite"),
-        ("gap.mat", "row 5, column \"q2\": \"NaN\" is not a finite"),
-        (
-            "gap.parquet",
-            "row 5, column \"q2\": \"NaN\" is not a finite",
-        ),
-        (
-            "ragged.parquet",
-            "row 50 of \"q\" has 1 number(s) where the first has 2",
-        ),
-        (
-            "pickled.npz",
-            "array \"q\" holds pickled objects, which are never read",
-        ),
-    ] {
-        let said = read(&folder.join(name)).unwrap_err();
-        assert!(said.contains(wanted), "{said}");
-    }
-}
-
-/// Positions and commands of an episode, by the names of the joints.
-#[test]
-fn an_episode_of_a_data_set_of_lerobot_is_a_log() {
-    let Some(folder) = formats() else { return };
-    let rig = Columns {
-        joint_names: vec!["wrist".into(), "elbow".into()],
-        driven_by: Quantity::Command,
-        ..Columns::default()
-    };
-    let read = |name: &str| {
-        let log = Log::read(folder.join(name), 2, &rig);
-        log.map_err(|error| error.to_string())
-    };
-    let wanted = self::read(&folder.join("run.csv")).unwrap();
-    for (name, rows) in [
-        ("set_v2#0", 50),
-        ("set_v2#1", 30),
-        ("set_v2/data/chunk-000/episode_000001.parquet", 30),
-        ("set_v3#0", 50),
-        ("set_v3#1", 30),
-        ("single", 50),
-    ] {
-        let log = read(name).unwrap();
-        assert_eq!(log.rows(), rows, "{name}");
-        // Data sets are in single precision.
-        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-7);
-        assert!(near(&log.time, &wanted.time) && near(&log.q[0], &wanted.q[1]));
-        assert!(near(&log.q[1], &wanted.q[0]) && near(&log.tau[0], &wanted.tau[1]));
-    }
-    for (name, wanted) in [
-        ("set_v3", "holds several episodes, up to 1"),
-        ("set_v3", "set_v3#1 for instance"),
-        ("set_v2#7", "there is no episode 7"),
-    ] {
-        let said = read(name).unwrap_err();
-        assert!(said.contains(wanted), "{said}");
-    }
-}
-
-/// Cut anywhere, and each with a bit flipped: read, or refused.
-#[test]
-fn damaged_files_are_no_panic() {
-    let Some(folder) = formats() else { return };
-    let scratch = tempfile::tempdir().unwrap();
-    for name in [
-        "plain.mat",
-        "packed.mat",
-        "matrices.npz",
-        "snappy.parquet",
-        "none.parquet",
-        "lists.parquet",
-    ] {
-        let whole = fs::read(folder.join(name)).unwrap();
-        let damaged = scratch.path().join(name);
-        for k in 0..150 {
-            fs::write(&damaged, &whole[..whole.len() * k / 150]).unwrap();
-            let _ = read(&damaged);
-            let mut flipped = whole.clone();
-            flipped[k * 7919 % whole.len()] ^= 1 << (k % 8);
-            fs::write(&damaged, &flipped).unwrap();
-            let _ = read(&damaged);
-        }
-    }
 }
 
 #[test]
@@ -189,5 +28,132 @@ fn files_that_are_not_read_get_the_line_that_converts_them() {
         fs::write(&path, begin).unwrap();
         let said = read(&path).unwrap_err();
         assert!(said.contains("run.log") && said.contains(remedy), "{said}");
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn every_format_holds_the_same_trajectory() {
+        let Some(folder) = formats() else { return };
+        let wanted = read(&folder.join("run.csv")).unwrap();
+        for name in [
+            "packed.csv.gz",
+            "german.csv",
+            "tabs.tsv",
+            "matrices.npz",
+            "columns.npz",
+            "fortran.npz",
+            "plain.mat",
+            "packed.mat",
+            "columns.mat",
+            "snappy.parquet",
+            "gzip.parquet",
+            "zstd.parquet",
+            "lz4.parquet",
+            "none.parquet",
+            "lists.parquet",
+        ] {
+            let found = read(&folder.join(name)).unwrap();
+            let channels = |log: &Log| {
+                (
+                    log.time.clone(),
+                    log.q.clone(),
+                    log.qd.clone(),
+                    log.tau.clone(),
+                )
+            };
+            assert!(channels(&found) == channels(&wanted), "{name}");
+        }
+        for name in ["integers.npz", "integers.mat"] {
+            let counts = read(&folder.join(name)).unwrap();
+            assert_eq!((counts.time[7], counts.q[0][1]), (7.0, 4.0), "{name}");
+        }
+        for (name, wanted) in [
+            ("short.npz", "short.npz, row 48, column \"tau1\": is empty"),
+            ("gap.npz", "row 5, column \"q2\": \"NaN\" is not a finite"),
+            ("gap.mat", "row 5, column \"q2\": \"NaN\" is not a finite"),
+            (
+                "gap.parquet",
+                "row 5, column \"q2\": \"NaN\" is not a finite",
+            ),
+            (
+                "ragged.parquet",
+                "row 50 of \"q\" has 1 number(s) where the first has 2",
+            ),
+            (
+                "pickled.npz",
+                "array \"q\" holds pickled objects, which are never read",
+            ),
+        ] {
+            let said = read(&folder.join(name)).unwrap_err();
+            assert!(said.contains(wanted), "{said}");
+        }
+    }
+
+    /// Positions and commands of an episode, by the names of the joints.
+    #[test]
+    fn an_episode_of_a_data_set_of_lerobot_is_a_log() {
+        let Some(folder) = formats() else { return };
+        let rig = Columns {
+            joint_names: vec!["wrist".into(), "elbow".into()],
+            driven_by: Quantity::Command,
+            ..Columns::default()
+        };
+        let read = |name: &str| {
+            let log = Log::read(folder.join(name), 2, &rig);
+            log.map_err(|error| error.to_string())
+        };
+        let wanted = self::read(&folder.join("run.csv")).unwrap();
+        for (name, rows) in [
+            ("set_v2#0", 50),
+            ("set_v2#1", 30),
+            ("set_v2/data/chunk-000/episode_000001.parquet", 30),
+            ("set_v3#0", 50),
+            ("set_v3#1", 30),
+            ("single", 50),
+        ] {
+            let log = read(name).unwrap();
+            assert_eq!(log.rows(), rows, "{name}");
+            // Data sets are in single precision.
+            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-7);
+            assert!(near(&log.time, &wanted.time) && near(&log.q[0], &wanted.q[1]));
+            assert!(near(&log.q[1], &wanted.q[0]) && near(&log.tau[0], &wanted.tau[1]));
+        }
+        for (name, wanted) in [
+            ("set_v3", "holds several episodes, up to 1"),
+            ("set_v3", "set_v3#1 for instance"),
+            ("set_v2#7", "there is no episode 7"),
+        ] {
+            let said = read(name).unwrap_err();
+            assert!(said.contains(wanted), "{said}");
+        }
+    }
+
+    /// Cut anywhere, and each with a bit flipped: read, or refused.
+    #[test]
+    fn damaged_files_are_no_panic() {
+        let Some(folder) = formats() else { return };
+        let scratch = tempfile::tempdir().unwrap();
+        for name in [
+            "plain.mat",
+            "packed.mat",
+            "matrices.npz",
+            "snappy.parquet",
+            "none.parquet",
+            "lists.parquet",
+        ] {
+            let whole = fs::read(folder.join(name)).unwrap();
+            let damaged = scratch.path().join(name);
+            for k in 0..150 {
+                fs::write(&damaged, &whole[..whole.len() * k / 150]).unwrap();
+                let _ = read(&damaged);
+                let mut flipped = whole.clone();
+                flipped[k * 7919 % whole.len()] ^= 1 << (k % 8);
+                fs::write(&damaged, &flipped).unwrap();
+                let _ = read(&damaged);
+            }
+        }
     }
 }

@@ -14,7 +14,8 @@ use residyn::report::{self, Report, Words, summary};
 use residyn::{Library, Log, Model, Outcome, Request, Settings, Verdict, close_loop};
 use serde_json::Value;
 
-use crate::common::{catalog, rng, simulate};
+use crate::support::catalogue::{catalog, rng};
+use crate::support::logs::simulate;
 use crate::support::{measured, refuses, residyn, succeeds, text};
 
 /// A pendulum with dry friction, thrown so that it turns over.
@@ -446,52 +447,6 @@ fn is_called_misread(log: &Log, columns: &Columns) -> Option<String> {
     misread.map(|finding| format!("{}: {finding}", log.path.display()))
 }
 
-/// The logs are as their rigs wrote them, in the units and with the signs that their converters document.
-#[test]
-fn no_measured_log_is_called_misread() {
-    let sets = [
-        "dfki_simple_pendulum",
-        "dfki_double_pendulum_a0",
-        "dfki_double_pendulum_c0",
-        "dfki_double_pendulum_c1",
-        "multiarm_single_pendulum",
-        "kuka_lwr4",
-        "panda",
-        "schunk_lwa4p",
-        "ur10",
-    ];
-    let mut called = Vec::new();
-    for folder in sets.into_iter().filter_map(measured) {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.extension().is_some_and(|extension| extension == "csv") {
-                let log = Log::read_standard(&path).unwrap();
-                called.extend(is_called_misread(&log, &Columns::default()));
-            }
-        }
-    }
-    assert!(called.is_empty(), "{called:#?}");
-}
-
-#[test]
-fn no_simulated_log_is_called_misread() {
-    let cases = catalog(SignForm::Smooth { width: 0.01 });
-    let mut called = Vec::new();
-    for (case, seed) in cases.iter().zip(0..) {
-        let start = vec![0.4; case.dynamics.states()];
-        let mut log = simulate(&case.dynamics, &start, 3.0, 1500, seed);
-        log.path = case.name.clone().into();
-        let runs_away = log.q.iter().flatten().any(|q| !(q.abs() < 1e3));
-        // No spring is wound up over turns: what looks like one is an angle in degrees.
-        let turns = log.q.iter().flatten().any(|q| q.abs() > TAU);
-        let is_wound = turns && case.name.contains("joint_spring");
-        if !runs_away && !is_wound {
-            called.extend(is_called_misread(&log, &Columns::default()));
-        }
-    }
-    assert!(called.is_empty(), "{called:#?}");
-}
-
 #[test]
 fn serious_findings_stand_before_the_answer() {
     let mut opposite = recorded("opposite.csv", 1);
@@ -538,4 +493,54 @@ fn a_test_log_that_was_fitted_is_said_to_be_no_test() {
     assert!(report::page(&report).contains("to which nothing was fitted"));
     let json = serde_json::to_value(&report).unwrap();
     assert_eq!(json["error"]["fitted_logs"], Value::Null);
+}
+
+mod slow {
+    use super::*;
+
+    /// The logs are as their rigs wrote them, in the units and with the signs that their converters document.
+    #[test]
+    fn no_measured_log_is_called_misread() {
+        let sets = [
+            "dfki_simple_pendulum",
+            "dfki_double_pendulum_a0",
+            "dfki_double_pendulum_c0",
+            "dfki_double_pendulum_c1",
+            "multiarm_single_pendulum",
+            "kuka_lwr4",
+            "panda",
+            "schunk_lwa4p",
+            "ur10",
+        ];
+        let mut called = Vec::new();
+        for folder in sets.into_iter().filter_map(measured) {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.extension().is_some_and(|extension| extension == "csv") {
+                    let log = Log::read_standard(&path).unwrap();
+                    called.extend(is_called_misread(&log, &Columns::default()));
+                }
+            }
+        }
+        assert!(called.is_empty(), "{called:#?}");
+    }
+
+    #[test]
+    fn no_simulated_log_is_called_misread() {
+        let cases = catalog(SignForm::Smooth { width: 0.01 });
+        let mut called = Vec::new();
+        for (case, seed) in cases.iter().zip(0..) {
+            let start = vec![0.4; case.dynamics.states()];
+            let mut log = simulate(&case.dynamics, &start, 3.0, 1500, seed);
+            log.path = case.name.clone().into();
+            let runs_away = log.q.iter().flatten().any(|q| !(q.abs() < 1e3));
+            // No spring is wound up over turns: what looks like one is an angle in degrees.
+            let turns = log.q.iter().flatten().any(|q| q.abs() > TAU);
+            let is_wound = turns && case.name.contains("joint_spring");
+            if !runs_away && !is_wound {
+                called.extend(is_called_misread(&log, &Columns::default()));
+            }
+        }
+        assert!(called.is_empty(), "{called:#?}");
+    }
 }

@@ -1,17 +1,13 @@
 //! Model files derived from robot descriptions.
 
 use std::fs;
-use std::path::{Path, PathBuf};
 
-use rand::RngExt;
 use residyn::expr::SignForm;
-use residyn::formats::{FORMATS, Format};
+use residyn::model::Dynamics;
 use residyn::model::chain::{Chain, model_text};
-use residyn::model::{Dynamics, FittedEffect, Library, Model};
-use serde_json::json;
 
-use crate::clients::client;
-use crate::common::{dynamics, points, rng};
+use crate::support::catalogue::{dynamics, points};
+use crate::support::mechanisms::{comparable, fixture, format_of, mujoco_agrees, read, system};
 use crate::support::{refuses, residyn, succeeds, text};
 
 const FILES: [&str; 6] = [
@@ -23,74 +19,8 @@ const FILES: [&str; 6] = [
     "geoms.xml",
 ];
 
-pub fn fixture(name: &str) -> PathBuf {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    root.join("tests/fixtures/mechanisms").join(name)
-}
-
-/// The format of a robot description, by the file's extension.
-fn format(file: &Path) -> &'static Format {
-    let extension = file.extension().unwrap();
-    let mut formats = FORMATS.iter().filter(|format| format.robots.is_some());
-    formats.find(|f| extension == f.extension).unwrap()
-}
-
-/// The chain of a description to the link `tip`.
-pub fn read_to(file: &Path, tip: Option<&str>) -> Chain {
-    (format(file).robots.as_ref().unwrap().read)(file, tip).unwrap()
-}
-
-pub fn read(file: &Path) -> Chain {
-    read_to(file, None)
-}
-
 fn chain(name: &str) -> Chain {
     read(&fixture(name))
-}
-
-pub fn system(chain: &Chain) -> Model {
-    let library = Library::built_in();
-    Model::from_text(
-        Path::new(&chain.name),
-        &model_text(chain),
-        library.effects(),
-    )
-    .unwrap()
-}
-
-/// The model with effects that are forces of the state: in MuJoCo dry friction and limits are constraints.
-pub fn comparable(system: &Model) -> Dynamics {
-    let others = ["coulomb_friction", "actuator_saturation"];
-    let is_force = |effect: &&FittedEffect| !others.contains(&effect.effect.name.as_str());
-    let effects: Vec<FittedEffect> = system.effects.iter().filter(is_force).cloned().collect();
-    dynamics(system, &effects, SignForm::Exact)
-}
-
-#[test]
-fn mujoco_finds_the_same_torques() {
-    for name in FILES {
-        mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
-    }
-}
-
-/// MuJoCo's inverse dynamics of a description gives back the torques that a model was moved by.
-pub fn mujoco_agrees(description: &Path, model: &Dynamics) {
-    let n = model.joints;
-    let mut rng = rng(1);
-    let sample = |_| {
-        let mut draw = |bound: f64| (0..n).map(|_| rng.random_range(-bound..bound)).collect();
-        let [q, qd, tau]: [Vec<f64>; 3] = [draw(3.0), draw(4.0), draw(20.0)];
-        let inputs = [&q, &qd, &tau, &vec![0.0], &model.values()]
-            .map(Vec::as_slice)
-            .concat();
-        let qdd = &model.program.eval(&inputs)[n..];
-        json!({"q": q, "qd": qd, "tau": tau, "qdd": qdd})
-    };
-    let samples: Vec<_> = (0..200).map(sample).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("samples.json");
-    fs::write(&file, serde_json::to_string(&samples).unwrap()).unwrap();
-    client("mechanism.py", &[description, &file]);
 }
 
 /// Positions, velocities, torques, time, and the parameters at their values.
@@ -263,7 +193,7 @@ fn message(name: &str, from: &str, to: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join(name);
     fs::write(&file, contents.replacen(from, to, 1)).unwrap();
-    let source = format!("--from-{}", format(&file).name);
+    let source = format!("--from-{}", format_of(&file).name);
     let out = folder.path().join("model.toml");
     let message = refuses(&["new", &source, text(&file), "--out", text(&out)]);
     assert!(!out.exists(), "a file was left behind");
@@ -454,4 +384,15 @@ fn angles_that_were_rounded_are_taken_as_written_and_noted() {
     let text = model_text(&read(&file));
     let short = "M11 = \"zz_1 + zz_2 + 1.2*mx_2*sin(q2)\"";
     assert!(text.contains(short), "{text}");
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn mujoco_finds_the_same_torques() {
+        for name in FILES {
+            mujoco_agrees(&fixture(name), &comparable(&system(&chain(name))));
+        }
+    }
 }

@@ -12,9 +12,11 @@ use residyn::sim::{Commands, Hold, Sensors, StepTorque, with_own_angles};
 
 use serde_json::Value;
 
-use crate::common::{add_noise, assert_near, dynamics, fitted, rng, simulate, system};
-use crate::support::{evaluated, refuses, succeeds, text};
 use rand::RngExt;
+
+use crate::support::catalogue::{assert_near, dynamics, fitted, rng, system};
+use crate::support::logs::{add_noise, simulate};
+use crate::support::{evaluated, refuses, succeeds, text};
 
 const DELAY_S: f64 = 0.0073;
 const LAG_S: f64 = 0.015;
@@ -214,47 +216,6 @@ fn recorded(effect: &str) -> (tempfile::TempDir, Vec<String>) {
 }
 
 #[test]
-fn closing_the_loop_names_the_effect_with_memory_or_of_the_sensor() {
-    for (setting, name, truth) in [
-        ("actuator_delay=0.01", "actuator_delay", 0.01),
-        ("actuator_lag=0.02", "actuator_lag", 0.02),
-        ("backlash=0.01", "backlash", 0.01),
-        ("encoder_eccentricity=0.01", "encoder_eccentricity", 0.01),
-    ] {
-        let (folder, logs) = recorded(setting);
-        let [a, b, c, test] = [0, 1, 2, 3].map(|k| logs[k].as_str());
-        let out = folder.path().join("report");
-        let given = ["--model", "pendulum", "--train", a, b, c, "--test", test];
-        let json = succeeds(&[&["closeloop", "--json", "--out", text(&out)], &given[..]].concat());
-        let report: Value = serde_json::from_str(&json).unwrap();
-        assert_eq!(report["verdict"], "explained", "{name}");
-        let effects = report["effects"].as_array().unwrap();
-        assert_eq!(effects.len(), 1, "{effects:?}");
-        assert_eq!(effects[0]["name"], name);
-        let parameter = &effects[0]["parameters"][0];
-        let end = |k: usize| parameter["ci95"][k].as_f64().unwrap();
-        assert!(end(0) < truth && truth < end(1), "{parameter}");
-
-        // What was written predicts the same when it is read again.
-        let error = |model: &[&str]| evaluated(model, test);
-        let told = |which: &str| {
-            report["error"][which]["position_rmse"][1][0]
-                .as_f64()
-                .unwrap()
-        };
-        let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
-        assert_near(
-            error(&["--model", text(&model)]) / told("after"),
-            1.0,
-            1e-9,
-            name,
-        );
-        let read = error(&["--checkpoint", text(&checkpoint)]);
-        assert_near(read / told("hybrid"), 1.0, 1e-4, name);
-    }
-}
-
-#[test]
 fn independent_transitions_are_refused_for_a_rig_with_delay() {
     let recipe = include_str!("../configs/smoke/train-pendulum.toml");
     assert!(recipe.contains("plant = "));
@@ -412,5 +373,51 @@ fn the_rigs_own_angles_are_found_behind_play() {
         // The torque is logged; a reversal of the motion is seen through velocities over 8 rows on either side.
         let reach = if driven > 0.0 { None } else { Some(8) };
         assert!(left.iter().max().copied() <= reach, "{driven}: {left:?}");
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn closing_the_loop_names_the_effect_with_memory_or_of_the_sensor() {
+        for (setting, name, truth) in [
+            ("actuator_delay=0.01", "actuator_delay", 0.01),
+            ("actuator_lag=0.02", "actuator_lag", 0.02),
+            ("backlash=0.01", "backlash", 0.01),
+            ("encoder_eccentricity=0.01", "encoder_eccentricity", 0.01),
+        ] {
+            let (folder, logs) = recorded(setting);
+            let [a, b, c, test] = [0, 1, 2, 3].map(|k| logs[k].as_str());
+            let out = folder.path().join("report");
+            let given = ["--model", "pendulum", "--train", a, b, c, "--test", test];
+            let json =
+                succeeds(&[&["closeloop", "--json", "--out", text(&out)], &given[..]].concat());
+            let report: Value = serde_json::from_str(&json).unwrap();
+            assert_eq!(report["verdict"], "explained", "{name}");
+            let effects = report["effects"].as_array().unwrap();
+            assert_eq!(effects.len(), 1, "{effects:?}");
+            assert_eq!(effects[0]["name"], name);
+            let parameter = &effects[0]["parameters"][0];
+            let end = |k: usize| parameter["ci95"][k].as_f64().unwrap();
+            assert!(end(0) < truth && truth < end(1), "{parameter}");
+
+            // What was written predicts the same when it is read again.
+            let error = |model: &[&str]| evaluated(model, test);
+            let told = |which: &str| {
+                report["error"][which]["position_rmse"][1][0]
+                    .as_f64()
+                    .unwrap()
+            };
+            let (model, checkpoint) = (out.join("model.toml"), out.join("checkpoint"));
+            assert_near(
+                error(&["--model", text(&model)]) / told("after"),
+                1.0,
+                1e-9,
+                name,
+            );
+            let read = error(&["--checkpoint", text(&checkpoint)]);
+            assert_near(read / told("hybrid"), 1.0, 1e-4, name);
+        }
     }
 }

@@ -8,8 +8,9 @@ use residyn::identify::calibrate;
 use residyn::model::{Dynamics, Library};
 use residyn::sim::metric::{Assessment, Summary, assess, summarise};
 
-use crate::common::{dynamics, empty_log, fitted, rng, simulate, system};
-use crate::oracles::{ORACLES, Oracle};
+use crate::support::catalogue::{dynamics, fitted, rng, system};
+use crate::support::logs::{empty_log, simulate};
+use crate::support::oracles::{ORACLES, Oracle};
 
 /// Halving the integrator's step may change a number by 0.1 %; the rest is rounding.
 const SHARE: f64 = 1e-3;

@@ -4,7 +4,8 @@ use burn::tensor::{Device, Tensor};
 use residyn::expr::{Program, SignForm};
 use residyn::lanes::Row;
 
-use crate::common::{assert_near, catalog, column, devices, in_f32, numbers, points, tensor};
+use crate::support::catalogue::{assert_near, catalog, column, in_f32, points};
+use crate::support::tensors::{devices, numbers, tensor};
 
 /// f32 keeps 24 bits, 6e-8 of a value. The accelerations here are sums of terms up to some tens whose
 /// angles (up to 12 q) are rounded as well: measured up to 5e-6 of max(1, value).

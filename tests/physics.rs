@@ -7,7 +7,7 @@ use residyn::lanes::Row;
 use residyn::model::{Dynamics, Model};
 use residyn::sim::{RK4, SCHEMES, Scheme, Stepper};
 
-use crate::common::{all_systems, dynamics, points, system};
+use crate::support::catalogue::{all_systems, dynamics, points, system};
 
 /// A system that states its energy, ready to run.
 struct Balanced {

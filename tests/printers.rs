@@ -6,7 +6,9 @@ use residyn::data::{Joint, Quantity};
 use residyn::expr::{Graph, Node, Program, Scope, SignForm, parse};
 use residyn::model::{Dynamics, Library};
 
-use crate::common::{all_systems, assert_near, can_act, catalog, fitted, jacobian, points};
+use crate::support::catalogue::{
+    all_systems, assert_near, can_act, catalog, fitted, jacobian, points,
+};
 
 const SIGNS: [SignForm; 2] = [SignForm::Exact, SignForm::Smooth { width: 0.05 }];
 

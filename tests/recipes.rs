@@ -5,7 +5,8 @@ use residyn::plant::Plant;
 use residyn::train::recipe::{Job, Recipe};
 use residyn::train::{Backend, Checkpoint};
 
-use crate::train::{configs, json, refused};
+use crate::support::in_folder::{json, refused};
+use crate::support::paths::configs;
 
 /// Recipes and plants; the demo's plant is part of the program, which reads it in its own tests.
 #[test]

@@ -7,8 +7,9 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use crate::support::in_folder::{json, refused, residyn, run};
+use crate::support::paths::config;
 use crate::support::{refuses, succeeds, text, until_there};
-use crate::train::{config, json, refused, residyn, run};
 
 #[test]
 fn a_second_run_in_a_folder_is_refused_and_harms_nothing() {
@@ -133,21 +134,6 @@ fn a_log_is_written_through_a_link_and_never_onto_a_device() {
 }
 
 #[test]
-fn a_report_is_written_where_all_its_files_have_a_place_and_else_none_is() {
-    let folder = tempfile::tempdir().unwrap();
-    // In a folder they are read in any order, so each name is tried.
-    for taken in ["report.json", "model.toml", "errors.svg"] {
-        let out = folder.path().join(taken);
-        fs::create_dir_all(out.join(taken)).unwrap();
-        let message = refuses(&["closeloop", "--out", text(&out)]);
-        for part in [taken, "it is a folder", "--out"] {
-            assert!(message.contains(part), "{part:?} in {message}");
-        }
-        assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "{taken}");
-    }
-}
-
-#[test]
 #[cfg(unix)]
 fn a_checkpoint_is_written_through_a_link() {
     let dir = tempfile::tempdir().unwrap();
@@ -159,5 +145,24 @@ fn a_checkpoint_is_written_through_a_link() {
         assert!(fs::symlink_metadata(dir.join("link")).unwrap().is_symlink());
         assert!(dir.join("real/checkpoint.json").is_file());
         assert_eq!(fs::read_dir(dir).unwrap().count(), 2);
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn a_report_is_written_where_all_its_files_have_a_place_and_else_none_is() {
+        let folder = tempfile::tempdir().unwrap();
+        // In a folder they are read in any order, so each name is tried.
+        for taken in ["report.json", "model.toml", "errors.svg"] {
+            let out = folder.path().join(taken);
+            fs::create_dir_all(out.join(taken)).unwrap();
+            let message = refuses(&["closeloop", "--out", text(&out)]);
+            for part in [taken, "it is a folder", "--out"] {
+                assert!(message.contains(part), "{part:?} in {message}");
+            }
+            assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "{taken}");
+        }
     }
 }

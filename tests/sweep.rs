@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::paths::configs;
 use crate::support::{refuses, residyn, succeeds, text};
-use crate::train::configs;
 
 fn sweep(config: &str, out: &Path, more: &[&str]) -> Value {
     let config = configs().join(config);

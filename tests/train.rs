@@ -1,9 +1,7 @@
 //! `residyn train` and `residyn tune`, through the binary where its face matters.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::thread::sleep;
+use std::path::Path;
 use std::time::Duration;
 
 use residyn::model::Library;
@@ -12,40 +10,8 @@ use residyn::train::recipe::{Job, Recipe, TrainingResults};
 use residyn::train::{Backend, Penalty};
 use serde_json::Value;
 
-use crate::support::until_there;
-
-pub fn configs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")
-}
-
-pub fn config(name: &str) -> String {
-    configs().join(name).display().to_string()
-}
-
-pub fn residyn(dir: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_residyn"));
-    command.current_dir(dir).args(arguments);
-    command
-}
-
-pub fn run(dir: &Path, arguments: &[&str]) -> Output {
-    residyn(dir, arguments).output().unwrap()
-}
-
-/// The JSON of a run that must succeed.
-pub fn json(dir: &Path, arguments: &[&str]) -> Value {
-    let output = run(dir, &[arguments, &["--json"]].concat());
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    serde_json::from_slice(&output.stdout).unwrap()
-}
-
-/// The message of a run that must be refused.
-pub fn refused(dir: &Path, arguments: &[&str]) -> String {
-    let output = run(dir, arguments);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-    String::from_utf8(output.stderr).unwrap()
-}
+use crate::support::in_folder::{json, kill_after, refused, residyn, run};
+use crate::support::paths::{config, configs};
 
 /// A recipe carried out in this process.
 fn train(recipe: Recipe, backend: Backend) -> TrainingResults {
@@ -71,55 +37,6 @@ fn worst(outcome: &TrainingResults) -> f64 {
         ((p.found - truth) / truth).abs()
     };
     outcome.parameters.iter().map(off).fold(0.0, f64::max)
-}
-
-/// Start the command, and kill it so long after a file is there.
-pub fn kill_after(command: &mut Command, file: &Path, later: Duration) {
-    let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
-    let mut child = quiet.spawn().unwrap();
-    until_there(file, &mut child);
-    sleep(later);
-    child.kill().unwrap();
-    let status = child.wait().unwrap();
-    assert_eq!(status.code(), None, "it was over before it was killed");
-}
-
-#[test]
-fn a_killed_run_resumes_to_the_same_numbers() {
-    let config = config("train-pendulum.toml");
-    let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let command = [
-        "train",
-        "--config",
-        &config,
-        "--save-every",
-        "20",
-        "--out",
-        "c",
-    ];
-    let expected = json(whole.path(), &command);
-
-    let manifest = killed.path().join("c/checkpoint.json");
-    for _ in 0..2 {
-        let mut command = residyn(killed.path(), &command);
-        kill_after(&mut command, &manifest, Duration::from_millis(120));
-    }
-    let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
-    let notes = String::from_utf8(output.stderr).unwrap();
-    assert!(notes.contains("note: c goes on from epoch"), "{notes}");
-    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(found, expected);
-    for file in [
-        "weights.safetensors",
-        "last.safetensors",
-        "checkpoint.json",
-        "model.toml",
-    ] {
-        let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
-        assert!(read(whole.path()) == read(killed.path()), "{file}");
-    }
-    let left = std::fs::read_dir(killed.path()).unwrap().count();
-    assert_eq!(left, 1, "only the checkpoint is left");
 }
 
 #[test]
@@ -309,4 +226,46 @@ fn the_published_settings_recover_the_acrobot_parameters() {
         outcome.test_error.unwrap().after < 1e-3 * outcome.error.before,
         "{outcome:?}"
     );
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn a_killed_run_resumes_to_the_same_numbers() {
+        let config = config("train-pendulum.toml");
+        let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let command = [
+            "train",
+            "--config",
+            &config,
+            "--save-every",
+            "20",
+            "--out",
+            "c",
+        ];
+        let expected = json(whole.path(), &command);
+
+        let manifest = killed.path().join("c/checkpoint.json");
+        for _ in 0..2 {
+            let mut command = residyn(killed.path(), &command);
+            kill_after(&mut command, &manifest, Duration::from_millis(120));
+        }
+        let output = run(killed.path(), &[command.as_slice(), &["--json"]].concat());
+        let notes = String::from_utf8(output.stderr).unwrap();
+        assert!(notes.contains("note: c goes on from epoch"), "{notes}");
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(found, expected);
+        for file in [
+            "weights.safetensors",
+            "last.safetensors",
+            "checkpoint.json",
+            "model.toml",
+        ] {
+            let read = |dir: &Path| std::fs::read(dir.join("c").join(file)).unwrap();
+            assert!(read(whole.path()) == read(killed.path()), "{file}");
+        }
+        let left = std::fs::read_dir(killed.path()).unwrap().count();
+        assert_eq!(left, 1, "only the checkpoint is left");
+    }
 }

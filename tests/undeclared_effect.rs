@@ -8,7 +8,7 @@ use residyn::model::Library;
 use residyn::runs::RunFolder;
 use residyn::train::Backend;
 
-use crate::train::configs;
+use crate::support::paths::configs;
 
 fn session(path: &Path) -> Session {
     let experiment = Experiment::read(path).unwrap();

@@ -7,7 +7,7 @@ use residyn::data::{Joint, Log};
 use residyn::model::{FittedEffect, Library, Model};
 use residyn::plant::Plant;
 
-use crate::common::rng;
+use crate::support::catalogue::rng;
 
 /// A pendulum that hangs at q1 = 0, driven by a geared motor; its encoder and its hidden effects are added.
 const RIG: &str = r#"
@@ -87,19 +87,6 @@ fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
     proposal(&study, &fitted, &left)
 }
 
-#[test]
-fn noise_is_not_significant() {
-    for sensor in [WHITE, QUANTISED] {
-        for seed in 0..8 {
-            let left = left(&logs(sensor, "0*size", seed), &[], seed);
-            assert!(
-                !left.is_significant() && left.p_value > 0.01,
-                "{sensor}, {seed}: {left:?}"
-            );
-        }
-    }
-}
-
 /// An effect of the library that the model has leaves nothing that matters, sharper though the rig's friction is.
 #[test]
 fn a_found_effect_leaves_no_remainder() {
@@ -107,25 +94,6 @@ fn a_found_effect_leaves_no_remainder() {
         let logs = logs(QUANTISED, "-0.16*size*sign(qd)", seed);
         let left = left(&logs, &["coulomb_friction"], seed);
         assert!(!left.is_significant(), "{seed}: {left:?}");
-    }
-}
-
-/// Forces that no effect of the library describes, and where they live.
-#[test]
-fn what_the_library_lacks_is_located() {
-    let cases = [
-        ("-0.0015*size*qd^3", "qd1"),
-        ("-0.15*size*sign(qd)*(1 + sin(q))", "q1*qd1"),
-        ("-0.02*size*t*sign(qd)", "t"),
-        ("clamp(tau, -1.2*size - 0.1*qd, 1.2 - 0.1*qd) - tau", "tau1"),
-        ("0.1*size*sin(25*t)", "unknown"),
-    ];
-    for (force, place) in cases {
-        for sensor in [WHITE, QUANTISED] {
-            let left = left(&logs(sensor, force, 1), &[], 1);
-            assert_eq!(left.place, place, "{force}, {sensor}: {left:?}");
-            assert!(left.p_value < 0.01);
-        }
     }
 }
 
@@ -215,6 +183,42 @@ fn effects_with_internal_state_are_not_taken_for_noise() {
                 left.is_significant() && left.p_value < 0.01,
                 "{model}, {effects:?}: {left:?}"
             );
+        }
+    }
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn noise_is_not_significant() {
+        for sensor in [WHITE, QUANTISED] {
+            for seed in 0..8 {
+                let left = left(&logs(sensor, "0*size", seed), &[], seed);
+                assert!(
+                    !left.is_significant() && left.p_value > 0.01,
+                    "{sensor}, {seed}: {left:?}"
+                );
+            }
+        }
+    }
+
+    /// Forces that no effect of the library describes, and where they live.
+    #[test]
+    fn what_the_library_lacks_is_located() {
+        let cases = [
+            ("-0.0015*size*qd^3", "qd1"),
+            ("-0.15*size*sign(qd)*(1 + sin(q))", "q1*qd1"),
+            ("-0.02*size*t*sign(qd)", "t"),
+            ("clamp(tau, -1.2*size - 0.1*qd, 1.2 - 0.1*qd) - tau", "tau1"),
+            ("0.1*size*sin(25*t)", "unknown"),
+        ];
+        for (force, place) in cases {
+            for sensor in [WHITE, QUANTISED] {
+                let left = left(&logs(sensor, force, 1), &[], 1);
+                assert_eq!(left.place, place, "{force}, {sensor}: {left:?}");
+                assert!(left.p_value < 0.01);
+            }
         }
     }
 }

@@ -8,7 +8,7 @@ use residyn::formats::write_back;
 use residyn::model::Model;
 use residyn::model::chain::{Chain, model_text};
 
-use crate::mechanism::{comparable, fixture, mujoco_agrees, read_to, system};
+use crate::support::mechanisms::{comparable, fixture, mujoco_agrees, read_to, system};
 use crate::support::{refuses, residyn, succeeds, text};
 
 /// Descriptions with the last link of the chain.
@@ -57,51 +57,6 @@ fn written(folder: &Path, file: &Path, tip: Option<&str>, values: &Chain) -> Pat
     arguments.extend(tip.iter().flat_map(|tip| ["--tip", tip]));
     succeeds(&arguments);
     out
-}
-
-#[test]
-fn what_is_written_back_moves_like_the_model() {
-    let folder = tempfile::tempdir().unwrap();
-    for (name, tip) in FILES {
-        let values = as_fitted(&fixture(name), tip);
-        let out = written(folder.path(), &fixture(name), tip, &values);
-        let again = read_to(&out, tip);
-        for (again, wanted) in again.joints.iter().zip(&values.joints) {
-            // A rotor may be a part of its body's inertia in the model: the motion tells, below.
-            let [again_has, wanted_has] = [again, wanted].map(|joint| {
-                let has = &joint.drivetrain;
-                [has.damping, has.friction]
-            });
-            // The file has the digits that people write.
-            let is_same =
-                |(again, wanted): (f64, f64)| (again - wanted).abs() <= 1e-12 * wanted.abs();
-            assert!(
-                again_has.into_iter().zip(wanted_has).all(is_same),
-                "{name}, {}: {again_has:?}, {wanted_has:?}",
-                wanted.name
-            );
-        }
-        let [found, wanted] = [&again, &values].map(|chain| comparable(&system(chain)));
-        let n = wanted.joints;
-        for point in crate::common::points(&wanted, 100, 5) {
-            let moving = &point[..3 * n + 1];
-            let rates = |model: &residyn::model::Dynamics| {
-                model.program.eval(&[moving, &model.values()].concat())
-            };
-            let size = rates(&wanted)[n..]
-                .iter()
-                .fold(0.0_f64, |most, rate| most.max(rate.abs()));
-            for (found, wanted) in rates(&found).iter().zip(&rates(&wanted)).skip(n) {
-                assert!(
-                    (found - wanted).abs() <= 1e-9 * size,
-                    "{name}: {found} {wanted}"
-                );
-            }
-        }
-        if values.joints.iter().all(|joint| joint.follows.is_none()) {
-            mujoco_agrees(&out, &comparable(&system(&values)));
-        }
-    }
 }
 
 #[test]
@@ -166,80 +121,6 @@ const ROD: &str = r#"<?xml version="1.0"?>
   </link>
 </robot>
 "#;
-
-#[test]
-fn what_closing_the_loop_finds_is_in_the_description() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml");
-    for (log, seed) in [("1.csv", "1"), ("2.csv", "2"), ("3.csv", "3")] {
-        succeeds(&[
-            "simulate",
-            "--plant",
-            plant,
-            "--seed",
-            seed,
-            "--out",
-            text(&at(log)),
-        ]);
-    }
-    fs::write(at("rod.urdf"), ROD).unwrap();
-    succeeds(&[
-        "new",
-        "--from-urdf",
-        text(&at("rod.urdf")),
-        "--out",
-        text(&at("rod.toml")),
-    ]);
-    let logs = ["1.csv", "2.csv", "3.csv"].map(at);
-    succeeds(&[
-        "closeloop",
-        "--model",
-        text(&at("rod.toml")),
-        "--train",
-        text(&logs[0]),
-        text(&logs[1]),
-        "--test",
-        text(&logs[2]),
-        "--out",
-        text(&at("report")),
-    ]);
-    let model = at("report/model.toml");
-    let out = at("fitted.urdf");
-    succeeds(&[
-        "export",
-        "--model",
-        text(&model),
-        "--into",
-        text(&at("rod.urdf")),
-        "--out",
-        text(&out),
-    ]);
-    assert_eq!(fs::read_to_string(at("rod.urdf")).unwrap(), ROD);
-    let joint = &read_to(&out, None).joints[0];
-    assert!(
-        (joint.drivetrain.friction - 0.16).abs() < 0.0016,
-        "{joint:?}"
-    );
-    // Those of configs/demo.toml: the inertia is 1 / C_i, the weight C_g / C_i.
-    let (inertia, weight) = (
-        joint.inertia.tensor[(2, 2)],
-        9.81 * joint.inertia.moment.norm(),
-    );
-    assert!(
-        (inertia * 4.6 - 1.0).abs() < 0.01 && (weight / 17.4 * 4.6 - 1.0).abs() < 0.01,
-        "{joint:?}"
-    );
-    let library = Library::built_in();
-    let fitted = comparable(&library.model(&model).unwrap());
-    let again = comparable(&system(&read_to(&out, None)));
-    for (fitted, again) in fitted.values().iter().zip(&again.values()) {
-        assert!(
-            (fitted - again).abs() <= 1e-12 * fitted.abs(),
-            "{fitted} {again}"
-        );
-    }
-}
 
 #[test]
 fn files_that_the_model_was_not_made_from_are_refused() {
@@ -307,4 +188,127 @@ fn what_the_format_cannot_hold_is_listed() {
             "cogging_torque on joint 1: A = 0.20000, N = 8.00000, phase = 0.00000"
         ]
     );
+}
+
+mod slow {
+    use super::*;
+
+    #[test]
+    fn what_is_written_back_moves_like_the_model() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, tip) in FILES {
+            let values = as_fitted(&fixture(name), tip);
+            let out = written(folder.path(), &fixture(name), tip, &values);
+            let again = read_to(&out, tip);
+            for (again, wanted) in again.joints.iter().zip(&values.joints) {
+                // A rotor may be a part of its body's inertia in the model: the motion tells, below.
+                let [again_has, wanted_has] = [again, wanted].map(|joint| {
+                    let has = &joint.drivetrain;
+                    [has.damping, has.friction]
+                });
+                // The file has the digits that people write.
+                let is_same =
+                    |(again, wanted): (f64, f64)| (again - wanted).abs() <= 1e-12 * wanted.abs();
+                assert!(
+                    again_has.into_iter().zip(wanted_has).all(is_same),
+                    "{name}, {}: {again_has:?}, {wanted_has:?}",
+                    wanted.name
+                );
+            }
+            let [found, wanted] = [&again, &values].map(|chain| comparable(&system(chain)));
+            let n = wanted.joints;
+            for point in crate::support::catalogue::points(&wanted, 100, 5) {
+                let moving = &point[..3 * n + 1];
+                let rates = |model: &residyn::model::Dynamics| {
+                    model.program.eval(&[moving, &model.values()].concat())
+                };
+                let size = rates(&wanted)[n..]
+                    .iter()
+                    .fold(0.0_f64, |most, rate| most.max(rate.abs()));
+                for (found, wanted) in rates(&found).iter().zip(&rates(&wanted)).skip(n) {
+                    assert!(
+                        (found - wanted).abs() <= 1e-9 * size,
+                        "{name}: {found} {wanted}"
+                    );
+                }
+            }
+            if values.joints.iter().all(|joint| joint.follows.is_none()) {
+                mujoco_agrees(&out, &comparable(&system(&values)));
+            }
+        }
+    }
+
+    #[test]
+    fn what_closing_the_loop_finds_is_in_the_description() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let plant = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/demo.toml");
+        for (log, seed) in [("1.csv", "1"), ("2.csv", "2"), ("3.csv", "3")] {
+            succeeds(&[
+                "simulate",
+                "--plant",
+                plant,
+                "--seed",
+                seed,
+                "--out",
+                text(&at(log)),
+            ]);
+        }
+        fs::write(at("rod.urdf"), ROD).unwrap();
+        succeeds(&[
+            "new",
+            "--from-urdf",
+            text(&at("rod.urdf")),
+            "--out",
+            text(&at("rod.toml")),
+        ]);
+        let logs = ["1.csv", "2.csv", "3.csv"].map(at);
+        succeeds(&[
+            "closeloop",
+            "--model",
+            text(&at("rod.toml")),
+            "--train",
+            text(&logs[0]),
+            text(&logs[1]),
+            "--test",
+            text(&logs[2]),
+            "--out",
+            text(&at("report")),
+        ]);
+        let model = at("report/model.toml");
+        let out = at("fitted.urdf");
+        succeeds(&[
+            "export",
+            "--model",
+            text(&model),
+            "--into",
+            text(&at("rod.urdf")),
+            "--out",
+            text(&out),
+        ]);
+        assert_eq!(fs::read_to_string(at("rod.urdf")).unwrap(), ROD);
+        let joint = &read_to(&out, None).joints[0];
+        assert!(
+            (joint.drivetrain.friction - 0.16).abs() < 0.0016,
+            "{joint:?}"
+        );
+        // Those of configs/demo.toml: the inertia is 1 / C_i, the weight C_g / C_i.
+        let (inertia, weight) = (
+            joint.inertia.tensor[(2, 2)],
+            9.81 * joint.inertia.moment.norm(),
+        );
+        assert!(
+            (inertia * 4.6 - 1.0).abs() < 0.01 && (weight / 17.4 * 4.6 - 1.0).abs() < 0.01,
+            "{joint:?}"
+        );
+        let library = Library::built_in();
+        let fitted = comparable(&library.model(&model).unwrap());
+        let again = comparable(&system(&read_to(&out, None)));
+        for (fitted, again) in fitted.values().iter().zip(&again.values()) {
+            assert!(
+                (fitted - again).abs() <= 1e-12 * fitted.abs(),
+                "{fitted} {again}"
+            );
+        }
+    }
 }

@@ -1,0 +1,19 @@
+//! What `tests/run --quick` leaves out, in whole files.
+
+mod clients;
+mod experiments;
+mod export_c;
+mod export_fmu;
+mod fuzz;
+mod guide;
+mod kills;
+mod large_inputs;
+mod measured;
+mod network;
+mod page;
+mod properties;
+mod recordings;
+mod several_effects;
+mod shards;
+mod simulators;
+mod slurm;

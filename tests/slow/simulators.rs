@@ -1,0 +1,312 @@
+//! Mechanisms exported for simulators of rigid bodies: simulated by MuJoCo, and read back.
+
+use std::fs;
+use std::path::Path;
+
+use residyn::formats::{ExportModel, FORMATS, find};
+use residyn::model::chain::model_text;
+use residyn::model::{Library, Model};
+use residyn::sim::Integrator;
+use serde_json::json;
+
+use crate::support::catalogue::{assert_near, points, rng};
+use crate::support::mechanisms::{fixture, read, read_to};
+use crate::support::predictions::{client_agrees, predictions};
+use crate::support::{exported_models, refuses, residyn, text};
+
+/// An effect as in a model file.
+fn effect(name: &str, joint: usize, values: &str) -> String {
+    format!("\n[[effect]]\nname = \"{name}\"\njoint = {joint}\n{values}\n")
+}
+
+fn portable(name: &str, integrator: Integrator, effects: &[String]) -> ExportModel {
+    let text = Library::system_text(name).unwrap().to_owned() + &effects.concat();
+    of_text(&text, integrator)
+}
+
+fn of_text(text: &str, integrator: Integrator) -> ExportModel {
+    let library = Library::built_in();
+    let system = Model::from_text(Path::new("model.toml"), text, library.effects()).unwrap();
+    ExportModel::of_system(&system, integrator, 0.01, json!({}))
+}
+
+/// Five bodies, each on the one before.
+fn chain() -> ExportModel {
+    let description = fs::read_to_string(fixture("linkage_4r.urdf")).unwrap();
+    let mimics = |line: &&str| line.contains("<mimic");
+    let lines: Vec<&str> = description.lines().filter(|line| !mimics(line)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("five.urdf");
+    fs::write(&file, lines.join("\n")).unwrap();
+    let text = model_text(&read_to(&file, Some("hand")));
+    let system = Model::from_text(&file, &text, Library::built_in().effects()).unwrap();
+    ExportModel::of_system(&system, Integrator::RK4, 0.002, json!({}))
+}
+
+/// Models that both formats carry.
+fn plain() -> Vec<(&'static str, ExportModel)> {
+    let fine = Integrator::fine(4.try_into().unwrap());
+    let friction = |joint| {
+        let dry = effect("coulomb_friction", joint, "F_c = 0.1");
+        dry + &effect("viscous_friction", joint, "b = 0.05")
+    };
+    let limited = |joint, m: f64| effect("actuator_saturation", joint, &format!("m = {m}"));
+    let tilted = effect("gravity_tilt", 1, "delta = 0.3");
+    vec![
+        (
+            "pendulum",
+            portable("pendulum", Integrator::SEMI_IMPLICIT_EULER, &[]),
+        ),
+        (
+            "pendulum with effects",
+            portable(
+                "pendulum",
+                Integrator::RK4,
+                &[friction(1), limited(1, 2.0), tilted.clone()],
+            ),
+        ),
+        ("drive", portable("drive", Integrator::RK4, &[friction(1)])),
+        ("chain of five", chain()),
+        ("acrobot", portable("acrobot", fine, &[])),
+        (
+            "acrobot with effects",
+            portable(
+                "acrobot",
+                Integrator::RK4,
+                &[friction(2), limited(2, 5.0), tilted],
+            ),
+        ),
+        ("cartpole", portable("cartpole", fine, &[])),
+        (
+            "cartpole with effects",
+            portable(
+                "cartpole",
+                Integrator::SEMI_IMPLICIT_EULER,
+                &[friction(1), friction(2), limited(1, 4.0)],
+            ),
+        ),
+    ]
+}
+
+/// Equations alone, whose mechanism has to be recovered.
+fn stated() -> Vec<(&'static str, ExportModel)> {
+    let stated = |slides: &str, mass: &[&[&str]], bias: &[&str]| {
+        let text = format!(
+            "[system]\nname = \"stated\"\njoints = {}\nprismatic = {slides}\n[dynamics]\nmass = {mass:?}\nbias = {bias:?}\n",
+            bias.len()
+        );
+        of_text(&text, Integrator::RK4)
+    };
+    let lean = &["2*sin(q1) + 1.5*cos(q1) + 0.1*qd1"];
+    let coupling = "0.9 + 0.4*cos(q2) + 0.1*sin(q2)";
+    let own = "3 + 0.8*cos(q2) + 0.2*sin(q2)";
+    let turning = &[
+        "(0.1*cos(q2) - 0.4*sin(q2))*(2*qd1*qd2 + qd2^2) + 0.2*qd1",
+        "(0.4*sin(q2) - 0.1*cos(q2))*qd1^2 + 0.3*qd2",
+    ];
+    let inclined = &["-4 - 0.3*sin(q2)*qd2^2", "-2.7*sin(q2) - 0.6*cos(q2)"];
+    let arm = read(&fixture("planar_2r.urdf"));
+    vec![
+        ("leaning pendulum", stated("[]", &[&["0.7"]], lean)),
+        ("inclined slide", stated("[1]", &[&["2"]], &["5 + 0.3*qd1"])),
+        (
+            "weightless arm with a rotor",
+            stated("[]", &[&[own, coupling], &[coupling, "1.1"]], turning),
+        ),
+        (
+            "cart with a pole on a slope",
+            stated(
+                "[1]",
+                &[&["2", "0.3*cos(q2)"], &["0.3*cos(q2)", "0.2"]],
+                inclined,
+            ),
+        ),
+        ("arm from URDF", of_text(&model_text(&arm), Integrator::RK4)),
+    ]
+}
+
+/// Models that MJCF alone carries, compared step by step.
+fn driven() -> Vec<(&'static str, ExportModel)> {
+    let spring = |joint| effect("joint_spring", joint, "k = 1.5\nq_0 = 0.2");
+    let rotor = |joint| effect("rotor_inertia", joint, "J = 0.2");
+    let gain = |joint| effect("actuator_gain", joint, "g = 0.3");
+    let limited = |joint| effect("actuator_saturation", joint, "m = 3.0");
+    let constant = |joint| effect("constant_torque", joint, "tau_0 = -0.4");
+    vec![
+        (
+            "servo with a gain",
+            portable("servo", Integrator::RK4, &[gain(1), spring(1)]),
+        ),
+        (
+            "gain, then limit",
+            portable(
+                "pendulum",
+                Integrator::RK4,
+                &[gain(1), limited(1), spring(1)],
+            ),
+        ),
+        (
+            "limit, then gain",
+            portable(
+                "acrobot",
+                Integrator::RK4,
+                &[limited(2), gain(2), rotor(1), rotor(2)],
+            ),
+        ),
+        (
+            "gain and offset",
+            portable(
+                "cartpole",
+                Integrator::RK4,
+                &[constant(1), gain(1), rotor(1), rotor(2), spring(2)],
+            ),
+        ),
+    ]
+}
+
+#[test]
+fn mujoco_integrates_written_mjcf_to_the_same_states() {
+    client_agrees(find("mjcf").unwrap(), &plain());
+    client_agrees(find("mjcf").unwrap(), &driven());
+    client_agrees(find("mjcf").unwrap(), &stated());
+}
+
+#[test]
+fn mujoco_integrates_written_urdf_to_the_same_states() {
+    client_agrees(find("urdf").unwrap(), &plain());
+}
+
+#[test]
+fn a_lag_has_the_same_derivative() {
+    let lag = effect("actuator_lag", 1, "T = 0.05") + &effect("actuator_gain", 1, "g = -0.2");
+    let model = portable("pendulum", Integrator::RK4, &[lag]);
+    let format = find("mjcf").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.xml");
+    format.write(&model, &path).unwrap();
+    let samples = model.samples(&mut rng(1)).unwrap();
+    let own = model.predict(&samples).unwrap();
+    if let Some(theirs) = predictions("lag", || format.predict(&path, &samples)) {
+        let difference = own.difference(&theirs);
+        assert!(
+            difference.derivative.unwrap() <= format.tolerance,
+            "{difference:?}"
+        );
+        assert_eq!((difference.next, difference.rollout), (None, None));
+    }
+    let limits = (format.not_carried)(&model);
+    assert!(limits[0].starts_with("the lag within a step"), "{limits:?}");
+}
+
+#[test]
+fn written_mechanisms_read_back_with_the_same_accelerations() {
+    let library = Library::built_in();
+    for (name, model) in plain() {
+        let folder = tempfile::tempdir().unwrap();
+        for format in FORMATS.iter().filter(|format| format.robots.is_some()) {
+            let path = folder.path().join("model").with_extension(format.extension);
+            format.write(&model, &path).unwrap();
+            let mut chain = read(&path);
+            let names = chain.joints.iter().map(|joint| &joint.name);
+            assert!(
+                names.zip(&model.system.joint_names).all(|(a, b)| a == b),
+                "{name}"
+            );
+            // URDF says nothing of gravity.
+            let down = chain.gravity.normalize();
+            let own = model.declared().parameters;
+            let own = own.iter().find(|p| p.unit == "m/s^2");
+            chain.gravity = own.map_or(chain.gravity, |g| down * g.value);
+            let text = model_text(&chain);
+            let back = Model::from_text(Path::new(name), &text, library.effects()).unwrap();
+            let n = model.joints();
+            let back = back.dynamics();
+            for point in points(&back, 50, 1) {
+                let moving = &point[..=3 * n];
+                let [found, wanted] = [&back, &model.equations]
+                    .map(|d| d.program.eval(&[moving, &d.values()].concat())[n]);
+                assert_near(found, wanted, 1e-9, &format!("{name} as {}", format.name));
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_that_are_not_carried_are_listed() {
+    let rest = effect("stribeck_friction", 1, "F_c = 0.1\nF_s = 0.2\nv_s = 0.1")
+        + &effect("rotor_inertia", 2, "J = 0.1")
+        + &effect("actuator_gain", 2, "g = 0.5");
+    let model = portable("acrobot", Integrator::RK4, &[rest]);
+    let said = |format: &str| (find(format).unwrap().not_carried)(&model).join("\n");
+    let (mjcf, urdf) = (said("mjcf"), said("urdf"));
+    assert!(
+        mjcf.starts_with("stribeck_friction on joint 1") && mjcf.lines().count() == 1,
+        "{mjcf}"
+    );
+    for part in [
+        "stribeck_friction",
+        "gravity of 9.8 ",
+        "rotor's inertia of joint 2",
+        "gain of joint 2",
+    ] {
+        assert!(urdf.contains(part), "{part} is missing in {urdf}");
+    }
+}
+
+#[test]
+fn equations_of_no_mechanism_cannot_be_exported() {
+    let all = exported_models::all();
+    let (_, data) = all
+        .iter()
+        .find(|(name, _)| *name == "pendulum_data")
+        .unwrap();
+    let error = find("mjcf")
+        .unwrap()
+        .write(data, Path::new("no.xml"))
+        .unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("a network replaces its equations"),
+        "{error}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("no.urdf");
+    let rig =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs/dfki_simple_pendulum_published.toml");
+    let said = refuses(&[
+        "export",
+        "--model",
+        text(&rig),
+        "--format",
+        "urdf",
+        "--out",
+        text(&out),
+    ]);
+    assert!(
+        said.contains("none of the mechanisms that are known"),
+        "{said}"
+    );
+    assert!(!out.exists());
+}
+
+#[test]
+fn export_lists_losses_and_measures_the_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("cartpole.xml");
+    let run = residyn(&[
+        "export",
+        "--model",
+        "cartpole",
+        "--format",
+        "mjcf",
+        "--out",
+        text(&out),
+    ]);
+    assert_eq!(run.status.code(), Some(0));
+    assert!(
+        fs::read_to_string(&out)
+            .unwrap()
+            .contains("<joint name=\"joint1\" type=\"slide\" axis=\"1 0 0\"/>")
+    );
+}

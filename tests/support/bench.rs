@@ -1,0 +1,76 @@
+//! A small bench of rigs on simulated logs.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use residyn::bench::{Cell, Source, read as grid};
+use residyn::model::Library;
+use tempfile::TempDir;
+
+use super::paths::ours;
+use super::text;
+
+/// Four logs of a pendulum with dry friction.
+fn record(folder: &Path) {
+    fs::create_dir_all(folder).unwrap();
+    let mut cell: Cell = grid(&ours("configs/bench/smoke.toml")).unwrap().remove(0);
+    let Source::Simulated(simulation) = &mut cell.source else {
+        panic!("the grid's rigs are simulated")
+    };
+    simulation.condition.logs = 4;
+    let model = Library::built_in().model(&cell.model).unwrap();
+    for log in cell.record(&model).unwrap().0 {
+        log.write(folder.join(&log.path)).unwrap();
+    }
+}
+
+/// The rig's true values, without its friction, as the published set.
+pub const RIGS: &str = r#"
+plain = ["coulomb_friction"]
+
+[[rig]]
+name = "rig"
+folder = "logs"
+model = "pendulum"
+parameters = { C_i = 5.0 }
+logs = ["log1.csv", "log2.csv", "log3.csv"]
+test = "each_log"
+leave_out = ["log2.csv@7.5-8"]
+published = [{ name = "1.0", model = "pendulum", parameters = { C_g = -19.62, C_i = 6.6667 } }]
+also = { fourth = ["log4.csv"] }
+"#;
+
+/// A folder with a file of rigs and the logs.
+pub struct Bench {
+    pub folder: TempDir,
+}
+
+impl Bench {
+    pub fn new(rigs: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        record(&folder.path().join("logs"));
+        fs::write(folder.path().join("rigs.toml"), rigs).unwrap();
+        Self { folder }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Run the command with these flags too.
+    pub fn command(&self, more: &[&str], run: impl Fn(&[&str])) {
+        let [rigs, out] = ["rigs.toml", "out"].map(|name| self.path(name));
+        let data = text(self.folder.path());
+        let rigs = [
+            "bench",
+            "rigs",
+            "--rigs",
+            text(&rigs),
+            "--data",
+            data,
+            "--out",
+            text(&out),
+        ];
+        run(&[rigs.as_slice(), more].concat());
+    }
+}

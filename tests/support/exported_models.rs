@@ -1,0 +1,206 @@
+//! One model of each kind that can be exported: equations, effects, filters of the command, networks; one joint and two.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use rand_chacha::ChaCha8Rng;
+use residyn::formats::ExportModel;
+use residyn::model::{
+    Angles, InputScaling, LastLayer, Library, MlpSettings, MlpWeights, Model, ModelWeights,
+    ResidualOn,
+};
+use residyn::sim::{Integrator, SCHEMES};
+use serde_json::json;
+use tempfile::TempDir;
+
+use super::catalogue::rng;
+use super::paths::ours;
+use super::{succeeds, text};
+
+/// Friction, and a command that is delayed by a fraction of a step and then lagged.
+const PENDULUM_EFFECTS: &str = r#"
+[[effect]]
+name = "coulomb_friction"
+joint = 1
+F_c = { value = 0.16, ci95 = [0.15, 0.17] }
+
+[[effect]]
+name = "actuator_delay"
+joint = 1
+d = 0.013
+
+[[effect]]
+name = "actuator_lag"
+joint = 1
+T = 0.02
+"#;
+
+/// A delay on one joint, a lag on the other.
+const ACROBOT_EFFECTS: &str = r#"
+[[effect]]
+name = "actuator_delay"
+joint = 1
+d = 0.025
+
+[[effect]]
+name = "actuator_lag"
+joint = 2
+T = 0.01
+
+[[effect]]
+name = "stribeck_friction"
+joint = 1
+F_c = 0.1
+F_s = 0.15
+v_s = 0.2
+
+[[effect]]
+name = "actuator_saturation"
+joint = 2
+m = 4.0
+"#;
+
+/// All of them, by name.
+pub fn all() -> Vec<(&'static str, ExportModel)> {
+    let fine = Integrator::fine(4.try_into().unwrap());
+    let (euler, rk4) = (Integrator::SEMI_IMPLICIT_EULER, Integrator::RK4);
+    let pendulum = || system("pendulum", "");
+    let friction = || system("pendulum", PENDULUM_EFFECTS);
+    let acrobot = || system("acrobot", "");
+    let late = || system("acrobot", ACROBOT_EFFECTS);
+    let mut random = rng(7);
+    let forces =
+        [Angles::Raw, Angles::SinCos].map(|angles| settings(angles, ResidualOn::Accelerations));
+    let rates = settings(Angles::SinCos, ResidualOn::Derivative);
+    let mut small = |joints, settings: &MlpSettings| network(joints, settings, &mut random);
+    let residuals = [small(1, &rates), small(2, &forces[0]), small(2, &forces[1])];
+    let priors = [small(1, &forces[1]), small(2, &rates)];
+    let mut models = vec![
+        ("pendulum", physics(&pendulum(), euler, 0.02)),
+        ("pendulum_effects", physics(&friction(), rk4, 0.01)),
+        (
+            "pendulum_hybrid",
+            hybrid(&friction(), &residuals[0], euler, 0.02),
+        ),
+        (
+            "pendulum_data",
+            data_driven(&pendulum(), &priors[0], rk4, 0.02),
+        ),
+        ("acrobot", physics(&acrobot(), fine, 0.02)),
+        ("acrobot_effects", physics(&late(), fine, 0.01)),
+        (
+            "acrobot_hybrid",
+            hybrid(&late(), &residuals[2], euler, 0.01),
+        ),
+        (
+            "acrobot_data",
+            data_driven(&acrobot(), &priors[1], fine, 0.02),
+        ),
+        ("cartpole", physics(&system("cartpole", ""), rk4, 0.02)),
+        (
+            "servo",
+            physics(&system("servo", PENDULUM_EFFECTS), rk4, 0.01),
+        ),
+        ("motor", physics(&system("motor", ""), rk4, 0.01)),
+        (
+            "cartpole_hybrid",
+            hybrid(&system("cartpole", ""), &residuals[1], rk4, 0.02),
+        ),
+    ];
+    models.extend(SCHEMES.map(|scheme| {
+        let integrator = Integrator::of(scheme);
+        (scheme.name, physics(&acrobot(), integrator, 0.02))
+    }));
+    models
+}
+
+/// A built-in system with effects appended to its file.
+pub fn system(name: &str, effects: &str) -> Model {
+    let library = Library::built_in();
+    let declared = library.model(Path::new(name)).unwrap();
+    Model::from_text(
+        Path::new(name),
+        &(declared.text + effects),
+        library.effects(),
+    )
+    .unwrap()
+}
+
+fn physics(system: &Model, integrator: Integrator, step_s: f64) -> ExportModel {
+    ExportModel::of_system(system, integrator, step_s, origin(system))
+}
+
+fn hybrid(
+    system: &Model,
+    residual: &MlpWeights,
+    integrator: Integrator,
+    step_s: f64,
+) -> ExportModel {
+    let mut model = physics(system, integrator, step_s);
+    model.residual = Some(residual.clone());
+    model
+}
+
+fn data_driven(
+    system: &Model,
+    prior: &MlpWeights,
+    integrator: Integrator,
+    step_s: f64,
+) -> ExportModel {
+    let numbers = ModelWeights {
+        parameters: Vec::new(),
+        prior: Some(prior.clone()),
+        residual: None,
+    };
+    ExportModel::new(system, numbers, integrator, step_s, origin(system))
+}
+
+fn origin(system: &Model) -> serde_json::Value {
+    json!({"config": {"model": system.name}, "seed": 7})
+}
+
+fn settings(angles: Angles, on: ResidualOn) -> MlpSettings {
+    MlpSettings {
+        hidden: vec![8, 6],
+        angles,
+        on,
+    }
+}
+
+/// A random network with scaled features and outputs that are small relative to the derivative.
+fn network(joints: usize, settings: &MlpSettings, random: &mut ChaCha8Rng) -> MlpWeights {
+    let features = settings.angles.features(joints);
+    let scaling = InputScaling {
+        mean: (0..features).map(|k| 0.125 * k as f64 - 0.25).collect(),
+        std: (0..features).map(|k| 1.0 + 0.5 * k as f64).collect(),
+    };
+    let mut network = MlpWeights::new(joints, settings, scaling, LastLayer::Random, random);
+    let last = network.layers.last_mut().unwrap();
+    for number in last.weight.iter_mut().chain(&mut last.bias) {
+        *number *= 0.25;
+    }
+    network
+}
+
+/// A model that the program exported as JSON, with its weights beside it.
+pub fn exported() -> &'static Path {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let (from, to) = (ours(CHECKPOINT), folder.path().join("model.json"));
+        succeeds(&[
+            "export",
+            "--checkpoint",
+            text(&from),
+            "--format",
+            "json",
+            "--out",
+            text(&to),
+        ]);
+        folder
+    });
+    folder.path()
+}
+
+/// A checkpoint of a hybrid model.
+pub const CHECKPOINT: &str = "checkpoints/pendulum-sim";

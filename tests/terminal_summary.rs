@@ -1,0 +1,134 @@
+//! What closing the loop prints in a terminal: the whole story in lines of eighty characters, thirty of them where there is not
+//! very much to say.
+
+use std::fs;
+use std::path::Path;
+
+use residyn::report::{Report, Words, summary};
+use serde_json::{Value, json};
+
+use crate::support::paths::ours;
+use crate::support::{succeeds, text};
+
+const BLOCKS: [char; 2] = ['█', '▁'];
+
+fn fits(said: &str) {
+    assert!(said.lines().count() <= 30, "{said}");
+    is_narrow(said);
+}
+
+fn is_narrow(said: &str) {
+    let wide = said.lines().find(|line| line.chars().count() > 80);
+    assert_eq!(wide, None, "{said}");
+}
+
+#[test]
+fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("r");
+    let log = ours("tests/fixtures/logs/pendulum.csv");
+    let rig = ["--model", "pendulum", "--train", text(&log)];
+    let closed = ["closeloop", "--curves", "--out", text(&out)];
+    let said = succeeds(&[&closed[..], &rig].concat());
+    fits(said.rsplit_once("\nTook ").unwrap().0);
+    for words in [
+        "The model lacks coulomb_friction on joint 1",
+        "What is missing?\n  coulomb_friction on joint 1: -F_c1 * sign(qd1)\n    F_c1 = 0.1",
+        "How much better is it? Open-loop errors on the test logs, rad\n",
+        "as written     fitted  with effects\n  joint 1, 0.1 s ahead",
+        "May I trust it?\n",
+        "What next? ",
+        "report.html; model and plots are beside it\n",
+    ] {
+        assert!(said.contains(words), "{words} is missing in\n{said}");
+    }
+    assert!(BLOCKS.iter().all(|block| said.contains(*block)), "{said}");
+    let report: Value =
+        serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
+    for compared in ["motion", "torque"] {
+        let report: Report = serde_json::from_value(arm(report.clone(), compared)).unwrap();
+        let drawn = vec![String::from("  a curve"); 3];
+        let said = summary(&report, &[], Path::new("report"), &drawn, &Words::default());
+        is_narrow(&said);
+        // What is said in sentences is never cut.
+        let whole = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(!whole.contains(".."), "{said}");
+        for sentence in [
+            format!("report.md): demo1.csv: {}", LONG.repeat(12)),
+            format!("to rule out stribeck_friction: {}", LONG.repeat(12)),
+            format!(
+                "held, since the logs do not tell them: {}",
+                held().join(", ")
+            ),
+        ] {
+            assert!(
+                whole.contains(sentence.trim()),
+                "{sentence} is missing in\n{said}"
+            );
+        }
+        assert!(
+            said.starts_with("Serious, to be mended first (and 1 more"),
+            "{said}"
+        );
+        assert!(said.contains("and 5 more effects in report.md"), "{said}");
+        let last = match compared {
+            "motion" => "and 3 more joints in report.md",
+            _ => "joint 7 (wrist_flange_joint)",
+        };
+        assert!(said.contains(last), "{said}");
+        assert!(said.contains("not ruled out: "), "{said}");
+        assert!(said.contains("What next? "), "{said}");
+    }
+}
+
+const LONG: &str = "a reason that goes on and on ";
+
+/// Parameters that the logs do not tell.
+fn held() -> Vec<String> {
+    (1..=30).map(|k| format!("m_{k}")).collect()
+}
+
+/// A report of an arm of seven joints with much to say, from one of a pendulum.
+fn arm(mut report: Value, compared: &str) -> Value {
+    let names = [
+        "base",
+        "shoulder",
+        "elbow",
+        "forearm",
+        "wrist",
+        "hand",
+        "wrist_flange",
+    ];
+    report["joints"] = json!(7);
+    report["joint_names"] = names.iter().map(|name| format!("{name}_joint")).collect();
+    report["prismatic"] = vec![false; 7].into();
+    report["compared"] = json!(compared);
+    let errors = |relative: f64| json!({"rms": vec![1.5; 7], "relative": relative});
+    report["torque"] = json!({
+        "as_declared": errors(0.4), "before": errors(0.2), "after": errors(0.1), "reduction_ci95": [0.4, 0.6]
+    });
+    for model in ["declared", "before", "after"] {
+        for horizon in report["error"][model]["position_rmse"]
+            .as_array_mut()
+            .unwrap()
+        {
+            *horizon = vec![0.0123; 7].into();
+        }
+    }
+    let before = report["error"]["before"].clone();
+    let mut other = before.clone();
+    other["name"] = json!("a/model/of/somebody/else.toml");
+    report["error"]["against"] = json!([other, other, other]);
+    report["effects"] = vec![report["effects"][0].clone(); 9].into();
+    let long = LONG.repeat(12);
+    report["reason"] = json!(long);
+    let found = json!({"severity": "serious", "text": long});
+    report["audit"][0]["findings"] = json!([found, found]);
+    report["identifiability"]["held"] = held().into();
+    let rival = json!({
+        "effects": [{"name": "x", "joint": 1, "label": "x on joint 1"}], "title": "stribeck_friction",
+        "place": "1", "reason": long, "experiment": long, "separation": null
+    });
+    report["alternatives"] = json!([rival, rival, rival, rival]);
+    report
+}
