@@ -54,7 +54,7 @@ impl Log {
             qd: qd.map(|qd| columns("qd", &qd)).transpose()?,
             driven,
         };
-        Ok(Self(channels.log(name.as_ref()).or_raise()?))
+        Ok(Self(channels.log(name).or_raise()?))
     }
 
     /// Time of each row in s, shape (rows,).

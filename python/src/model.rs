@@ -384,7 +384,7 @@ impl Model {
         step_s: f64,
         integrator: &str,
     ) -> PyResult<Vec<String>> {
-        let format = formats::find(format).map_err(ResidynError::new_err)?;
+        let format = formats::find(format).or_raise()?;
         check_seconds("step", step_s)?;
         let origin = json!({"config": {"model": self.inner.name}, "seed": 0});
         let model = ExportModel::of_system(&self.inner, integrator_of(integrator)?, step_s, origin);
@@ -447,5 +447,5 @@ fn check_seconds(what: &str, seconds: f64) -> PyResult<()> {
 }
 
 fn integrator_of(name: &str) -> PyResult<Integrator> {
-    name.parse().map_err(ResidynError::new_err)
+    name.parse::<Integrator>().or_raise()
 }

@@ -168,7 +168,7 @@ pub fn simulate(
     let mut plant = Plant::read(&plant, &library).or_raise()?;
     for (at, values) in effects {
         let (effect, joint) = place(&at)?;
-        let first = library.effect(effect).map_err(ResidynError::new_err)?;
+        let first = library.effect(effect).or_raise()?;
         let values = match values {
             Values::First(value) => vec![(first.parameters[0].name.clone(), value)],
             Values::Named(values) => values.into_iter().collect(),

@@ -63,10 +63,10 @@ impl RobotReader {
         let mut chain = (self.read)(file, tip)?;
         if let Some(name) = drive {
             let found = ReadyDrive::find(Library::drives(), name);
-            chain.drive = Some(found.map_err(|message| FileError {
+            chain.drive = Some(found.map_err(|unknown| FileError {
                 path: file.to_owned(),
                 place: None,
-                message,
+                message: unknown.to_string(),
             })?);
         }
         let name = Path::new(&chain.name);
