@@ -91,7 +91,10 @@ pub fn is_reading(value: f64) -> bool {
 ///
 /// # Errors
 /// The number, and what is taken at most.
-pub fn check_readings(name: &str, numbers: impl IntoIterator<Item = f64>) -> Result<(), String> {
+pub(crate) fn check_readings(
+    name: &str,
+    numbers: impl IntoIterator<Item = f64>,
+) -> Result<(), String> {
     let mut numbers = numbers.into_iter();
     match numbers.find(|number| !is_reading(*number)) {
         Some(number) => Err(format!(

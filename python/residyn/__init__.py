@@ -16,6 +16,7 @@ do about it.
 
 from ._residyn import (
     Episode,
+    Library,
     Log,
     Model,
     Parameter,
@@ -30,18 +31,26 @@ from ._residyn import (
     tune,
 )
 from .loop import close_loop
-from .report import Effect, EffectParameter, Report
+from .report import Effect, EffectParameter, Errors, Report, TorqueErrors
+from .results import Bounds, Prediction, Step, Torques
 
 __all__ = [
+    "Bounds",
     "Effect",
     "EffectParameter",
     "Episode",
+    "Errors",
+    "Library",
     "Log",
     "Model",
     "Parameter",
+    "Prediction",
     "Report",
     "ResidynError",
     "Rig",
+    "Step",
+    "TorqueErrors",
+    "Torques",
     "__version__",
     "close_loop",
     "control",

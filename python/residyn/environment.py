@@ -28,7 +28,7 @@ class Environment(gymnasium.Env[Array, Array]):
         """
         self._rig = Rig(plant, task)
         self._steps = 0
-        low, high = numpy.array(self._rig.torque, dtype=numpy.float64).T
+        low, high = self._rig.action_bounds
         self.action_space = gymnasium.spaces.Box(low, high, dtype=numpy.float64)
         unbounded = numpy.full(2 * self._rig.joints, numpy.inf)
         self.observation_space = gymnasium.spaces.Box(-unbounded, unbounded, dtype=numpy.float64)
@@ -44,4 +44,4 @@ class Environment(gymnasium.Env[Array, Array]):
         assert isinstance(self.action_space, gymnasium.spaces.Box)
         measured, reward = self._rig.step(numpy.clip(action, self.action_space.low, self.action_space.high))
         self._steps += 1
-        return measured, reward, False, self._steps >= self._rig.steps, {}
+        return measured, reward, False, self._steps >= self._rig.episode_steps, {}

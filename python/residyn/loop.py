@@ -40,6 +40,9 @@ def close_loop(
         progress: called with the stage, what is being done in it and, where that is a number of models to fit, how many
             of how many are done.
 
+    Returns:
+        What was found; in a notebook it shows itself.
+
     Raises:
         ResidynError: logs without a usable stretch, or of another rig; a model that diverges from its starting values.
     """

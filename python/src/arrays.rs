@@ -2,6 +2,7 @@
 
 use numpy::ndarray::{Array2, ArrayViewD, Axis};
 use numpy::{AllowTypeChange, IntoPyArray, PyArray2, PyArrayLikeDyn};
+use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 use serde::Serialize;
 
@@ -46,6 +47,15 @@ pub fn matrix<'py>(py: Python<'py>, channels: &[Vec<f64>]) -> Bound<'py, PyArray
     let rows = channels.first().map_or(0, Vec::len);
     let at = |(row, joint): (usize, usize)| channels[joint][row];
     Array2::from_shape_fn((rows, channels.len()), at).into_pyarray(py)
+}
+
+/// A result with names: a class of `residyn.results`.
+pub fn named<'py>(
+    py: Python<'py>,
+    class: &str,
+    fields: impl PyCallArgs<'py>,
+) -> PyResult<Bound<'py, PyAny>> {
+    py.import("residyn.results")?.getattr(class)?.call1(fields)
 }
 
 /// A result as Python's own lists, dictionaries and numbers.

@@ -28,31 +28,48 @@ pub struct Outcome {
 
 #[pymethods]
 impl Outcome {
-    /// The text of report.json.
+    /// The report as values.
+    ///
+    /// Returns:
+    ///     The text of report.json.
     fn json(&self) -> String {
         serde_json::to_string(&self.report).expect("a report has only finite numbers and texts")
     }
 
     /// The report as a page for a browser, whole in itself.
+    ///
+    /// Returns:
+    ///     HTML.
     fn html(&self) -> String {
         report::page(&self.report)
     }
 
     /// The report as Markdown; its pictures are files of `write`.
+    ///
+    /// Returns:
+    ///     Markdown.
     fn markdown(&self) -> String {
         report::text(&self.report)
     }
 
     /// The declared model with the effects that were found, refitted.
+    ///
+    /// Returns:
+    ///     A model with the library of the declared one.
     fn model(&self) -> PyResult<Model> {
         let text = report::model_file(&self.lock());
-        let name = "model.toml".as_ref();
-        let inner = Declared::from_text(name, &text, self.library.effects()).or_raise()?;
         let library = self.library.clone();
+        let inner = library.model_from_text("model.toml", &text).or_raise()?;
         Ok(Model { inner, library })
     }
 
     /// Write report.html, report.md, report.json, model.toml, plots and the network into a folder.
+    ///
+    /// Args:
+    ///     folder: made where it is missing.
+    ///
+    /// Raises:
+    ///     ResidynError: a folder that cannot be written.
     #[allow(clippy::needless_pass_by_value)]
     fn write(&self, folder: PathBuf) -> PyResult<()> {
         report::write(folder, &self.lock(), &self.origin).or_raise()?;
@@ -127,7 +144,7 @@ impl Question {
     }
 }
 
-/// See `residyn.close_loop`.
+/// See `residyn.close_loop`, which has the same arguments.
 #[pyfunction]
 #[pyo3(signature = (model, train, test, against, seed, budget_s, errors, network, progress))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // the Python function's own
@@ -203,7 +220,10 @@ fn space(errors: &str) -> PyResult<Space> {
     }
 }
 
-/// The stages of closing the loop, in their order, as `progress` is told them.
+/// The stages of closing the loop.
+///
+/// Returns:
+///     Their names in their order, as `progress` is told them.
 #[pyfunction]
 pub fn stages() -> Vec<&'static str> {
     Stage::ALL.map(Stage::text).to_vec()

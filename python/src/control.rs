@@ -13,6 +13,7 @@ use residyn::train::{Backend, Checkpoint};
 use crate::error::{OrRaise, ResidynError};
 use crate::log::Log;
 use crate::model::Model;
+use crate::rig::task_of;
 use crate::work::interruptible;
 
 /// An episode of a plant under control.
@@ -71,7 +72,7 @@ impl Planned<'_> {
             Self::Checkpoint(folder) => {
                 let (checkpoint, _, trained) =
                     Checkpoint::open(folder, &Library::built_in(), Backend::default())
-                        .or_raise()?;
+                        .or_raise_at(folder)?;
                 Ok(trained.predictor(checkpoint.manifest.settings.integrator))
             }
         }
@@ -114,6 +115,9 @@ impl Question {
 ///     episodes: how many.
 ///     seed: of starts, noise and plans; the same seed gives the same episodes.
 ///
+/// Returns:
+///     The episodes.
+///
 /// Raises:
 ///     ResidynError: files that cannot be read, a model of another system, or a plant that diverges.
 #[pyfunction]
@@ -127,8 +131,8 @@ pub fn control(
     episodes: usize,
     seed: u64,
 ) -> PyResult<Vec<Episode>> {
-    let plant = Plant::read(&plant, &Library::built_in()).or_raise()?;
-    let task = Task::for_plant(&plant, task.as_deref()).or_raise()?;
+    let plant = Plant::read(&plant, &Library::built_in()).or_raise_at(&plant)?;
+    let task = task_of(&plant, task.as_deref())?;
     let predictor = model.predictor(&task)?;
     if predictor.joints() != task.joints() {
         return Err(ResidynError::new_err(format!(

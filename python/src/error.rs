@@ -1,24 +1,81 @@
 use std::error::Error;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind};
+use std::path::Path;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use residyn::files::OutputError;
 
 pyo3::create_exception!(
     residyn,
     ResidynError,
     PyValueError,
-    "What cannot be done: what is wrong, where (file, line, column), and what to do about it."
+    "What cannot be done: what is wrong, where (file, line, column), and what to do about it.\n\n\
+     A file that is missing or may not be opened is, as well, a FileNotFoundError or a PermissionError with its `filename`."
 );
 
 /// Raises what the library says.
 pub trait OrRaise<T> {
     fn or_raise(self) -> PyResult<T>;
+
+    /// The same of what reads a path.
+    fn or_raise_at(self, path: &Path) -> PyResult<T>;
 }
 
-impl<T, E: Error> OrRaise<T> for Result<T, E> {
+impl<T, E: Error + 'static> OrRaise<T> for Result<T, E> {
     fn or_raise(self) -> PyResult<T> {
-        self.map_err(|error| ResidynError::new_err(told(&error)))
+        self.map_err(|error| raised(&error, written(&error)))
     }
+
+    fn or_raise_at(self, path: &Path) -> PyResult<T> {
+        self.map_err(|error| {
+            let unreadable = unreadable(path).map(|why| (why, path));
+            raised(&error, unreadable.or_else(|| written(&error)))
+        })
+    }
+}
+
+/// Why a path cannot be opened, if so. Messages of the library hold it as words alone.
+fn unreadable(path: &Path) -> Option<io::Error> {
+    match fs::metadata(path) {
+        Ok(found) if found.is_dir() => None,
+        Ok(_) => File::open(path).err(),
+        Err(why) => Some(why),
+    }
+}
+
+/// What could not be written, and why, if an error is of that.
+fn written(error: &(dyn Error + 'static)) -> Option<(io::Error, &Path)> {
+    let mut causes = std::iter::successors(Some(error), |error| (**error).source());
+    let output = causes.find_map(|cause| cause.downcast_ref::<OutputError>())?;
+    Some((output.source.kind().into(), &output.path))
+}
+
+/// A `ResidynError`; where the operating system refuses a file, one that is Python's own class for that as well.
+fn raised(error: &dyn Error, refused: Option<(io::Error, &Path)>) -> PyErr {
+    let message = told(error);
+    let class = refused.and_then(|(why, path)| {
+        let class = match why.kind() {
+            ErrorKind::NotFound => "ResidynFileNotFoundError",
+            ErrorKind::PermissionDenied => "ResidynPermissionError",
+            ErrorKind::IsADirectory => "ResidynIsADirectoryError",
+            _ => return None,
+        };
+        Some((class, path))
+    });
+    match class {
+        None => ResidynError::new_err(message),
+        Some((class, path)) => {
+            Python::attach(|py| of_file(py, class, &message, path).unwrap_or_else(|error| error))
+        }
+    }
+}
+
+fn of_file(py: Python<'_>, class: &str, message: &str, path: &Path) -> PyResult<PyErr> {
+    let class = py.import("residyn._errors")?.getattr(class)?;
+    let error = class.call_method1("of_file", (message, path))?;
+    Ok(PyErr::from_value(error))
 }
 
 /// An error and its causes. One that the message before it contains is not repeated.

@@ -4,6 +4,7 @@ mod arrays;
 mod close_loop;
 mod control;
 mod error;
+mod library;
 mod log;
 mod model;
 mod rig;
@@ -25,6 +26,8 @@ mod _residyn {
     #[pymodule_export]
     use crate::error::ResidynError;
     #[pymodule_export]
+    use crate::library::Library;
+    #[pymodule_export]
     use crate::log::{Log, read_log};
     #[pymodule_export]
     use crate::model::{Model, Parameter};
@@ -40,14 +43,29 @@ mod _residyn {
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 
-    /// Run the command line `arguments`, the name of the program first, and return its exit status. `file` is that of this
-    /// module.
+    /// Run the command line.
+    ///
+    /// Args:
+    ///     file: the file of this module.
+    ///     arguments: the words, the name of the program first.
+    ///
+    /// Returns:
+    ///     The exit status.
     #[pyfunction]
     fn main(py: Python<'_>, file: PathBuf, arguments: Vec<OsString>) -> u8 {
         py.detach(|| residyn::cli::run_from(file, arguments))
     }
 
-    /// Names of what is built in: "systems", "plants", "tasks", "effects", "drives" or "formats".
+    /// Names of what is built in.
+    ///
+    /// Args:
+    ///     of: "systems", "plants", "tasks", "effects", "drives" or "formats".
+    ///
+    /// Returns:
+    ///     The names.
+    ///
+    /// Raises:
+    ///     ResidynError: another kind.
     #[pyfunction]
     fn names(of: &str) -> PyResult<Vec<String>> {
         let library = residyn::Library::built_in();

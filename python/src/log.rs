@@ -1,8 +1,10 @@
 use std::path::PathBuf;
 
 use numpy::{IntoPyArray, PyArray1, PyArray2};
+use pyo3::exceptions::{PyImportError, PyKeyError};
 use pyo3::prelude::*;
-use residyn::data::{Channels, Columns, Interval, Quantity, audit};
+use pyo3::types::PyDict;
+use residyn::data::{self, Channels, Interval, Quantity, audit};
 
 use crate::arrays::{ArrayLike, columns, matrix, plain, vector};
 use crate::error::{OrRaise, ResidynError};
@@ -10,24 +12,23 @@ use crate::model::Model;
 
 /// One trajectory of a rig: what was recorded between switching it on and off.
 ///
-/// Row i's torque, or command, acts from time[i] to time[i + 1].
+/// Row i's torque, or command, acts from time[i] to time[i + 1]. `log["q1"]` is a column, `len(log)` the number of rows.
+///
+/// Args:
+///     time: s, shape (rows,), strictly increasing; irregular sampling is fine.
+///     q: joint angles in rad (m of joints that slide), shape (rows, joints), or (rows,) of one joint.
+///     qd: joint velocities in rad/s, of the same shape; without them they come from the angles.
+///     tau: joint torques in N m (N), of the same shape; without torques and commands, the rig is passive.
+///     cmd: commands of the drives in place of torques: targets of servos, volts, amperes.
+///     name: what messages and reports call the log.
+///
+/// Raises:
+///     ResidynError: arrays of other lengths, numbers that are not finite, or time that does not increase.
 #[pyclass(frozen, module = "residyn")]
 pub struct Log(pub residyn::Log);
 
 #[pymethods]
 impl Log {
-    /// A log of arrays in memory.
-    ///
-    /// Args:
-    ///     time: s, shape (rows,), strictly increasing; irregular sampling is fine.
-    ///     q: joint angles in rad (m of joints that slide), shape (rows, joints), or (rows,) of one joint.
-    ///     qd: joint velocities in rad/s; without them they come from the angles.
-    ///     tau: joint torques in N m (N); without torques and commands, the rig is passive.
-    ///     cmd: commands of the drives in place of torques: targets of servos, volts, amperes.
-    ///     name: what messages and reports call the log.
-    ///
-    /// Raises:
-    ///     ResidynError: arrays of other lengths, numbers that are not finite, or time that does not increase.
     #[new]
     #[pyo3(signature = (*, time, q, qd=None, tau=None, cmd=None, name="log"))]
     fn new(
@@ -54,7 +55,84 @@ impl Log {
             qd: qd.map(|qd| columns("qd", &qd)).transpose()?,
             driven,
         };
-        Ok(Self(channels.log(name.as_ref()).or_raise()?))
+        Ok(Self(channels.log(name).or_raise()?))
+    }
+
+    /// A log of a data frame of pandas or polars, or of anything else that has `columns` and gives one for its name.
+    ///
+    /// Args:
+    ///     frame: with the columns of a log file: time, q1, ..., and qd1, ..., tau1, ... or cmd1, ...; or those that a
+    ///         model's `[columns]` name. Others are passed over.
+    ///     model: of the rig; without it, the columns have the standard names and units.
+    ///     name: what messages and reports call the log.
+    ///
+    /// Returns:
+    ///     The log.
+    ///
+    /// Raises:
+    ///     ResidynError: a column that is missing, numbers that are missing or not finite, or time that does not increase.
+    #[staticmethod]
+    #[pyo3(signature = (frame, *, model=None, name="log"))]
+    fn from_dataframe(
+        frame: &Bound<'_, PyAny>,
+        model: Option<&Model>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let Columns { numbers, others } = columns_of(frame)?;
+        let log = match model {
+            Some(model) => model.inner.log_from_columns(name, numbers),
+            None => residyn::Log::from_columns(name, numbers, None),
+        };
+        let log = log.map_err(|error| {
+            let others = match others.is_empty() {
+                true => String::new(),
+                false => format!("; these columns hold no numbers: {}", others.join(", ")),
+            };
+            ResidynError::new_err(format!("{error}{others}"))
+        });
+        log.map(Self)
+    }
+
+    /// The log as a data frame of pandas.
+    ///
+    /// Returns:
+    ///     A pandas.DataFrame with the columns `columns`.
+    ///
+    /// Raises:
+    ///     ImportError: pandas is not installed.
+    fn to_pandas<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.frame(py, "pandas")
+    }
+
+    /// The log as a data frame of polars.
+    ///
+    /// Returns:
+    ///     A polars.DataFrame with the columns `columns`.
+    ///
+    /// Raises:
+    ///     ImportError: polars is not installed.
+    fn to_polars<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.frame(py, "polars")
+    }
+
+    /// Names of the columns: time, q1, ..., qd1, ..., and tau1, ... or cmd1, ...
+    #[getter]
+    fn columns(&self) -> Vec<String> {
+        self.0.named_columns().map(|(name, _)| name).collect()
+    }
+
+    /// A column by its name, shape (rows,).
+    ///
+    /// Raises:
+    ///     KeyError: no column has this name.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let mut columns = self.0.named_columns();
+        let found = columns.find(|(column, _)| column == name);
+        let (_, values) = found.ok_or_else(|| {
+            let known = self.columns().join(", ");
+            PyKeyError::new_err(format!("no column {name:?}; there are {known}"))
+        })?;
+        Ok(PyArray1::from_slice(py, values))
     }
 
     /// Time of each row in s, shape (rows,).
@@ -105,7 +183,14 @@ impl Log {
         self.0.notes.clone()
     }
 
-    /// The same log without the stretch from start_s to end_s, in the log's own time: it is neither fitted nor scored.
+    /// The same log without the stretch from start_s to end_s: it is neither fitted nor scored.
+    ///
+    /// Args:
+    ///     start_s: where it begins in s, in the log's own time.
+    ///     end_s: where it ends in s.
+    ///
+    /// Returns:
+    ///     The log; `q` and the other arrays have all rows still.
     ///
     /// Raises:
     ///     ResidynError: an end that does not come after the start.
@@ -124,14 +209,21 @@ impl Log {
     ///
     /// Args:
     ///     model: whose `[columns]` say what the columns of the file hold.
+    ///
+    /// Returns:
+    ///     As `residyn audit --json` prints it; a finding has a `severity` ("serious", "warning" or "info") and a `text`.
     #[pyo3(signature = (model=None))]
     fn audit<'py>(&self, py: Python<'py>, model: Option<&Model>) -> PyResult<Bound<'py, PyAny>> {
-        let columns = model.map_or_else(Columns::default, |model| model.inner.columns.clone());
+        let columns =
+            model.map_or_else(data::Columns::default, |model| model.inner.columns.clone());
         let found = py.detach(|| audit(&self.0, &columns));
         plain(py, &found)
     }
 
     /// Write the log as CSV with the columns time, q1, ..., qd1, ..., tau1, ... or cmd1, ...
+    ///
+    /// Args:
+    ///     path: the file; one that is there is replaced.
     ///
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
@@ -155,6 +247,60 @@ impl Log {
     }
 }
 
+impl Log {
+    /// The columns as a data frame of a package.
+    fn frame<'py>(&self, py: Python<'py>, package: &str) -> PyResult<Bound<'py, PyAny>> {
+        let found = py.import(package).map_err(|missing| {
+            let remedy = format!("to_{package} needs {package}: pip install {package}");
+            let error = PyImportError::new_err(remedy);
+            error.set_cause(py, Some(missing));
+            error
+        })?;
+        let columns = PyDict::new(py);
+        for (name, values) in self.0.named_columns() {
+            columns.set_item(name, PyArray1::from_slice(py, values))?;
+        }
+        found.getattr("DataFrame")?.call1((columns,))
+    }
+}
+
+/// The columns of a data frame.
+struct Columns {
+    numbers: Vec<(String, Vec<f64>)>,
+    /// Names of those that hold texts, dates or whatever is no number.
+    others: Vec<String>,
+}
+
+fn columns_of(frame: &Bound<'_, PyAny>) -> PyResult<Columns> {
+    let numpy = frame.py().import("numpy")?;
+    let mut columns = Columns {
+        numbers: Vec::new(),
+        others: Vec::new(),
+    };
+    for label in frame.getattr("columns")?.try_iter()? {
+        let label = label?;
+        // What has no text for its name is no column of a log.
+        let Ok(name) = label.extract::<String>() else {
+            continue;
+        };
+        let array = numpy.call_method1("asarray", (frame.get_item(label)?,))?;
+        let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+        // Dates would become numbers of nanoseconds.
+        let numbers = match "mM".contains(&kind) {
+            true => None,
+            false => array.call_method1("astype", ("float64",)).ok(),
+        };
+        match numbers {
+            Some(numbers) => {
+                let numbers = vector(&name, &numbers.extract()?)?;
+                columns.numbers.push((name, numbers));
+            }
+            None => columns.others.push(name),
+        }
+    }
+    Ok(columns)
+}
+
 /// Read a log of any format that is read, with the standard columns and as many joints as it has.
 ///
 /// Where columns have other names or units, the model says so: `Model.read_log`.
@@ -162,12 +308,15 @@ impl Log {
 /// Args:
 ///     path: the file.
 ///
+/// Returns:
+///     The log.
+///
 /// Raises:
 ///     ResidynError: with file, line and column, what is wrong and what to do.
 #[pyfunction]
 #[allow(clippy::needless_pass_by_value)]
 pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
     py.detach(|| residyn::Log::read_standard(&path))
-        .or_raise()
+        .or_raise_at(&path)
         .map(Log)
 }

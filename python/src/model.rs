@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::{IntoPyArray, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use residyn::formats::{self, ExportModel};
@@ -9,8 +9,9 @@ use residyn::sim::{Environment, Integrator};
 use residyn::{Library, Log as Recorded};
 use serde_json::json;
 
-use crate::arrays::{ArrayLike, columns, matrix, plain, vector};
+use crate::arrays::{ArrayLike, columns, matrix, named, plain, vector};
 use crate::error::{OrRaise, ResidynError};
+use crate::library::Effects;
 use crate::log::Log;
 
 /// A dynamics model: equations with parameters, and the effects that were found.
@@ -48,16 +49,13 @@ impl Parameter {
     }
 }
 
-/// The built-in effects and those of the user's folders.
-fn library(folders: Vec<PathBuf>) -> PyResult<Library> {
-    let mut library = Library::built_in();
-    for folder in folders {
-        library = library.with_folder(&folder).or_raise()?;
-    }
-    Ok(library)
-}
-
 impl Model {
+    /// A model file, or a built-in system by its name.
+    pub fn of_library(library: Library, path: &Path) -> PyResult<Self> {
+        let inner = library.model(path).or_raise_at(path)?;
+        Ok(Self { inner, library })
+    }
+
     /// The model of a robot description, with a warning of what that has and the model has not.
     fn described(
         py: Python<'_>,
@@ -65,15 +63,15 @@ impl Model {
         path: &Path,
         tip: Option<&str>,
         drive: Option<&str>,
-        effects: Vec<PathBuf>,
+        effects: Effects<'_>,
     ) -> PyResult<Self> {
         let format = formats::find(format).expect("called with the names of formats");
         let reader = format
             .robots
             .as_ref()
             .expect("called with robot descriptions");
-        let (inner, notes) = reader.model(path, tip, drive).or_raise()?;
-        let library = library(effects)?;
+        let (inner, notes) = reader.model(path, tip, drive).or_raise_at(path)?;
+        let library = effects.library()?;
         warn(py, &notes).map(|()| Self { inner, library })
     }
 }
@@ -96,24 +94,37 @@ impl Model {
     ///
     /// Args:
     ///     path: a file, or one of `residyn.names("systems")`.
-    ///     effects: folders of effect files of your own, which `close_loop` then considers as well.
+    ///     effects: a `Library`, or folders of effect files of your own beside the built-in ones; `close_loop` then considers
+    ///         them.
+    ///
+    /// Returns:
+    ///     The model.
     ///
     /// Raises:
     ///     ResidynError: with file, line and column, what is wrong and what to do.
     #[staticmethod]
-    #[pyo3(signature = (path, *, effects=Vec::new()))]
-    fn read(path: PathBuf, effects: Vec<PathBuf>) -> PyResult<Self> {
-        let library = library(effects)?;
-        let inner = library.model(path).or_raise()?;
-        Ok(Self { inner, library })
+    #[pyo3(signature = (path, *, effects=Effects::default()))]
+    fn read(path: PathBuf, effects: Effects<'_>) -> PyResult<Self> {
+        Self::of_library(effects.library()?, &path)
     }
 
-    /// The model in the text of a model file; `name` is for messages.
+    /// The model in the text of a model file.
+    ///
+    /// Args:
+    ///     text: what the file would hold.
+    ///     name: what messages call the text.
+    ///     effects: as for `read`.
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ResidynError: with line and column, what is wrong and what to do.
     #[staticmethod]
-    #[pyo3(signature = (text, *, name="model.toml", effects=Vec::new()))]
-    fn from_text(text: &str, name: &str, effects: Vec<PathBuf>) -> PyResult<Self> {
-        let library = library(effects)?;
-        let inner = residyn::Model::from_text(name.as_ref(), text, library.effects()).or_raise()?;
+    #[pyo3(signature = (text, *, name="model.toml", effects=Effects::default()))]
+    fn from_text(text: &str, name: &str, effects: Effects<'_>) -> PyResult<Self> {
+        let library = effects.library()?;
+        let inner = library.model_from_text(name, text).or_raise()?;
         Ok(Self { inner, library })
     }
 
@@ -123,31 +134,52 @@ impl Model {
     ///     path: the file.
     ///     tip: the last link; without it, the end of the longest branch.
     ///     drive: what drives the joints, where logs hold commands: one of `residyn.names("drives")`.
-    ///     effects: folders of effect files of your own.
+    ///     effects: as for `read`.
+    ///
+    /// Returns:
+    ///     The model, whose parameters are the masses, centres and inertias of the links.
+    ///
+    /// Raises:
+    ///     ResidynError: a file that cannot be read or holds no serial chain, or an unknown drive.
     ///
     /// Warns:
     ///     UserWarning: of what is read differently or not at all.
     #[staticmethod]
-    #[pyo3(signature = (path, *, tip=None, drive=None, effects=Vec::new()))]
+    #[pyo3(signature = (path, *, tip=None, drive=None, effects=Effects::default()))]
     fn from_urdf(
         py: Python<'_>,
         path: PathBuf,
         tip: Option<&str>,
         drive: Option<&str>,
-        effects: Vec<PathBuf>,
+        effects: Effects<'_>,
     ) -> PyResult<Self> {
         Self::described(py, "urdf", &path, tip, drive, effects)
     }
 
-    /// The serial chain of an MJCF file of MuJoCo: as `from_urdf`; position actuators are taken over.
+    /// The serial chain of an MJCF file of MuJoCo: every link's inertia a parameter; position actuators are taken over.
+    ///
+    /// Args:
+    ///     path: the file.
+    ///     tip: the last body; without it, the end of the longest branch.
+    ///     drive: what drives the joints, where logs hold commands: one of `residyn.names("drives")`.
+    ///     effects: as for `read`.
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ResidynError: a file that cannot be read or holds no serial chain, or an unknown drive.
+    ///
+    /// Warns:
+    ///     UserWarning: of what is read differently or not at all.
     #[staticmethod]
-    #[pyo3(signature = (path, *, tip=None, drive=None, effects=Vec::new()))]
+    #[pyo3(signature = (path, *, tip=None, drive=None, effects=Effects::default()))]
     fn from_mjcf(
         py: Python<'_>,
         path: PathBuf,
         tip: Option<&str>,
         drive: Option<&str>,
-        effects: Vec<PathBuf>,
+        effects: Effects<'_>,
     ) -> PyResult<Self> {
         Self::described(py, "mjcf", &path, tip, drive, effects)
     }
@@ -194,18 +226,30 @@ impl Model {
             .collect()
     }
 
+    /// The effects that it may lack, which `close_loop` considers.
+    #[getter]
+    fn library(&self) -> crate::library::Library {
+        crate::library::Library(self.library.clone())
+    }
+
     /// The text of the model file.
     #[getter]
     fn text(&self) -> &str {
         &self.inner.text
     }
 
-    /// The declared equations in LaTeX, one a line.
+    /// The declared equations in LaTeX.
+    ///
+    /// Returns:
+    ///     An equation a text; of a chain of bodies, their form.
     fn latex(&self) -> Vec<String> {
         self.inner.latex()
     }
 
     /// Write the model file.
+    ///
+    /// Args:
+    ///     path: the file; one that is there is replaced.
     ///
     /// Raises:
     ///     ResidynError: a folder that cannot be written.
@@ -215,10 +259,18 @@ impl Model {
 
     /// Read a log of this rig, of any format that is read, by the model's `[columns]`.
     ///
+    /// Args:
+    ///     path: the file, or the folder of a LeRobot data set.
+    ///
+    /// Returns:
+    ///     The log.
+    ///
     /// Raises:
     ///     ResidynError: with file, line and column, what is wrong and what to do.
     fn read_log(&self, py: Python<'_>, path: PathBuf) -> PyResult<Log> {
-        py.detach(|| self.inner.read_log(path)).or_raise().map(Log)
+        py.detach(|| self.inner.read_log(&path))
+            .or_raise_at(&path)
+            .map(Log)
     }
 
     /// Predictions of a log, open loop: over consecutive windows of `horizon_s`, the motion from the logged state at the
@@ -229,47 +281,43 @@ impl Model {
     ///     horizon_s: length of a window in s.
     ///
     /// Returns:
-    ///     One pair a window: time in s, shape (rows,), and joint angles in rad (or m), shape (rows, joints).
+    ///     A `Prediction` a window: `time` in s, shape (rows,), and `q`, joint angles in rad (or m), shape (rows, joints).
+    ///
+    /// Raises:
+    ///     ResidynError: a log of another rig, or a horizon that is not above zero.
     #[pyo3(signature = (log, horizon_s=1.0))]
-    #[allow(clippy::type_complexity)] // as the stubs say it
     fn predict<'py>(
         &self,
         py: Python<'py>,
         log: &Log,
         horizon_s: f64,
-    ) -> PyResult<Vec<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)>> {
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         self.check(log)?;
         check_seconds("horizon", horizon_s)?;
         let found = py.detach(|| traces(&self.inner.dynamics(), &log.0, horizon_s));
-        let arrays = found.into_iter().map(|trace| {
+        let predictions = found.into_iter().map(|trace| {
             let q = matrix(py, &trace.q);
-            (trace.time.into_pyarray(py), q)
+            named(py, "Prediction", (trace.time.into_pyarray(py), q))
         });
-        Ok(arrays.collect())
+        predictions.collect()
     }
 
     /// The torques that the logged motion needs by the model, beside the logged ones, both low-passed.
     ///
+    /// Args:
+    ///     log: of a rig with as many joints.
+    ///
     /// Returns:
-    ///     Time in s, shape (rows,); logged and needed torques in N m (or N), shape (rows, joints).
+    ///     `Torques`: `time` in s, shape (rows,); `logged` and `needed` in N m (or N), shape (rows, joints).
     ///
     /// Raises:
-    ///     ResidynError: a model that gives accelerations.
-    #[allow(clippy::type_complexity)]
-    fn torques<'py>(
-        &self,
-        py: Python<'py>,
-        log: &Log,
-    ) -> PyResult<(
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray2<f64>>,
-    )> {
+    ///     ResidynError: a model that gives accelerations, or a log of another rig.
+    fn torques<'py>(&self, py: Python<'py>, log: &Log) -> PyResult<Bound<'py, PyAny>> {
         self.check(log)?;
         let found = py.detach(|| needed_torques(&self.inner, &log.0));
         let found = found.ok_or_else(|| self.no_torques())?;
         let (logged, needed) = (matrix(py, &found.logged), matrix(py, &found.needed));
-        Ok((found.time.into_pyarray(py), logged, needed))
+        named(py, "Torques", (found.time.into_pyarray(py), logged, needed))
     }
 
     /// Prediction errors on logs, as `residyn evaluate --json` prints them.
@@ -328,6 +376,9 @@ impl Model {
     ///
     /// Returns:
     ///     The states, the first one included, shape (steps + 1, 2 joints).
+    ///
+    /// Raises:
+    ///     ResidynError: a state or torques of another shape, an integrator that is unknown, or a step that is not above zero.
     #[pyo3(signature = (state, tau, step_s, integrator="rk4"))]
     fn rollout<'py>(
         &self,
@@ -384,7 +435,7 @@ impl Model {
         step_s: f64,
         integrator: &str,
     ) -> PyResult<Vec<String>> {
-        let format = formats::find(format).map_err(ResidynError::new_err)?;
+        let format = formats::find(format).or_raise()?;
         check_seconds("step", step_s)?;
         let origin = json!({"config": {"model": self.inner.name}, "seed": 0});
         let model = ExportModel::of_system(&self.inner, integrator_of(integrator)?, step_s, origin);
@@ -447,5 +498,5 @@ fn check_seconds(what: &str, seconds: f64) -> PyResult<()> {
 }
 
 fn integrator_of(name: &str) -> PyResult<Integrator> {
-    name.parse().map_err(ResidynError::new_err)
+    name.parse::<Integrator>().or_raise()
 }

@@ -1,5 +1,5 @@
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
@@ -11,8 +11,9 @@ use residyn::plant::{self, Plant};
 use residyn::{Library, rng};
 use self_cell::self_cell;
 
-use crate::arrays::{ArrayLike, vector};
+use crate::arrays::{ArrayLike, named, vector};
 use crate::error::{OrRaise, ResidynError};
+use crate::library;
 use crate::log::Log;
 
 type Controlled<'d> = plant::Rig<'d>;
@@ -27,6 +28,13 @@ self_cell!(
 );
 
 /// A simulated rig with a task, step by step: `residyn.environment.Environment` makes a Gymnasium environment of it.
+///
+/// Args:
+///     plant: a plant or model file, or a built-in plant or system by its name.
+///     task: a task file, or a built-in task; by default a built-in one of the plant's system.
+///
+/// Raises:
+///     ResidynError: files that cannot be read, or a task of another system.
 #[pyclass(module = "residyn")]
 pub struct Rig {
     plant: Plant,
@@ -39,19 +47,11 @@ pub struct Rig {
 #[pymethods]
 #[allow(clippy::needless_pass_by_value)]
 impl Rig {
-    /// A plant and what it is to do.
-    ///
-    /// Args:
-    ///     plant: a plant or model file, or a built-in plant or system by its name.
-    ///     task: a task file, or a built-in task; by default a built-in one of the plant's system.
-    ///
-    /// Raises:
-    ///     ResidynError: files that cannot be read, or a task of another system.
     #[new]
     #[pyo3(signature = (plant, task=None))]
     fn new(plant: PathBuf, task: Option<PathBuf>) -> PyResult<Self> {
-        let plant = Plant::read(&plant, &Library::built_in()).or_raise()?;
-        let task = Task::for_plant(&plant, task.as_deref()).or_raise()?;
+        let plant = Plant::read(&plant, &Library::built_in()).or_raise_at(&plant)?;
+        let task = task_of(&plant, task.as_deref())?;
         Ok(Self {
             objective: task.objective(),
             random: rng(0),
@@ -67,14 +67,16 @@ impl Rig {
         self.task.joints()
     }
 
-    /// Lowest and highest torque (N m or N) or command of each joint.
+    /// What may be commanded: `Bounds` with the `low` and `high` torque (N m or N) or command of each joint, each of the
+    /// shape (joints,).
     #[getter]
-    fn torque(&self) -> Vec<(f64, f64)> {
-        self.task
-            .torque
-            .iter()
-            .map(|[low, high]| (*low, *high))
-            .collect()
+    fn action_bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let ends = [0, 1].map(|end| -> Vec<f64> {
+            let torque = self.task.torque.iter();
+            torque.map(|range| range[end]).collect()
+        });
+        let [low, high] = ends.map(|end| end.into_pyarray(py));
+        named(py, "Bounds", (low, high))
     }
 
     /// How long a torque is held, in s.
@@ -83,13 +85,16 @@ impl Rig {
         self.task.step_s
     }
 
-    /// Steps of an episode.
+    /// How many steps an episode of the task has.
     #[getter]
-    fn steps(&self) -> usize {
+    fn episode_steps(&self) -> usize {
         self.task.steps
     }
 
-    /// Begin an episode; with a seed, everything random from here on is drawn anew from it.
+    /// Begin an episode, from a start state that is drawn from the task's.
+    ///
+    /// Args:
+    ///     seed: with one, everything random from here on is drawn anew from it.
     ///
     /// Returns:
     ///     The measured state: positions, then velocities, shape (2 joints,).
@@ -111,16 +116,15 @@ impl Rig {
 
     /// Hold a torque (or command) for a step.
     ///
+    /// Args:
+    ///     tau: of each joint in N m (or N), shape (joints,).
+    ///
     /// Returns:
-    ///     The measured state, and the reward of the step by the task.
+    ///     `Step`: the measured `state`, shape (2 joints,), and the `reward` of the step by the task.
     ///
     /// Raises:
     ///     ResidynError: before `reset`, a torque of another size, or a plant that diverges.
-    fn step<'py>(
-        &mut self,
-        py: Python<'py>,
-        tau: ArrayLike<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, f64)> {
+    fn step<'py>(&mut self, py: Python<'py>, tau: ArrayLike<'py>) -> PyResult<Bound<'py, PyAny>> {
         let tau = vector("tau", &tau)?;
         if tau.len() != self.task.joints() {
             return Err(ResidynError::new_err(format!(
@@ -136,8 +140,17 @@ impl Rig {
         moving.with_dependent_mut(|_, rig| {
             rig.step(&tau).or_raise()?;
             let reward = objective.value(rig.state(), &tau, rig.time_s());
-            Ok((rig.measure(random).into_pyarray(py), reward))
+            named(py, "Step", (rig.measure(random).into_pyarray(py), reward))
         })
+    }
+}
+
+/// The task in a file, or a built-in one.
+pub fn task_of(plant: &Plant, task: Option<&Path>) -> PyResult<Task> {
+    let found = Task::for_plant(plant, task);
+    match task {
+        Some(path) => found.or_raise_at(path),
+        None => found.or_raise(),
     }
 }
 
@@ -150,11 +163,15 @@ impl Rig {
 ///     seed: of excitation and noise; the same seed gives the same log.
 ///     duration_s: in place of the plant's own.
 ///     name: what messages and reports call the log; by default the plant's name and the seed.
+///     library: the effects to choose from; by default the built-in ones.
+///
+/// Returns:
+///     What the rig's sensors said, and its torques or commands.
 ///
 /// Raises:
 ///     ResidynError: a plant or effect that is unknown, or a rig that diverges.
 #[pyfunction]
-#[pyo3(signature = (plant, *, effects=BTreeMap::new(), seed=0, duration_s=None, name=None))]
+#[pyo3(signature = (plant, *, effects=BTreeMap::new(), seed=0, duration_s=None, name=None, library=None))]
 #[allow(clippy::needless_pass_by_value)]
 pub fn simulate(
     py: Python<'_>,
@@ -163,12 +180,13 @@ pub fn simulate(
     seed: u64,
     duration_s: Option<f64>,
     name: Option<PathBuf>,
+    library: Option<PyRef<'_, library::Library>>,
 ) -> PyResult<Log> {
-    let library = Library::built_in();
-    let mut plant = Plant::read(&plant, &library).or_raise()?;
+    let library = library.map_or_else(Library::built_in, |library| library.0.clone());
+    let mut plant = Plant::read(&plant, &library).or_raise_at(&plant)?;
     for (at, values) in effects {
         let (effect, joint) = place(&at)?;
-        let first = library.effect(effect).map_err(ResidynError::new_err)?;
+        let first = library.effect(effect).or_raise()?;
         let values = match values {
             Values::First(value) => vec![(first.parameters[0].name.clone(), value)],
             Values::Named(values) => values.into_iter().collect(),

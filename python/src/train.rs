@@ -2,6 +2,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use residyn::Library;
 use residyn::runs::RunFolder;
 use residyn::train::recipe::{Job, Recipe, RecipeError, Saves, TrainingResults};
@@ -19,7 +20,8 @@ type Told = (usize, usize, f64);
 /// The same call goes on with a run that was interrupted, and ends with the same numbers.
 ///
 /// Args:
-///     config: the training recipe.
+///     config: the training recipe: a file, or a dictionary with the keys of one, where paths are relative to the working
+///         directory.
 ///     out: the folder of the checkpoint.
 ///     seed: of everything random; the same seed gives the same result on the same machine.
 ///     progress: called after each epoch with the number of epochs done, of all, and the loss.
@@ -35,19 +37,13 @@ type Told = (usize, usize, f64);
 #[allow(clippy::needless_pass_by_value)]
 pub fn train(
     py: Python<'_>,
-    config: PathBuf,
+    config: Config,
     out: PathBuf,
     seed: u64,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'_, PyAny>> {
-    let begin = move || {
-        Job::train(
-            Recipe::read(&config)?,
-            &Library::built_in(),
-            Backend::default(),
-            seed,
-        )
-    };
+    let recipe = config.recipe(py)?;
+    let begin = move || Job::train(recipe, &Library::built_in(), Backend::default(), seed);
     carry_out(py, begin, out, progress)
 }
 
@@ -56,13 +52,13 @@ pub fn train(
 /// Args:
 ///     checkpoint: the folder of the trained model.
 ///     out: the folder of the new checkpoint.
-///     config: a recipe; or
+///     config: a recipe, a file or a dictionary as for `train`; or
 ///     logs: files of logs, for a recipe that suits most.
 ///     seed: of everything random.
 ///     progress: called after each epoch with the number of epochs done, of all, and the loss.
 ///
 /// Returns:
-///     As `train`.
+///     Errors and parameters before and after, as `train` returns them.
 ///
 /// Raises:
 ///     ResidynError: as `train`, and a checkpoint of another system.
@@ -73,7 +69,7 @@ pub fn tune(
     py: Python<'_>,
     checkpoint: PathBuf,
     out: PathBuf,
-    config: Option<PathBuf>,
+    config: Option<Config>,
     logs: Vec<PathBuf>,
     seed: u64,
     progress: Option<Py<PyAny>>,
@@ -83,15 +79,40 @@ pub fn tune(
             "give either config= or logs= to tune on",
         ));
     }
+    let recipe = config.map(|config| config.recipe(py)).transpose()?;
+    let checkpoint = Checkpoint::load(&checkpoint).or_raise_at(&checkpoint)?;
     let begin = move || {
         let (library, backend) = (Library::built_in(), Backend::default());
-        let checkpoint = Checkpoint::load(&checkpoint)?;
-        match config {
-            Some(config) => Job::tune(&checkpoint, Recipe::read(&config)?, &library, backend, seed),
+        match recipe {
+            Some(recipe) => Job::tune(&checkpoint, recipe, &library, backend, seed),
             None => Job::tune_on_logs(&checkpoint, logs, &library, backend, seed),
         }
     };
     carry_out(py, begin, out, progress)
+}
+
+/// A recipe as a notebook has it.
+#[derive(FromPyObject)]
+pub enum Config {
+    File(PathBuf),
+    Keys(Py<PyDict>),
+}
+
+impl Config {
+    fn recipe(self, py: Python<'_>) -> PyResult<Recipe> {
+        match self {
+            Self::File(path) => Recipe::read(&path).or_raise_at(&path),
+            Self::Keys(keys) => {
+                let options = PyDict::new(py);
+                // Paths may be those of pathlib.
+                options.set_item("default", py.import("os")?.getattr("fspath")?)?;
+                let json = py
+                    .import("json")?
+                    .call_method("dumps", (keys,), Some(&options))?;
+                Recipe::from_json(json.extract()?).or_raise()
+            }
+        }
+    }
 }
 
 fn carry_out(

@@ -50,3 +50,12 @@ def test_a_plant_without_a_task_is_refused() -> None:
 def test_a_rig_needs_its_start() -> None:
     with pytest.raises(residyn.ResidynError, match="call reset first"):
         residyn.Rig("pendulum").step([0.0])
+
+
+def test_what_a_rig_says_has_names() -> None:
+    rig = residyn.Rig("acrobot")
+    low, high = rig.action_bounds
+    assert low.shape == high.shape == (2,) and (low <= high).all() and rig.episode_steps > 1
+    rig.reset(seed=1)
+    step = rig.step([0.0, 0.0])
+    assert step.state.shape == (4,) and step == (step.state, step.reward)

@@ -4,10 +4,22 @@ import signal
 import threading
 import time
 from pathlib import Path
+from typing import get_args, get_type_hints
 
+import numpy as np
 import pytest
 import residyn
 from conftest import command
+
+MAGNET = """
+[effect]
+name = "magnet"
+about = "a magnet beside the path"
+force = "-F*(q - 0.5)*exp(-((q - 0.5)/0.3)^2)"
+
+[parameters]
+F = { unit = "N m/rad", about = "its pull", typical = 1.0, positive = true }
+"""
 
 
 def test_the_hidden_effect_is_named(report: residyn.Report) -> None:
@@ -15,9 +27,49 @@ def test_the_hidden_effect_is_named(report: residyn.Report) -> None:
     (friction,) = effect.parameters
     assert (report.verdict, effect.name, effect.joint) == ("explained", "coulomb_friction", 1)
     assert friction.ci95 is not None and friction.ci95[0] < 0.2 < friction.ci95[1] and friction.unit == "N m"
-    assert report.errors["after"]["position_rmse"][1][0] < 0.5 * report.errors["before"]["position_rmse"][1][0]
+    assert report.after.position_rmse[1, 0] < 0.5 * report.before.position_rmse[1, 0]
     assert report.model.effects == ["coulomb_friction on joint 1"]
     assert "coulomb_friction on joint 1: F_c1 = 0.20" in str(report)
+
+
+def test_errors_are_those_of_the_file(report: residyn.Report) -> None:
+    written = report.to_dict()["error"]
+    assert report.horizons_s.tolist() == written["horizons_s"] and report.before.torque is None
+    for name in ["declared", "before", "with_friction", "after", "hybrid"]:
+        errors = getattr(report, name)
+        assert (errors is None) == (written[name] is None), name
+        for number in ["position_rmse", "position_median", "velocity_rmse", "windows", "diverged"] if errors else ():
+            assert getattr(errors, number).tolist() == written[name][number], (name, number)
+    assert report.before.position_rmse.shape == (len(report.horizons_s), 1)
+    assert report.reduction_ci95 is not None and list(report.reduction_ci95) == written["reduction_ci95"]
+
+
+def test_a_verdict_is_one_of_those_of_the_file() -> None:
+    schema = json.loads((Path(__file__).parents[2] / "docs" / "report.schema.json").read_text())
+    assert {entry["const"] for entry in schema["$defs"]["Verdict"]["oneOf"]} == set(get_args(get_type_hints(residyn.Report.verdict.fget)["return"]))
+
+
+def test_torques_have_errors_as_well() -> None:
+    arm = [residyn.simulate("acrobot", effects={"coulomb_friction@2": 0.3}, seed=seed, duration_s=4.0) for seed in range(2)]
+    report = residyn.close_loop(residyn.Model.read("acrobot"), arm[:1], arm[1:], network=False)
+    written = report.to_dict()["torque"]
+    for errors, name in [(report.declared, "as_declared"), (report.before, "before"), (report.after, "after")]:
+        assert errors.torque is not None and errors.torque.relative == written[name]["relative"]
+        assert errors.torque.rms.tolist() == written[name]["rms"]
+    assert report.hybrid is None
+
+
+def test_an_effect_of_ones_own_is_found() -> None:
+    library = residyn.Library().with_effect(MAGNET)
+    hidden = {"magnet": 3.0}
+    logs = [residyn.simulate("pendulum", effects=hidden, seed=seed, library=library) for seed in range(4)]
+    report = residyn.close_loop(residyn.Model.read("pendulum", effects=library), logs, network=False)
+    (effect,) = report.effects
+    (pull,) = effect.parameters
+    assert effect.name == "magnet" and pull.ci95 is not None and pull.ci95[0] < 3.0 < pull.ci95[1]
+    assert report.model.library.effects == library.effects
+    with pytest.raises(residyn.ResidynError, match="unknown effect `magnet`"):
+        residyn.Model.from_text(report.model.text)
 
 
 def test_a_notebook_shows_the_page_in_a_frame(report: residyn.Report) -> None:

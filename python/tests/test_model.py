@@ -44,7 +44,7 @@ def test_errors_are_those_of_the_command(tmp_path: Path, report: residyn.Report,
 
 def test_predictions_start_from_the_log(report: residyn.Report, logs: list[residyn.Log]) -> None:
     windows = report.model.predict(logs[3], 0.5)
-    assert len(windows) > 30
+    assert len(windows) > 30 and windows[0].q.shape == (len(windows[0].time), 1)
     for time, q in windows:
         measured = logs[3].q[np.searchsorted(logs[3].time, time)]
         assert q.shape == measured.shape and np.abs(q - measured).max() < 0.1
@@ -54,7 +54,8 @@ def test_predictions_start_from_the_log(report: residyn.Report, logs: list[resid
 def test_torques_are_of_models_with_a_mass(pendulum: residyn.Model, logs: list[residyn.Log]) -> None:
     arm = residyn.Model.read("acrobot")
     log = residyn.simulate("acrobot", seed=2)
-    time, logged, needed = arm.torques(log)
+    time, logged, needed = torques = arm.torques(log)
+    assert torques.needed is needed and isinstance(torques, residyn.Torques)
     assert time.shape == (len(logged),) and logged.shape == needed.shape == (len(time), 2)
     with pytest.raises(residyn.ResidynError, match="gives accelerations"):
         pendulum.torques(logs[0])
@@ -90,3 +91,25 @@ def test_a_log_of_another_rig_is_refused(pendulum: residyn.Model) -> None:
 def test_what_is_wrong_is_said(call: object, words: str) -> None:
     with pytest.raises(residyn.ResidynError, match=words):
         call()  # type: ignore[operator]
+
+
+def test_a_library_has_effects_from_texts_and_folders(tmp_path: Path) -> None:
+    text = """
+[effect]
+name = "weak_spring"
+about = "a weak spring"
+force = "-k*q"
+
+[parameters]
+k = { unit = "N m/rad", about = "stiffness", typical = 0.01 }
+"""
+    built_in = residyn.Library()
+    library = built_in.with_effect(text)
+    assert "weak_spring" in library and "weak_spring" not in built_in and len(library) == len(built_in) + 1
+    (tmp_path / "spring.toml").write_text(text)
+    of_folder = residyn.Model.read("pendulum", effects=[tmp_path]).library
+    assert of_folder.effects == built_in.with_folder(tmp_path).effects == library.effects == sorted(library.effects)
+    sprung = library.model("pendulum").text + '\n[[effect]]\nname = "weak_spring"\njoint = 1\nk = 0.02\n'
+    assert residyn.Model.from_text(sprung, effects=library).effects == ["weak_spring on joint 1"]
+    with pytest.raises(residyn.ResidynError, match="effect, line 2, column 2: unknown key `efect`; did you mean `effect`"):
+        library.with_effect("\n[efect]\n")

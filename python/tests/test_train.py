@@ -1,5 +1,6 @@
 import json
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,23 @@ def test_a_training_is_that_of_the_command(tmp_path: Path) -> None:
     assert {**found, "checkpoint": None} == {**wanted, "checkpoint": None}
     assert [epoch for epoch, _, _ in told] == list(range(1, found["epochs"] + 1))
     assert told[-1][2] < told[0][2]
+
+
+def test_a_dictionary_is_a_recipe(tmp_path: Path) -> None:
+    recipe = tomllib.loads((SMOKE / "train-pendulum.toml").read_text())
+    recipe["fit"]["epochs"] = 20
+    (tmp_path / "recipe.toml").write_text(
+        (SMOKE / "train-pendulum.toml").read_text().replace("epochs = 200", "epochs = 20")
+    )
+    ours = residyn.train(recipe, tmp_path / "ours")
+    theirs = residyn.train(tmp_path / "recipe.toml", tmp_path / "theirs")
+    assert {**ours, "checkpoint": None} == {**theirs, "checkpoint": None} and ours["epochs"] == 20
+    tuned = residyn.tune(tmp_path / "ours", tmp_path / "tuned", config={key: recipe[key] for key in recipe if key != "start"})
+    assert tuned["epochs"] == 20
+    with pytest.raises(residyn.ResidynError, match="recipe: unknown field `nonsense`"):
+        residyn.train({**recipe, "nonsense": 1}, tmp_path / "other")
+    with pytest.raises(residyn.ResidynError, match="recipe: missing field"):
+        residyn.train({}, tmp_path / "other")
 
 
 def test_what_is_interrupted_goes_on(tmp_path: Path) -> None:

@@ -96,8 +96,7 @@ impl Cell {
         let drawn = recipe.settle(self, &model, library, &mut rng)?;
         let mut settled = self.drawn(&drawn, &drawn.effects);
         let (_, truth) = settled.record(&model)?;
-        let start = recipe.start(&model, &truth.declared, &mut rng);
-        settled.start = start.map_err(|message| anyhow!(message))?;
+        settled.start = recipe.start(&model, &truth.declared, &mut rng)?;
         Ok(settled)
     }
 

@@ -62,7 +62,7 @@ impl Condition {
     ///
     /// # Errors
     /// Why not.
-    pub fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let sound = self.rate_hz > 0.0
             && self.noise >= 0.0
             && self.quantum >= 0.0

@@ -123,7 +123,7 @@ impl Machine {
     ///
     /// # Errors
     /// An unknown effect, a joint that the rig does not have, or missing or surplus numbers.
-    pub fn with(mechanics: Mechanics, effects: &[Hidden]) -> Result<Self, String> {
+    pub(crate) fn with(mechanics: Mechanics, effects: &[Hidden]) -> Result<Self, String> {
         let mut machine = Self::bare(mechanics);
         for effect in effects {
             machine.add(effect)?;

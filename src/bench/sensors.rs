@@ -29,7 +29,7 @@ impl Flaws {
     ///
     /// # Errors
     /// Why not.
-    pub fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let sizes = [
             self.jitter,
             self.torque_noise,

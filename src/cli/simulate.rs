@@ -113,7 +113,7 @@ fn add_effects(plant: &mut Plant, library: &Library, settings: &[EffectSetting])
     type Group<'s> = (&'s str, Joint, Vec<(String, f64)>);
     let mut groups: Vec<Group<'_>> = Vec::new();
     for setting in settings {
-        let effect = library.effect(&setting.name).map_err(anyhow::Error::msg)?;
+        let effect = library.effect(&setting.name)?;
         let first = || effect.parameters.first().map(|first| first.name.clone());
         let parameter = setting.parameter.clone().or_else(first);
         let parameter = parameter.with_context(|| format!("{} has no parameter", setting.name))?;

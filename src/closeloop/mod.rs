@@ -55,7 +55,7 @@ pub use remainder::{
     Curve, ForceSample, Omnibus, Probed, Proposal, ResidualForce, UNKNOWN, Unexplained, proposal,
     unexplained,
 };
-pub use request::{Reference, Request};
+pub use request::{Logs, Reference, Request};
 pub use run::close_loop;
 pub use score::{Contradicted, Errors, Finding, TestLog, TorqueErrors};
 pub use select::{Rival, Round, Tried};

@@ -17,7 +17,7 @@ pub struct Request<'a> {
     pub model: &'a Model,
     /// The effects that it may lack.
     pub library: &'a Library,
-    pub split: Split,
+    pub logs: Logs,
     /// Models to score as they are on the same test logs.
     pub against: Vec<Reference>,
     pub settings: Settings,
@@ -27,6 +27,15 @@ pub struct Request<'a> {
     pub budget: Option<Duration>,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
+}
+
+/// What a request learns from and is judged by.
+#[derive(Debug, Clone)]
+pub enum Logs {
+    /// Some are set apart for the test as `settings.split` says when the loop is closed.
+    Together(Vec<Log>),
+    /// They are divided already.
+    Divided(Split),
 }
 
 /// A model that is scored as it is, beside those that are fitted.
@@ -41,10 +50,20 @@ pub struct Reference {
 impl<'a> Request<'a> {
     /// A request with the default settings, without a residual network and without reference models.
     pub fn new(model: &'a Model, library: &'a Library, split: Split) -> Self {
+        Self::on(model, library, Logs::Divided(split))
+    }
+
+    /// The same on logs of which some are set apart for the test, by the settings that the request has when the loop is
+    /// closed.
+    pub fn of(model: &'a Model, library: &'a Library, logs: Vec<Log>) -> Self {
+        Self::on(model, library, Logs::Together(logs))
+    }
+
+    fn on(model: &'a Model, library: &'a Library, logs: Logs) -> Self {
         Self {
             model,
             library,
-            split,
+            logs,
             against: Vec::new(),
             settings: Settings::default(),
             space: None,
@@ -53,37 +72,76 @@ impl<'a> Request<'a> {
         }
     }
 
-    /// The same on logs of which some are set apart for the test.
-    pub fn of(model: &'a Model, library: &'a Library, logs: Vec<Log>) -> Self {
-        let split = Split::of(logs, &Settings::default().split);
-        Self::new(model, library, split)
+    /// Divide the logs, as the settings say where the user has not done so.
+    pub(super) fn divided(&mut self) -> Split {
+        match std::mem::replace(&mut self.logs, Logs::Together(Vec::new())) {
+            Logs::Together(logs) => Split::of(logs, &self.settings.split),
+            Logs::Divided(split) => split,
+        }
     }
 
-    /// The same with those of the horizons of which the test logs hold a window, and the others.
+    /// Keep those of the horizons of which the test logs hold a window, and return the others.
     ///
     /// # Errors
     /// Test logs without a window of any of them.
-    pub(super) fn scorable(mut self) -> Result<(Self, Vec<f64>), StudyError> {
+    pub(super) fn score_on(&mut self, test: &[Log]) -> Result<Vec<f64>, StudyError> {
         let horizons_s = self.settings.score.horizons_s.drain(..);
         let (scored_s, unscored_s): (Vec<_>, Vec<_>) =
-            horizons_s.partition(|horizon_s| window_count(&self.split.test, *horizon_s) > 0);
+            horizons_s.partition(|horizon_s| window_count(test, *horizon_s) > 0);
         if scored_s.is_empty() {
             return Err(StudyError::NoTest {
                 shortest_s: unscored_s.into_iter().fold(f64::INFINITY, f64::min),
-                found: self.serious_in_test(),
+                found: self.serious_in(test),
             });
         }
         self.settings.score.horizons_s = scored_s;
-        Ok((self, unscored_s))
+        Ok(unscored_s)
     }
 
     /// The first serious finding about a test log, as the end of a sentence; empty without one.
-    fn serious_in_test(&self) -> String {
-        let audits = audit_together(&self.split.test, &self.model.columns);
+    fn serious_in(&self, test: &[Log]) -> String {
+        let audits = audit_together(test, &self.model.columns);
         let mut found = audits.iter().flat_map(|audit| {
             let told = |finding: &Finding| format!("; {}: {finding}", audit.log);
             audit.serious().map(told).next()
         });
         found.next().unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Channels;
+
+    fn log(number: u32) -> Log {
+        let time: Vec<f64> = (0..100).map(|row| 0.1 * f64::from(row)).collect();
+        let q = vec![time.clone()];
+        let channels = Channels {
+            time,
+            q,
+            ..Channels::default()
+        };
+        channels.log(&format!("run {number}")).unwrap()
+    }
+
+    #[test]
+    fn settings_that_are_changed_later_divide_the_logs() {
+        let library = Library::empty();
+        let model = library.model("pendulum").unwrap();
+        let mut request = Request::of(&model, &library, (1..=4).map(log).collect());
+        request.settings.split.test_share = 0.5;
+        let split = request.divided();
+        assert_eq!((split.train.len(), split.test.len()), (2, 2));
+    }
+
+    #[test]
+    fn logs_that_the_user_divides_stay_divided() {
+        let library = Library::empty();
+        let model = library.model("pendulum").unwrap();
+        let split = Split::given((1..=3).map(log).collect(), vec![log(4)]);
+        let mut request = Request::new(&model, &library, split);
+        request.settings.split.test_share = 0.5;
+        assert_eq!(request.divided().test, [log(4)]);
     }
 }

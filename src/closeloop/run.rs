@@ -29,20 +29,21 @@ use crate::model::{Library, Status};
 /// # Errors
 /// Logs without a usable window, or a declared model that diverges from its starting values.
 pub fn close_loop(
-    request: Request<'_>,
+    mut request: Request<'_>,
     rng: &mut impl Rng,
     progress: &mut Observer<'_>,
 ) -> Result<Outcome, StudyError> {
-    let (request, unscored_s) = request.scorable()?;
+    let split = request.divided();
+    let unscored_s = request.score_on(&split.test)?;
     let Request {
         model,
         library,
-        split,
         against,
         settings,
         space,
         budget,
         learner,
+        ..
     } = request;
     let free = model.free_parameters();
     if free > FITTED_PARAMETERS {

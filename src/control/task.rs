@@ -260,7 +260,7 @@ impl Task {
         if !(1..=LOG_ROWS).contains(&self.steps) {
             return Err(format!("`steps` is from 1 to {LOG_ROWS}"));
         }
-        self.planner.check()?;
+        self.planner.check().map_err(|error| error.to_string())?;
         if !(1..=self.planner.horizon).contains(&self.replan) {
             return Err(format!(
                 "`replan` is {}, but a plan has {} steps; choose from 1 to these",

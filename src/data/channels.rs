@@ -1,13 +1,26 @@
-use std::path::Path;
-
 use super::column::Quantity;
 use super::columns::Columns;
 use super::error::LogError;
 use super::log::Log;
-use super::read::log;
-use super::table::Arrays;
 
 /// The channels of one trajectory in memory, as a program that recorded them itself has them: `[joint][row]`.
+///
+/// ```
+/// use residyn::{Channels, Quantity};
+///
+/// let time: Vec<f64> = (0..200).map(|row| 0.01 * f64::from(row)).collect();
+/// let angle: Vec<f64> = time.iter().map(|t| t.cos()).collect();
+/// let torque = vec![0.0; time.len()];
+/// let channels = Channels {
+///     time,
+///     q: vec![angle],
+///     qd: None, // from the angles
+///     driven: Some((Quantity::Torque, vec![torque])),
+/// };
+/// let log = channels.log("swing")?;
+/// assert_eq!((log.name(), log.joints(), log.rows()), ("swing".to_owned(), 1, 200));
+/// # Ok::<(), residyn::data::LogError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Channels {
     /// s
@@ -25,29 +38,22 @@ impl Channels {
     ///
     /// # Errors
     /// As [`Log::read`].
-    pub fn log(self, name: &Path) -> Result<Log, LogError> {
+    pub fn log(self, name: &str) -> Result<Log, LogError> {
         let joints = self.q.len();
         let driven_by = (self.driven.as_ref()).map_or(Quantity::Torque, |(quantity, _)| *quantity);
-        // What is in memory already needs no limit.
-        let mut table = Arrays::of(u64::MAX);
-        table.add("time", self.time);
         let driven = self.driven.map(|(_, driven)| driven);
         let channels = [
             ("q", Some(self.q)),
             ("qd", self.qd),
             (driven_by.key(), driven),
         ];
-        for (stem, channel) in channels {
-            for (column, number) in channel.into_iter().flatten().zip(1..) {
-                table.add(format!("{stem}{number}"), column);
-            }
-        }
-        log(
-            name,
-            &mut table,
-            joints,
-            &Columns::standard(joints, driven_by),
-        )
+        let named = channels.into_iter().flat_map(|(stem, channel)| {
+            let numbered = (1..).zip(channel.into_iter().flatten());
+            numbered.map(move |(number, column)| (format!("{stem}{number}"), column))
+        });
+        let time = std::iter::once(("time".to_owned(), self.time));
+        let rig = (joints, &Columns::standard(joints, driven_by));
+        Log::from_columns(name, time.chain(named), Some(rig))
     }
 }
 
@@ -66,7 +72,7 @@ mod tests {
 
     #[test]
     fn what_is_not_given_is_as_in_a_file_without_it() {
-        let log = channels().log(Path::new("swing")).unwrap();
+        let log = channels().log("swing").unwrap();
         assert_eq!((log.joints(), log.rows()), (2, 50));
         assert!((log.qd[1][20] - 6.0 * 0.2).abs() < 1e-9);
         assert!(log.tau[0].iter().all(|tau| *tau == 0.0) && log.notes.len() == 2);
@@ -76,7 +82,7 @@ mod tests {
     fn commands_are_commands() {
         let mut channels = channels();
         channels.driven = Some((Quantity::Command, channels.q.clone()));
-        let log = channels.log(Path::new("servo")).unwrap();
+        let log = channels.log("servo").unwrap();
         assert_eq!((log.driven_by, &log.tau), (Quantity::Command, &log.q));
     }
 
@@ -84,7 +90,7 @@ mod tests {
     fn faults_are_placed() {
         let mut short = channels();
         short.q[1].truncate(48);
-        let said = |channels: Channels| channels.log(Path::new("swing")).unwrap_err().to_string();
+        let said = |channels: Channels| channels.log("swing").unwrap_err().to_string();
         assert!(said(short).contains("swing, row 49, column \"q2\": is empty"));
         let mut other = channels();
         other.driven = Some((Quantity::Torque, other.q[..1].to_vec()));

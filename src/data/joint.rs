@@ -6,6 +6,7 @@ use std::str::FromStr;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
+use thiserror::Error as ThisError;
 
 /// One joint of a rig.
 ///
@@ -68,12 +69,17 @@ impl fmt::Display for Joint {
     }
 }
 
-impl FromStr for Joint {
-    type Err = String;
+/// A text that is not the number of a joint.
+#[derive(Debug, Clone, PartialEq, Eq, ThisError)]
+#[error("{0:?} is not a joint's number, which is 1 or more")]
+pub struct JointError(String);
 
-    fn from_str(text: &str) -> Result<Self, String> {
+impl FromStr for Joint {
+    type Err = JointError;
+
+    fn from_str(text: &str) -> Result<Self, JointError> {
         let number = text.parse().ok().and_then(Self::numbered);
-        number.ok_or_else(|| format!("{text:?} is not a joint's number, which is 1 or more"))
+        number.ok_or_else(|| JointError(text.to_owned()))
     }
 }
 

@@ -179,6 +179,16 @@ impl Log {
         Ok(write_with(path, |out| self.write_rows(out))?)
     }
 
+    /// The columns with the names and in the order of a file that is written: `time`, `q1`, ..., `qd1`, ..., `tau1` or
+    /// `cmd1`, ...
+    pub fn named_columns(&self) -> impl Iterator<Item = (String, &[f64])> {
+        let standard = Columns::standard(self.joints(), self.driven_by);
+        let names: Vec<String> = (standard.in_file_order())
+            .map(|column| column.name.clone())
+            .collect();
+        names.into_iter().zip(self.columns().map(Vec::as_slice))
+    }
+
     /// The columns in file order.
     fn columns(&self) -> impl Iterator<Item = &Vec<f64>> {
         std::iter::once(&self.time)
@@ -188,14 +198,13 @@ impl Log {
     }
 
     fn check_readings(&self, path: &Path) -> Result<(), LogError> {
-        let names = Columns::standard(self.joints(), self.driven_by);
-        for (column, values) in names.in_file_order().zip(self.columns()) {
+        for (column, values) in self.named_columns() {
             if let Some(row) = values.iter().position(|value| !is_reading(*value)) {
                 return Err(LogError::Cell {
                     path: path.to_owned(),
                     // The header is line 1.
                     place: Place::Line(row + 2),
-                    column: column.name.clone(),
+                    column,
                     fault: CellFault::of_number(values[row]),
                 });
             }
@@ -204,8 +213,7 @@ impl Log {
     }
 
     fn write_rows(&self, out: &mut dyn Write) -> io::Result<()> {
-        let names = Columns::standard(self.joints(), self.driven_by);
-        let header: Vec<&str> = names.in_file_order().map(|column| &*column.name).collect();
+        let header: Vec<String> = self.named_columns().map(|(name, _)| name).collect();
         writeln!(out, "{}", header.join(","))?;
         for row in 0..self.rows() {
             // `{:?}` of a float is its shortest text that reads back the same, with an exponent

@@ -3,14 +3,14 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use super::column::unwrap;
+use super::column::{Quantity, unwrap};
 use super::columns::{Cell, Columns, Header, Layout, joints};
 use super::error::{CellFault, LogError};
 use super::late;
 use super::local_cubic::slopes;
 use super::log::Log;
 use super::statistics::median;
-use super::table::{Table, open, too_large};
+use super::table::{Arrays, Table, open, too_large};
 use crate::expr::listed;
 use crate::limits::{LOG_JOINTS, LOG_TIME, is_reading, log_steps};
 
@@ -37,18 +37,56 @@ impl Log {
     pub fn read_standard(path: impl AsRef<Path>) -> Result<Log, LogError> {
         let path = path.as_ref();
         let mut table = open(path, &Columns::default())?;
-        let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
-        let numbered = (1..).take_while(has).count();
-        check_joints(path, numbered.max(joints(table.names()).len()))?;
-        let named = joints(table.names()).into_iter();
-        let columns = Columns {
-            joint_names: named.map(str::to_owned).collect(),
-            ..Columns::default()
-        };
-        // A header of no joint lacks the first.
-        let count = numbered.max(columns.joint_names.len()).max(1);
-        log(path, table.as_mut(), count, &columns)
+        standard(path, table.as_mut(), Quantity::Torque)
     }
+
+    /// The log that a file with these columns, in memory, is: with `rig` as [`Log::read`] by its columns and number of
+    /// joints, else as [`Log::read_standard`], where columns `cmd1`, ... without torques are commands. `name` is for messages
+    /// and for the report.
+    ///
+    /// # Errors
+    /// As [`Log::read`].
+    pub fn from_columns(
+        name: &str,
+        columns: impl IntoIterator<Item = (String, Vec<f64>)>,
+        rig: Option<(usize, &Columns)>,
+    ) -> Result<Log, LogError> {
+        let path = Path::new(name);
+        // What is in memory already needs no limit.
+        let mut table = Arrays::of(u64::MAX);
+        for (name, column) in columns {
+            table.add(name, column);
+        }
+        match rig {
+            Some((joints, columns)) => {
+                log(path, &mut table, joints, &columns.completed(joints, path)?)
+            }
+            None => {
+                let has = |name: &str| table.names().iter().any(|known| known == name);
+                let driven_by = match has("cmd1") && !has("tau1") {
+                    true => Quantity::Command,
+                    false => Quantity::Torque,
+                };
+                standard(path, &mut table, driven_by)
+            }
+        }
+    }
+}
+
+/// The log of a table with the standard columns.
+fn standard(path: &Path, table: &mut dyn Table, driven_by: Quantity) -> Result<Log, LogError> {
+    let has = |joint: &usize| table.names().contains(&format!("q{joint}"));
+    let numbered = (1..).take_while(has).count();
+    check_joints(path, numbered.max(joints(table.names()).len()))?;
+    let named = joints(table.names()).into_iter();
+    let columns = Columns {
+        joint_names: named.map(str::to_owned).collect(),
+        driven_by,
+        ..Columns::default()
+    };
+    // A header of no joint lacks the first.
+    let count = numbered.max(columns.joint_names.len()).max(1);
+    log(path, table, count, &columns)
 }
 
 /// Refuses more joints than are looked at without a model that chooses among them.

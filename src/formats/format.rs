@@ -63,7 +63,8 @@ impl RobotReader {
         let mut chain = (self.read)(file, tip)?;
         if let Some(name) = drive {
             let found = ReadyDrive::find(Library::drives(), name);
-            chain.drive = Some(found.map_err(|message| FileError::new(file, None, message))?);
+            let found = found.map_err(|unknown| FileError::new(file, None, unknown.to_string()));
+            chain.drive = Some(found?);
         }
         let name = Path::new(&chain.name);
         let model = Model::from_text(name, &model_text(&chain), Library::built_in().effects())?;

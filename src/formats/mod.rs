@@ -26,6 +26,8 @@ pub use json::{ImportError, Imported};
 pub use robot::write_back::{Change, WrittenBack, write_back};
 pub use verify::{Client, ClientError, Difference, Predictions, PythonClient, Samples, rollout_s};
 
+use thiserror::Error;
+
 use crate::expr::suggestion;
 
 /// Every format.
@@ -42,19 +44,27 @@ pub const FORMATS: &[&Format] = &[
     &urdf::FORMAT,
 ];
 
+/// No format has this name.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("unknown format `{name}`{near}; there are {}", names().join(", "))]
+pub struct UnknownFormat {
+    name: String,
+    /// A similar known name, as the end of a sentence; empty without one.
+    near: String,
+}
+
+fn names() -> Vec<&'static str> {
+    FORMATS.iter().map(|format| format.name).collect()
+}
+
 /// The format of this name.
 ///
 /// # Errors
 /// Unknown name, with the nearest known one.
-pub fn find(name: &str) -> Result<&'static Format, String> {
-    let known = || FORMATS.iter().map(|format| format.name);
+pub fn find(name: &str) -> Result<&'static Format, UnknownFormat> {
     let format = FORMATS.iter().find(|format| format.name == name);
-    format.copied().ok_or_else(|| {
-        let near = suggestion(name, known());
-        let all: Vec<&str> = known().collect();
-        format!(
-            "unknown format `{name}`{near}; there are {}",
-            all.join(", ")
-        )
+    format.copied().ok_or_else(|| UnknownFormat {
+        name: name.to_owned(),
+        near: suggestion(name, names()),
     })
 }

@@ -1,3 +1,4 @@
+use super::error::ModelError;
 use super::filter::CommandFilter;
 use crate::expr::{Formula, Graph, Node, Program, Scope, SignForm, suggestion};
 
@@ -190,11 +191,11 @@ impl Effect {
     ///
     /// # Errors
     /// Unknown name, with a similar known one.
-    pub(super) fn find<'e>(effects: &'e [Self], name: &str) -> Result<&'e Self, String> {
+    pub(super) fn find<'e>(effects: &'e [Self], name: &str) -> Result<&'e Self, ModelError> {
         let found = effects.iter().find(|effect| effect.name == name);
-        found.ok_or_else(|| {
-            let near = suggestion(name, effects.iter().map(|effect| effect.name.as_str()));
-            format!("unknown effect `{name}`{near}; `residyn list effects` shows all")
+        found.ok_or_else(|| ModelError::UnknownEffect {
+            name: name.to_owned(),
+            near: suggestion(name, effects.iter().map(|effect| effect.name.as_str())),
         })
     }
 

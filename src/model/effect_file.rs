@@ -1,6 +1,7 @@
 //! The file of an effect.
 
 use std::path::Path;
+use std::str::FromStr;
 
 use super::effect::{
     COUPLING_NAMES, EFFECT_NAMES, Effect, EffectParameter, Entry, Measure, PLACE, RATIO,
@@ -101,6 +102,15 @@ impl Effect {
             shown_by: section.text_or_empty("shown_by")?,
             first_joint_only: section.choice("joints", r#""all" or "first""#, &ALL_OR_FIRST)?,
         })
+    }
+}
+
+/// The effect in the text of a file. Messages call the text `effect`; [`Effect::from_text`] names the file.
+impl FromStr for Effect {
+    type Err = FileError;
+
+    fn from_str(text: &str) -> Result<Self, FileError> {
+        Self::from_text("effect".as_ref(), text)
     }
 }
 

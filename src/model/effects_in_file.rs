@@ -26,7 +26,7 @@ fn fitted(
 ) -> Result<FittedEffect, FileError> {
     let name = section.required_text("name")?.value;
     let effect = Effect::find(library, &name);
-    let effect = effect.map_err(|message| section.error_at("name", message))?;
+    let effect = effect.map_err(|unknown| section.error_at("name", unknown.to_string()))?;
     let (key, joint) = match effect.is_coupling() {
         true => ("joints", pair(section, joints)?),
         false => ("joint", one(section, joints)?),

@@ -80,7 +80,7 @@ impl Model {
         for (k, section) in top.sections("effect")?.iter().enumerate() {
             let (present, rest) = system.effects.split_at(k);
             let check = system.check_effect(&rest[0], present);
-            check.map_err(|message| section.error(message))?;
+            check.map_err(|refused| section.error(refused.to_string()))?;
         }
         Ok(system)
     }

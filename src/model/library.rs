@@ -1,19 +1,47 @@
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, LazyLock};
 
 use include_dir::{Dir, include_dir};
 
 use super::effect::Effect;
+use super::error::ModelError;
 use super::reader::FileError;
 use super::ready_drive::ReadyDrive;
 use super::system::Model;
 
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/models");
 
-/// The effects and systems known by name: the embedded ones and a user's own.
+/// Read once: every command and every call of a library asks for it.
+static EMBEDDED: LazyLock<Library> = LazyLock::new(|| Library {
+    effects: embedded("effects", Effect::from_text).into(),
+    probes: embedded("probes", Effect::from_text).into(),
+});
+
+/// The effects and systems known by name: the embedded ones and a user's own. A clone shares them.
+///
+/// ```
+/// use residyn::{Effect, Library};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let eddy_brake: Effect = r#"
+///     [effect]
+///     name = "eddy_brake"
+///     about = "brake that loses its grip at speed"
+///     force = "-b*qd/(1 + (qd/v_0)^2)"
+///     [parameters]
+///     b = { unit = "N m s/rad", about = "torque per speed at low speed", typical = 0.1, positive = true }
+///     v_0 = { unit = "rad/s", about = "speed of the largest torque", typical = 5.0, positive = true }
+/// "#
+/// .parse()?;
+/// let library = Library::built_in().with_effect(eddy_brake);
+/// assert_eq!(library.effect("eddy_brake")?.parameters.len(), 2);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone)]
 pub struct Library {
-    effects: Vec<Effect>,
-    probes: Vec<Effect>,
+    effects: Arc<[Effect]>,
+    probes: Arc<[Effect]>,
 }
 
 impl Library {
@@ -22,17 +50,14 @@ impl Library {
     /// # Panics
     /// Never: a test reads every embedded file.
     pub fn built_in() -> Self {
-        Self {
-            effects: embedded("effects", Effect::from_text),
-            probes: embedded("probes", Effect::from_text),
-        }
+        EMBEDDED.clone()
     }
 
     /// A library without effects and probes, in which nothing can be found.
     pub fn empty() -> Self {
         Self {
-            effects: Vec::new(),
-            probes: Vec::new(),
+            effects: Arc::default(),
+            probes: Arc::default(),
         }
     }
 
@@ -42,12 +67,23 @@ impl Library {
     /// Unreadable folder, or the first error in a file.
     pub fn with_folder(mut self, folder: &Path) -> Result<Self, FileError> {
         for path in effect_files(folder)? {
-            let effect = Effect::read(&path)?;
-            self.effects.retain(|known| known.name != effect.name);
-            self.effects.push(effect);
+            self = self.with_effect(Effect::read(&path)?);
         }
-        self.effects.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(self)
+    }
+
+    /// Add an effect; it replaces the known one of its name.
+    #[must_use]
+    pub fn with_effect(mut self, effect: Effect) -> Self {
+        let known = self.effects.iter();
+        let mut effects: Vec<Effect> = known
+            .filter(|known| known.name != effect.name)
+            .cloned()
+            .collect();
+        let place = effects.partition_point(|known| known.name < effect.name);
+        effects.insert(place, effect);
+        self.effects = effects.into();
+        self
     }
 
     /// All effects, by name.
@@ -65,7 +101,7 @@ impl Library {
     ///
     /// # Errors
     /// Unknown name, with the nearest known one.
-    pub fn effect(&self, name: &str) -> Result<&Effect, String> {
+    pub fn effect(&self, name: &str) -> Result<&Effect, ModelError> {
         Effect::find(&self.effects, name)
     }
 
@@ -91,6 +127,14 @@ impl Library {
     /// The text of an embedded system.
     pub fn system_text(name: &str) -> Option<&'static str> {
         BUILT_IN.get_file(format!("{name}.toml"))?.contents_utf8()
+    }
+
+    /// The system in the text of a model file; `name` is for messages.
+    ///
+    /// # Errors
+    /// As [`Model::from_text`].
+    pub fn model_from_text(&self, name: &str, text: &str) -> Result<Model, FileError> {
+        Model::from_text(name.as_ref(), text, &self.effects)
     }
 
     /// A system from a file or, where there is no such file, an embedded one of that name.
@@ -164,6 +208,34 @@ fn is_toml(path: &Path) -> bool {
 mod tests {
     use super::Library;
     use std::path::Path;
+
+    const WEAK: &str = r#"
+        [effect]
+        name = "NAME"
+        about = "a weak spring"
+        force = "-k*q"
+        [parameters]
+        k = { unit = "N m/rad", about = "stiffness", typical = 0.01 }
+    "#;
+
+    #[test]
+    fn an_effect_from_text_joins_the_library_or_replaces_its_namesake() {
+        let known = Library::built_in();
+        let new = |name: &str| WEAK.replace("NAME", name).parse().unwrap();
+        let more = known.clone().with_effect(new("weak_spring"));
+        assert_eq!(more.effects().len(), known.effects().len() + 1);
+        assert!(more.effects().is_sorted_by_key(|effect| &effect.name));
+        assert!(known.effect("weak_spring").is_err());
+        let other = known.clone().with_effect(new("joint_spring"));
+        assert_eq!(other.effects().len(), known.effects().len());
+        assert_eq!(other.effect("joint_spring").unwrap().about, "a weak spring");
+    }
+
+    #[test]
+    fn the_embedded_effects_are_read_once() {
+        let [first, second] = [Library::built_in(), Library::built_in()];
+        assert!(std::ptr::eq(first.effects(), second.effects()));
+    }
 
     #[test]
     fn every_embedded_file_is_valid() {

@@ -11,6 +11,7 @@ mod dynamics;
 mod effect;
 mod effect_file;
 mod effects_in_file;
+mod error;
 mod fade;
 mod file;
 mod filter;
@@ -30,6 +31,7 @@ mod written;
 
 pub use dynamics::{Dynamics, OwnValue, Parameter};
 pub use effect::{EFFECT_NAMES, Effect, EffectParameter, Entry, Measure};
+pub use error::ModelError;
 pub use filter::{CommandFilter, Filter};
 pub use fitted::{FittedEffect, Status};
 pub use library::{Library, effect_files};

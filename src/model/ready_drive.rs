@@ -4,6 +4,7 @@ use std::path::Path;
 
 use toml_edit::{DocumentMut, InlineTable, Item, Table};
 
+use super::error::ModelError;
 use super::fitted::unit_on;
 use super::reader::{Document, FileError, Section};
 use super::sections;
@@ -55,12 +56,15 @@ impl ReadyDrive {
     ///
     /// # Errors
     /// Unknown name, with a similar known one.
-    pub fn find(drives: Vec<Self>, name: &str) -> Result<Self, String> {
+    pub fn find(drives: Vec<Self>, name: &str) -> Result<Self, ModelError> {
         let near = suggestion(name, drives.iter().map(|drive| drive.name.as_str()));
         let mut drives = drives.into_iter();
         drives
             .find(|drive| drive.name == name)
-            .ok_or_else(|| format!("unknown drive `{name}`{near}; `residyn list drives` shows all"))
+            .ok_or_else(|| ModelError::UnknownDrive {
+                name: name.to_owned(),
+                near,
+            })
     }
 
     /// The torque in terms of the command, as the file has it.

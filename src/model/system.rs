@@ -7,6 +7,7 @@ use super::chain::{Body, Recovered};
 use super::drive::Drive;
 use super::dynamics::{Dynamics, OwnValue, Parameter};
 use super::effect::{Effect, Entry, Measure};
+use super::error::ModelError;
 use super::fitted::FittedEffect;
 use super::reader::Located;
 use crate::data::{Columns, Joint, Log, LogError};
@@ -81,6 +82,18 @@ impl Model {
     /// A file that cannot be read, or that lacks a column or a number.
     pub fn read_log(&self, path: impl AsRef<Path>) -> Result<Log, LogError> {
         Log::read(path, self.joints, &self.columns)
+    }
+
+    /// The log that a file with these columns, in memory, is; `name` is for messages and for the report.
+    ///
+    /// # Errors
+    /// As [`Model::read_log`].
+    pub fn log_from_columns(
+        &self,
+        name: &str,
+        columns: impl IntoIterator<Item = (String, Vec<f64>)>,
+    ) -> Result<Log, LogError> {
+        Log::from_columns(name, columns, Some((self.joints, &self.columns)))
     }
 
     /// Read several logs.
@@ -257,24 +270,24 @@ impl Model {
     ///
     /// # Errors
     /// Why not.
-    pub fn can_carry(&self, effect: &Effect, joint: Joint) -> Result<(), String> {
-        let name = &effect.name;
+    pub fn can_carry(&self, effect: &Effect, joint: Joint) -> Result<(), ModelError> {
+        let name = || effect.name.clone();
         if effect.first_joint_only && (joint.index() > 0 || self.prismatic[joint]) {
-            return Err(format!(
-                "`{name}` acts on the first joint, where that turns"
-            ));
+            return Err(ModelError::FirstJointOnly { effect: name() });
         }
         match effect.entry {
-            Entry::Payload(_) if !self.carries_at(joint) => Err(format!(
-                "`{name}` acts on the last joint of a chain of bodies"
-            )),
-            Entry::Coupling(_) if !self.couples(joint) => Err(format!(
-                "`{name}` acts on two joints in a row that both turn or both slide"
-            )),
-            Entry::Inertia(_) | Entry::Coupling(_) if !self.has_mass_matrix() => Err(format!(
-                "`{name}` needs a model that gives `mass` and `bias`; {} gives accelerations",
-                self.name
-            )),
+            Entry::Payload(_) if !self.carries_at(joint) => {
+                Err(ModelError::LastJointOnly { effect: name() })
+            }
+            Entry::Coupling(_) if !self.couples(joint) => {
+                Err(ModelError::NeighboursOfOneKind { effect: name() })
+            }
+            Entry::Inertia(_) | Entry::Coupling(_) if !self.has_mass_matrix() => {
+                Err(ModelError::NeedsMass {
+                    effect: name(),
+                    model: self.name.clone(),
+                })
+            }
             _ => Ok(()),
         }
     }
@@ -294,15 +307,18 @@ impl Model {
     ///
     /// # Errors
     /// Why not: see [`Model::can_carry`], a value outside of its bounds, or the same effect twice.
-    pub fn check_effect(&self, new: &FittedEffect, present: &[FittedEffect]) -> Result<(), String> {
-        let name = &new.effect.name;
+    pub fn check_effect(
+        &self,
+        new: &FittedEffect,
+        present: &[FittedEffect],
+    ) -> Result<(), ModelError> {
         self.can_carry(&new.effect, new.joint)?;
         let mut others = present.iter();
         if let Some(old) = others.find(|old| old.excludes(new)) {
-            return Err(format!(
-                "`{}` acts on joint {} already",
-                old.effect.name, new.joint
-            ));
+            return Err(ModelError::Twice {
+                effect: old.effect.name.clone(),
+                joint: new.joint,
+            });
         }
         let common = (0..).zip(new.values.iter().map(|(value, _)| value));
         let own = new.own.iter().map(|own| (own.parameter, &own.value));
@@ -311,10 +327,13 @@ impl Model {
             let [low, high] = parameter.bounds;
             // Bounds that are multiples of what logs show cannot be checked before there are logs.
             if parameter.measure == Measure::One && !(low..=high).contains(value) {
-                return Err(format!(
-                    "`{name}`: {} = {value} lies outside of {low} to {high}",
-                    parameter.name
-                ));
+                return Err(ModelError::OutOfBounds {
+                    effect: new.effect.name.clone(),
+                    parameter: parameter.name.clone(),
+                    value: *value,
+                    low,
+                    high,
+                });
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::limits::check_elite;
+use super::limits::{SettingsError, check_elite};
 use super::method::Search;
 use super::population::Population;
 use super::proposal::Proposal;
@@ -15,7 +15,7 @@ pub struct Cem {
 }
 
 impl Search for Cem {
-    fn check(&self, population: usize) -> Result<(), String> {
+    fn check(&self, population: usize) -> Result<(), SettingsError> {
         check_elite(self.elite, population)
     }
 

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::limits::{check_elite, within};
+use super::limits::{SettingsError, check_elite, within};
 use super::method::Search;
 use super::noise::Noise;
 use super::population::Population;
@@ -54,7 +54,7 @@ impl Icem {
 }
 
 impl Search for Icem {
-    fn check(&self, population: usize) -> Result<(), String> {
+    fn check(&self, population: usize) -> Result<(), SettingsError> {
         check_elite(self.elite, population)?;
         let exponent = self.noise_exponent;
         within("noise_exponent", exponent, 0.0..=10.0, "from 0 to 10")?;

@@ -3,14 +3,27 @@
 use std::fmt::Display;
 use std::ops::RangeBounds;
 
+use thiserror::Error;
+
+/// A setting of a planner with which no search can run.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("`{key}` is {value}; it must be {remedy}")]
+pub struct SettingsError {
+    /// As files call it.
+    pub key: &'static str,
+    pub value: String,
+    /// What it may be.
+    pub remedy: String,
+}
+
 /// Refuse an elite that is none of the population.
-pub(super) fn check_elite(elite: usize, population: usize) -> Result<(), String> {
+pub(super) fn check_elite(elite: usize, population: usize) -> Result<(), SettingsError> {
     let remedy = format!("a whole number from 1 to {population}, the population");
     within("elite", elite, 1..=population, &remedy)
 }
 
 /// Refuse a count that is zero or above `most`.
-pub(super) fn whole(key: &str, value: usize, most: usize) -> Result<(), String> {
+pub(super) fn whole(key: &'static str, value: usize, most: usize) -> Result<(), SettingsError> {
     within(
         key,
         value,
@@ -21,13 +34,17 @@ pub(super) fn whole(key: &str, value: usize, most: usize) -> Result<(), String> 
 
 /// Refuse the value of `key` outside of `range`, which `remedy` puts into words.
 pub(super) fn within<T: PartialOrd + Display>(
-    key: &str,
+    key: &'static str,
     value: T,
     range: impl RangeBounds<T>,
     remedy: &str,
-) -> Result<(), String> {
+) -> Result<(), SettingsError> {
     if range.contains(&value) {
         return Ok(());
     }
-    Err(format!("`{key}` is {value}; it must be {remedy}"))
+    Err(SettingsError {
+        key,
+        value: value.to_string(),
+        remedy: remedy.to_owned(),
+    })
 }

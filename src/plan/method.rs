@@ -1,3 +1,4 @@
+use super::limits::SettingsError;
 use super::noise::Noise;
 use super::population::Population;
 use super::proposal::Proposal;
@@ -8,7 +9,7 @@ pub trait Search {
     ///
     /// # Errors
     /// One sentence that names the key, its value and what it may be.
-    fn check(&self, population: usize) -> Result<(), String>;
+    fn check(&self, population: usize) -> Result<(), SettingsError>;
 
     /// Standard deviation of the candidates in the first iteration, as a share of half an input's range.
     fn deviation(&self) -> f64 {

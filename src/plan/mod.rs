@@ -20,6 +20,7 @@ mod tests;
 
 pub use cem::Cem;
 pub use icem::Icem;
+pub use limits::SettingsError;
 pub use model::{Prepared, Start};
 pub use mppi::Mppi;
 pub use objective::Objective;

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::limits::within;
+use super::limits::{SettingsError, within};
 use super::method::Search;
 use super::population::Population;
 use super::proposal::Proposal;
@@ -30,7 +30,7 @@ impl Default for Mppi {
 }
 
 impl Search for Mppi {
-    fn check(&self, _: usize) -> Result<(), String> {
+    fn check(&self, _: usize) -> Result<(), SettingsError> {
         let above_zero = "above 0 and at most 10";
         for (key, value) in [
             ("temperature", self.temperature),

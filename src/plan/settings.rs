@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::limits::whole;
+use super::limits::{SettingsError, whole};
 use super::method::Search;
 use super::{Cem, Icem, Mppi};
 use crate::limits::{CANDIDATES, HORIZON, ITERATIONS};
@@ -39,7 +39,7 @@ impl Settings {
     ///
     /// # Errors
     /// One sentence that names the key, its value and what it may be.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), SettingsError> {
         whole("population", self.population, CANDIDATES)?;
         whole("iterations", self.iterations, ITERATIONS)?;
         whole("horizon", self.horizon, HORIZON)?;

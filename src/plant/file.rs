@@ -10,7 +10,7 @@ use crate::data::Joint;
 use crate::expr::suggestion;
 use crate::files::{beside_or_named, from_toml, text_or_embedded};
 use crate::limits::{LOG_ROWS, RUNS, SIMULATED_S, TONES, check_readings};
-use crate::model::{FileError, FittedEffect, Library, Model};
+use crate::model::{FileError, FittedEffect, Library, Model, ModelError};
 
 /// Why a plant cannot be simulated.
 #[derive(Debug, Error)]
@@ -19,8 +19,29 @@ pub enum PlantError {
     Model(#[from] FileError),
     #[error("{path}: {message}", path = .path.display())]
     File { path: PathBuf, message: String },
-    #[error("{0}")]
-    Effect(String),
+    #[error(transparent)]
+    Effect(#[from] ModelError),
+    #[error("effect `{effect}`: `joint` is from 1 to {joints}, found {found}")]
+    Joint {
+        effect: String,
+        joints: usize,
+        found: Joint,
+    },
+    #[error("unknown parameter `{name}` of {system}{near}")]
+    Parameter {
+        system: String,
+        name: String,
+        /// A similar known name, as the end of a sentence; empty without one.
+        near: String,
+    },
+    #[error("effect `{effect}` has no parameter `{name}`{near}; it has {known}")]
+    EffectParameter {
+        effect: String,
+        name: String,
+        /// A similar known name, as the end of a sentence; empty without one.
+        near: String,
+        known: String,
+    },
     #[error("{0}")]
     Sampling(String),
     #[error(
@@ -156,7 +177,8 @@ impl Plant {
         let file: File = from_toml(text).map_err(|error| wrong(error.to_string()))?;
         let model = beside_or_named(path, &file.model);
         let mut plant = Self::of_system(library.model(&model)?);
-        plant.set_parameters(&file.parameters).map_err(wrong)?;
+        let parameters = plant.set_parameters(&file.parameters);
+        parameters.map_err(|error| wrong(error.to_string()))?;
         plant.hide(library, &file.effect)?;
         plant.sensor = file.sensor;
         plant.excitation = file.excitation;
@@ -247,13 +269,16 @@ impl Plant {
     ///
     /// # Errors
     /// Unknown parameter, with a similar known one.
-    pub fn set_parameters(&mut self, values: &BTreeMap<String, f64>) -> Result<(), String> {
+    pub fn set_parameters(&mut self, values: &BTreeMap<String, f64>) -> Result<(), PlantError> {
         let known = &self.system.parameters;
         for (name, value) in values {
             let Some(k) = known.iter().position(|p| p.name == *name) else {
                 let near = suggestion(name, known.iter().map(|p| p.name.as_str()));
-                let system = &self.system.name;
-                return Err(format!("unknown parameter `{name}` of {system}{near}"));
+                return Err(PlantError::Parameter {
+                    system: self.system.name.clone(),
+                    name: name.clone(),
+                    near,
+                });
             };
             self.parameters[k] = *value;
         }
@@ -283,13 +308,13 @@ impl Plant {
         joint: Joint,
         values: &[(String, f64)],
     ) -> Result<(), PlantError> {
-        let effect = library.effect(name).map_err(PlantError::Effect)?;
+        let effect = library.effect(name)?;
         if !joint.is_of(self.system.joints) {
-            let message = format!(
-                "effect `{name}`: `joint` is from 1 to {}, found {joint}",
-                self.system.joints
-            );
-            return Err(PlantError::Effect(message));
+            return Err(PlantError::Joint {
+                effect: name.to_owned(),
+                joints: self.system.joints,
+                found: joint,
+            });
         }
         let mut own: Vec<(f64, Option<[f64; 2]>)> = effect
             .parameters
@@ -300,10 +325,12 @@ impl Plant {
             let Some(k) = effect.parameters.iter().position(|p| p.name == *key) else {
                 let near = suggestion(key, effect.parameters.iter().map(|p| p.name.as_str()));
                 let known: Vec<&str> = effect.parameters.iter().map(|p| p.name.as_str()).collect();
-                let known = known.join(", ");
-                let message =
-                    format!("effect `{name}` has no parameter `{key}`{near}; it has {known}");
-                return Err(PlantError::Effect(message));
+                return Err(PlantError::EffectParameter {
+                    effect: name.to_owned(),
+                    name: key.clone(),
+                    near,
+                    known: known.join(", "),
+                });
             };
             own[k].0 = *value;
         }
@@ -315,9 +342,7 @@ impl Plant {
             fixed: false,
             status: None,
         };
-        self.system
-            .check_effect(&new, &self.effects)
-            .map_err(PlantError::Effect)?;
+        self.system.check_effect(&new, &self.effects)?;
         self.effects.push(new);
         Ok(())
     }

@@ -19,5 +19,5 @@ pub use identity::Identity;
 pub use lines::Lines;
 pub use merge::{Lacking, MergeError, merge};
 pub use part::Part;
-pub use shard::Shard;
+pub use shard::{Shard, ShardError};
 pub use streams::{Purpose, stream};

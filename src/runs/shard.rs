@@ -2,6 +2,7 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A share of a run's pieces of work, so that several machines do a run together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,21 +30,28 @@ impl Shard {
     }
 }
 
+/// What is no shard of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ShardError {
+    #[error("give two whole numbers as K/N, 3/8 say")]
+    Form,
+    #[error("K is {number} and N is {of}; shards are counted from 1/N to N/N")]
+    Number { number: usize, of: usize },
+}
+
 impl FromStr for Shard {
-    type Err = String;
+    type Err = ShardError;
 
     /// From K/N.
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, ShardError> {
         let numbers = text
             .split_once('/')
             .and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
-        let (number, of) = numbers.ok_or("give two whole numbers as K/N, 3/8 say")?;
+        let (number, of) = numbers.ok_or(ShardError::Form)?;
         if (1..=of).contains(&number) {
             Ok(Self { number, of })
         } else {
-            Err(format!(
-                "K is {number} and N is {of}; shards are counted from 1/N to N/N"
-            ))
+            Err(ShardError::Number { number, of })
         }
     }
 }
@@ -81,7 +89,7 @@ mod tests {
             ("-1/8", "as K/N"),
             ("1/8/2", "as K/N"),
         ] {
-            let message = text.parse::<Shard>().unwrap_err();
+            let message = text.parse::<Shard>().unwrap_err().to_string();
             assert!(message.contains(part), "{text}: {message}");
         }
     }

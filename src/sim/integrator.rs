@@ -3,6 +3,7 @@ use std::num::NonZeroU32;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use super::scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme};
 use crate::limits::SUBSTEPS;
@@ -16,6 +17,24 @@ use crate::limits::SUBSTEPS;
 pub struct Integrator {
     scheme: &'static Scheme,
     substeps: NonZeroU32,
+}
+
+/// What is no integrator.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum IntegratorError {
+    /// No scheme has this name.
+    #[error(
+        "unknown integrator {name:?}; there are {}, and fine:N for N substeps of rk4",
+        names()
+    )]
+    Unknown { name: String },
+    /// More substeps than are taken.
+    #[error("a step is integrated in at most {SUBSTEPS} substeps, found {found}")]
+    TooManySubsteps { found: NonZeroU32 },
+}
+
+fn names() -> String {
+    SCHEMES.map(|scheme| scheme.name).join(", ")
 }
 
 impl Integrator {
@@ -56,21 +75,17 @@ impl Integrator {
     }
 
     /// Substeps that a user gives.
-    fn checked(substeps: NonZeroU32) -> Result<Self, String> {
+    fn checked(substeps: NonZeroU32) -> Result<Self, IntegratorError> {
         match substeps.get() <= SUBSTEPS {
             true => Ok(Self::fine(substeps)),
-            false => Err(format!(
-                "a step is integrated in at most {SUBSTEPS} substeps, found {substeps}"
-            )),
+            false => Err(IntegratorError::TooManySubsteps { found: substeps }),
         }
     }
 
-    fn named(name: &str) -> Result<Self, String> {
-        Scheme::named(name).map(Self::of).ok_or_else(|| {
-            let names = SCHEMES.map(|scheme| scheme.name).join(", ");
-            format!(
-                "unknown integrator {name:?}; there are {names}, and fine:N for N substeps of rk4"
-            )
+    fn named(name: &str) -> Result<Self, IntegratorError> {
+        let scheme = Scheme::named(name).map(Self::of);
+        scheme.ok_or_else(|| IntegratorError::Unknown {
+            name: name.to_owned(),
         })
     }
 }
@@ -83,9 +98,9 @@ impl Default for Integrator {
 
 /// As on a command line: a scheme's name, or `fine:N`.
 impl FromStr for Integrator {
-    type Err = String;
+    type Err = IntegratorError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, IntegratorError> {
         let substeps = text.strip_prefix("fine:").and_then(|n| n.parse().ok());
         substeps.map_or_else(|| Self::named(text), Self::checked)
     }
@@ -124,9 +139,9 @@ struct Steps {
 }
 
 impl TryFrom<Form> for Integrator {
-    type Error = String;
+    type Error = IntegratorError;
 
-    fn try_from(form: Form) -> Result<Self, String> {
+    fn try_from(form: Form) -> Result<Self, IntegratorError> {
         match form {
             Form::Name(name) => Self::named(&name),
             Form::Substeps(Fine { fine }) => Self::checked(fine.steps),

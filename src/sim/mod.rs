@@ -15,7 +15,7 @@ mod window;
 
 pub use command::{Commands, Delivered, StepTorque};
 pub use environment::Environment;
-pub use integrator::Integrator;
+pub use integrator::{Integrator, IntegratorError};
 pub use point::Point;
 pub use scheme::{RK4, SCHEMES, SEMI_IMPLICIT_EULER, Scheme, Stage};
 pub use sensors::{Sensors, as_modelled, with_own_angles};

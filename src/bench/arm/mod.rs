@@ -65,7 +65,7 @@ impl Arm {
     ///
     /// # Errors
     /// A model that is no chain of bodies.
-    pub fn hidden(&self, model: &Model, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
+    pub(crate) fn hidden(&self, model: &Model, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
         let bodies = Bodies::of(model).ok_or("its model is no chain of bodies")?;
         let motion = Motion::draw(&self.amplitude, rng);
         Ok(self.draw(&bodies, &motion, rng))
@@ -75,7 +75,7 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::hidden`], and effects that an arm cannot have.
-    pub fn record(
+    pub(crate) fn record(
         &self,
         model: &Model,
         effects: &[Hidden],

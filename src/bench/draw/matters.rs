@@ -30,13 +30,12 @@ impl Recipe {
         rng: &mut impl Rng,
     ) -> Result<Drawn> {
         for _ in 0..RIGS {
-            let mut drawn = self.draw(rng).map_err(|message| anyhow!(message))?;
+            let mut drawn = self.draw(rng)?;
             for _ in 0..EFFECTS {
                 let Some(place) = self.idle(cell, &drawn, model, library)? else {
                     return Ok(drawn);
                 };
-                let again = self.draw_effect(&mut drawn, place, rng);
-                again.map_err(|message| anyhow!(message))?;
+                self.draw_effect(&mut drawn, place, rng)?;
             }
         }
         Err(anyhow!(

@@ -1,10 +1,12 @@
 //! Rigs drawn by chance, by rules that a grid file holds: which effects they hide and how large, how messy their logs
 //! are, and how far off their model files start.
 
+mod error;
 mod matters;
 mod recipe;
 mod rules;
 mod size;
 
+pub use error::DrawError;
 pub use recipe::{Drawn, Recipe};
 pub use rules::Rules;

@@ -7,6 +7,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
+use super::error::DrawError;
 use super::rules::{Kind, Rules, StandIn};
 use super::size::Size;
 use crate::bench::condition::{Condition, Driving};
@@ -46,7 +47,7 @@ impl Recipe {
     ///
     /// # Errors
     /// Why not.
-    pub fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let joints = self.mechanics.joints();
         if self.speed.len() != joints {
             return Err(format!(
@@ -54,11 +55,12 @@ impl Recipe {
             ));
         }
         let rng = &mut ChaCha8Rng::seed_from_u64(0);
-        let drawn = self.draw(rng)?;
+        let drawn = self.draw(rng).map_err(|error| error.to_string())?;
         let all = self.rules.effects.iter().chain(&self.rules.outside);
         for (name, kind) in all {
             for joint in Joint::all(joints) {
-                let effect = self.hidden(name, joint, &kind.values, self.scales(joint), rng)?;
+                let effect = self.hidden(name, joint, &kind.values, self.scales(joint), rng);
+                let effect = effect.map_err(|error| error.to_string())?;
                 if kind.joint.is_none_or(|only| only == joint) {
                     Machine::with(self.mechanics.clone(), &[effect])?;
                 }
@@ -71,7 +73,7 @@ impl Recipe {
     ///
     /// # Errors
     /// Rules that leave no effect to draw, or name a scale that there is not.
-    pub fn draw(&self, rng: &mut impl Rng) -> Result<Drawn, String> {
+    pub fn draw(&self, rng: &mut impl Rng) -> Result<Drawn, DrawError> {
         let mut drawn = Drawn {
             simulation: Simulation {
                 mechanics: self.mechanics.clone(),
@@ -96,7 +98,7 @@ impl Recipe {
         drawn: &mut Drawn,
         place: usize,
         rng: &mut impl Rng,
-    ) -> Result<(), String> {
+    ) -> Result<(), DrawError> {
         if place < drawn.effects.len() {
             drawn.effects.remove(place);
         }
@@ -114,7 +116,7 @@ impl Recipe {
             left -= kind.weight;
             left <= 0.0
         });
-        let (name, kind, joint) = chosen.ok_or("the rules leave no effect to draw")?;
+        let (name, kind, joint) = chosen.ok_or(DrawError::NothingLeft)?;
         let hidden = self.hidden(name, *joint, &kind.values, self.scales(*joint), rng)?;
         if place >= self.effects {
             drawn.stand_ins[place - self.effects] = self.stand_ins(&hidden, rng)?;
@@ -146,13 +148,13 @@ impl Recipe {
         model: &Model,
         declared: &BTreeMap<String, f64>,
         rng: &mut impl Rng,
-    ) -> Result<BTreeMap<String, f64>, String> {
+    ) -> Result<BTreeMap<String, f64>, DrawError> {
         let factor = self.rules.start.plain(rng)?;
         let free = model.parameters.iter().filter(|parameter| !parameter.fixed);
         free.map(|parameter| {
             let name = &parameter.name;
             let value = declared.get(name);
-            let value = value.ok_or(format!("the true value of `{name}` is not known"))?;
+            let value = value.ok_or_else(|| DrawError::NoTrueValue(name.clone()))?;
             let off = factor.powf(rng.random_range(-1.0..=1.0));
             Ok((name.clone(), value * off))
         })
@@ -181,11 +183,15 @@ impl Recipe {
         sizes: &BTreeMap<String, Size>,
         mut scales: BTreeMap<String, f64>,
         rng: &mut impl Rng,
-    ) -> Result<Hidden, String> {
+    ) -> Result<Hidden, DrawError> {
         let mut values = BTreeMap::new();
         for (parameter, size) in sizes {
             let drawn = size.draw(&scales, rng);
-            let value = drawn.map_err(|error| format!("`{name}`: `{parameter}`: {error}"))?;
+            let value = drawn.map_err(|why| DrawError::Number {
+                effect: name.to_owned(),
+                parameter: parameter.clone(),
+                why: Box::new(why),
+            })?;
             scales.insert(parameter.clone(), value);
             values.insert(parameter.clone(), value);
         }
@@ -196,7 +202,7 @@ impl Recipe {
         })
     }
 
-    fn stand_ins(&self, outside: &Hidden, rng: &mut impl Rng) -> Result<Vec<Hidden>, String> {
+    fn stand_ins(&self, outside: &Hidden, rng: &mut impl Rng) -> Result<Vec<Hidden>, DrawError> {
         let mut scales = self.scales(outside.joint);
         scales.extend(outside.values.clone());
         let stand_ins = self.rules.outside[&outside.name].stand_ins.iter();
@@ -205,14 +211,14 @@ impl Recipe {
         stand_ins.map(hidden).collect()
     }
 
-    fn condition(&self, rng: &mut impl Rng) -> Result<Condition, String> {
+    fn condition(&self, rng: &mut impl Rng) -> Result<Condition, DrawError> {
         let rules = &self.rules.condition;
         let mut loops = rules.loops.clone();
         while loops.len() > 2 {
             loops.remove(rng.random_range(0..loops.len()));
         }
         if rules.filter_s.is_empty() {
-            return Err("`filter_s` needs a number".to_owned());
+            return Err(DrawError::NoFilter);
         }
         let quantum = TAU / 2.0_f64.powf(rules.bits.plain(rng)?);
         Ok(Condition {

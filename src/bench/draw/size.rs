@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
+use super::error::DrawError;
+
 /// Numbers from `from` to `to`: evenly spread on a logarithmic scale where both are positive, else on a linear one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -34,7 +36,11 @@ impl Size {
     ///
     /// # Errors
     /// `of` names none of the `scales`.
-    pub fn draw(&self, scales: &BTreeMap<String, f64>, rng: &mut impl Rng) -> Result<f64, String> {
+    pub fn draw(
+        &self,
+        scales: &BTreeMap<String, f64>,
+        rng: &mut impl Rng,
+    ) -> Result<f64, DrawError> {
         let place = rng.random::<f64>();
         let number = if self.from > 0.0 && self.to > 0.0 {
             self.from * (self.to / self.from).powf(place)
@@ -44,20 +50,22 @@ impl Size {
         let number = if self.whole { number.round() } else { number };
         let negative = self.signed && rng.random();
         let scale = match &self.of {
-            Some(name) => scales.get(name).ok_or(format!("no scale `{name}`"))?,
+            Some(name) => scales
+                .get(name)
+                .ok_or_else(|| DrawError::NoScale(name.clone()))?,
             None => &1.0,
         };
         Ok(if negative { -number } else { number } * scale)
     }
 
     /// A number that is a multiple of nothing.
-    pub fn plain(&self, rng: &mut impl Rng) -> Result<f64, String> {
+    pub fn plain(&self, rng: &mut impl Rng) -> Result<f64, DrawError> {
         self.draw(&BTreeMap::new(), rng)
     }
 
     /// A number of things.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few
-    pub fn count(&self, rng: &mut impl Rng) -> Result<usize, String> {
+    pub fn count(&self, rng: &mut impl Rng) -> Result<usize, DrawError> {
         Ok(self.plain(rng)?.round() as usize)
     }
 }
@@ -85,7 +93,8 @@ mod tests {
         };
         assert!((share(&|x| x.abs() < 4.0) - 0.5).abs() < 0.03);
         assert!((share(&|x| x < 0.0) - 0.5).abs() < 0.03);
-        assert_eq!(size.draw(&[].into(), rng).unwrap_err(), "no scale `torque`");
+        let message = size.draw(&[].into(), rng).unwrap_err().to_string();
+        assert_eq!(message, "no scale `torque`");
         let whole: Size = toml::from_str("from = -3\nto = 3\nwhole = true").unwrap();
         assert!((0..100).all(|_| whole.plain(rng).unwrap().fract() == 0.0));
     }

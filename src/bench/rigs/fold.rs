@@ -7,7 +7,7 @@ use super::config::{Declared, Published, Rig, RigsError, Test};
 use crate::closeloop::between;
 use crate::data::{Joint, LeaveOut, Log, leave_out};
 use crate::files::content_id;
-use crate::model::{FittedEffect, Library, Model};
+use crate::model::{FittedEffect, Library, Model, ModelError};
 
 /// A measured rig with its models and logs.
 #[derive(Debug)]
@@ -62,7 +62,8 @@ impl Measured {
             .map(published)
             .collect::<Result<_, _>>()?;
         Ok(Self {
-            plain: with_plain(&declared, &rig.plain, library).map_err(wrong)?,
+            plain: with_plain(&declared, &rig.plain, library)
+                .map_err(|error| wrong(error.to_string()))?,
             published,
             folds: logs.folds(rig.test),
             fingerprint: fingerprint(&rig, data),
@@ -99,7 +100,11 @@ fn model(rig: &Rig, declared: &Declared, library: &Library) -> Result<Model, Rig
 }
 
 /// The model with these effects on every joint, absent until they are fitted.
-fn with_plain(declared: &Model, effects: &[String], library: &Library) -> Result<Model, String> {
+fn with_plain(
+    declared: &Model,
+    effects: &[String],
+    library: &Library,
+) -> Result<Model, ModelError> {
     let mut all = declared.effects.clone();
     for name in effects {
         let effect = library.effect(name)?;

@@ -45,7 +45,8 @@ impl Session {
                 |message: String| experiment.wrong(format!("case `{}`: {message}", case.name));
             let mut plant =
                 Plant::read(&model, &library).map_err(|error| wrong(error.to_string()))?;
-            plant.set_parameters(&case.parameters).map_err(wrong)?;
+            let parameters = plant.set_parameters(&case.parameters);
+            parameters.map_err(|error| wrong(error.to_string()))?;
             let hidden = plant.hide(&library, &case.effects);
             hidden.map_err(|error| wrong(error.to_string()))?;
             Ok(plant)

@@ -91,10 +91,29 @@ impl Recipe {
             path: path.to_owned(),
             message,
         };
-        let mut recipe: Self = from_toml(text).map_err(|e| wrong(e.to_string()))?;
-        recipe.path = path.to_owned();
-        recipe.check().map_err(|message| recipe.wrong(message))?;
-        Ok(recipe)
+        let recipe: Self = from_toml(text).map_err(|e| wrong(e.to_string()))?;
+        recipe.located(path)
+    }
+
+    /// The recipe in `json`, with the keys of a file; the files that it names are relative to the working directory.
+    ///
+    /// # Errors
+    /// As [`Recipe::read`], without lines.
+    pub fn from_json(json: &str) -> Result<Self, RecipeError> {
+        let path = Path::new("recipe");
+        let wrong = |message: String| RecipeError::File {
+            path: path.to_owned(),
+            message,
+        };
+        let recipe: Self = serde_json::from_str(json).map_err(|e| wrong(e.to_string()))?;
+        recipe.located(path)
+    }
+
+    /// The same recipe as one of this file, once it is sound.
+    fn located(mut self, path: &Path) -> Result<Self, RecipeError> {
+        path.clone_into(&mut self.path);
+        self.check().map_err(|message| self.wrong(message))?;
+        Ok(self)
     }
 
     /// The recipe for fine-tuning a model of `system` on logs: segments and integrator suit rigs that are sampled finely
