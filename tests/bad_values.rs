@@ -2,6 +2,7 @@
 //! and the place, and what leaves the finite numbers is told.
 
 use std::fs;
+use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};

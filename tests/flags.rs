@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::hard::Scratch;
-use crate::support::{refuses, says, succeeds};
+use crate::support::{Scratch, refuses, says, succeeds, swinging};
 
 /// The flags that a text names: `--train` and the like.
 fn flags(text: &str) -> BTreeSet<String> {
@@ -63,7 +62,7 @@ fn the_command_line_says_which_flag_mends_an_error() {
         [0.0; 3]
     });
     let (long, out) = (
-        scratch.log("long.csv", crate::hard::swinging),
+        scratch.log("long.csv", swinging),
         scratch.out(),
     );
     let model = [
@@ -109,7 +108,7 @@ fn a_finding_is_mended_by_a_flag_on_the_command_line_alone() {
     let scratch = Scratch::new();
     // The logger stopped for half a second.
     let times = (0..600).map(|row| 0.01 * f64::from(row) + if row < 300 { 0.0 } else { 0.5 });
-    let log = scratch.log_at("gap.csv", times, crate::hard::swinging);
+    let log = scratch.log_at("gap.csv", times, swinging);
     let output = crate::support::residyn(&["audit", &log]);
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains("paste: --leave-out gap.csv@"), "{told}");
