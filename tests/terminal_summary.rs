@@ -54,7 +54,7 @@ fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
         let whole = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(!whole.contains(".."), "{said}");
         for sentence in [
-            format!("report.md): demo1.csv: {}", LONG.repeat(12)),
+            format!("report.md): pendulum.csv: {}", LONG.repeat(12)),
             format!("to rule out stribeck_friction: {}", LONG.repeat(12)),
             format!(
                 "held, since the logs do not tell them: {}",

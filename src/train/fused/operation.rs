@@ -55,12 +55,14 @@ impl LossTask {
             [] => Evaluation::new(self.problem, self.workers, &numbers[0]),
             _ => Evaluation::new(self.problem, self.workers, &numbers.concat()),
         };
-        let [error, norm] = evaluation.loss;
-        *self.parts.lock().expect("no other thread uses it") = evaluation.loss.map(f64::from);
-        let sums = self
-            .sums
-            .iter()
-            .map(|[of_error, of_norm]| of_error * error + of_norm * norm);
+        let loss = evaluation.loss;
+        *self.parts.lock().expect("no other thread uses it") = loss.map(f64::from);
+        // What has no weight does not count, be it infinite.
+        let weighted = |(weight, part): (&f32, f32)| match *weight {
+            0.0 => 0.0,
+            weight => weight * part,
+        };
+        let sums = (self.sums.iter()).map(|weights| weights.iter().zip(loss).map(weighted).sum());
         let loss = vector(sums.collect());
         let evaluated = Evaluated {
             evaluation: Arc::new(Mutex::new(evaluation)),

@@ -47,7 +47,7 @@ fn visitors_find_every_part_by_its_path() {
         paths.found[1],
         ("residual.layers.0.weight".to_owned(), 3 * 16)
     );
-    assert_eq!(paths.found[8], ("residual.layers.3.bias".to_owned(), 2));
+    assert_eq!(paths.found[8], ("residual.layers.3.bias".to_owned(), 1));
     let entries: usize = paths.found.iter().map(|(_, entries)| entries).sum();
     assert_eq!(model.num_params(), entries);
     let names: Vec<&str> = model.physics.as_ref().unwrap().names().collect();
@@ -124,7 +124,7 @@ fn a_step_out_of_the_bounds_ends_on_them() {
         Tensor::from_inner(moved).require_grad()
     });
     let within = model.within_bounds();
-    assert_eq!(within.weights().parameters[1], 2.05);
+    assert!((within.weights().parameters[1] - 2.05).abs() < 1e-6);
     assert!((within.weights().parameters[0] - 24.0).abs() < 1e-5);
     assert!(within.physics.unwrap().scaled.is_require_grad());
 }
