@@ -46,7 +46,7 @@ fn unreadable(path: &Path) -> Option<io::Error> {
 }
 
 /// What could not be written, and why, if an error is of that.
-fn written(error: &(dyn Error + 'static)) -> Option<(io::Error, &Path)> {
+fn written<'a>(error: &'a (dyn Error + 'static)) -> Option<(io::Error, &'a Path)> {
     let mut causes = std::iter::successors(Some(error), |error| (**error).source());
     let output = causes.find_map(|cause| cause.downcast_ref::<OutputError>())?;
     Some((output.source.kind().into(), &output.path))

@@ -145,7 +145,7 @@ impl Crate {
         let used = module
             .uses
             .iter()
-            .find(|(name, path, _)| name == first && path != &[first.clone()]);
+            .find(|(name, path, _)| name == first && path != std::slice::from_ref(first));
         let (_, path, _) = used?;
         self.resolved(at, &[path, rest].concat())
     }
