@@ -42,7 +42,7 @@ impl Study<'_> {
         // Torques may be fitted well by what cannot move like the rig.
         let mut by_motion = Study {
             declared: &model,
-            ..self.again()
+            ..self.clone()
         };
         let by_motion = by_motion.fit_declared(&[]).ok()?;
         Some(self.motion_error(&by_motion.model) >= far)

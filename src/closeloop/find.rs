@@ -202,7 +202,7 @@ fn second_search(
 ) -> Option<(Identifiability, Chosen)> {
     let mut short = study.over_short_windows();
     let declared = short.fit_started().ok()?;
-    let mut study = study.again();
+    let mut study = study.clone();
     study.identifiability = short.identifiability.clone();
     let chosen = choose(&study, library, before, progress, |search| {
         search.select_from(&short, declared)

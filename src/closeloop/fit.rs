@@ -7,7 +7,7 @@ use super::space::Space;
 use super::start::around;
 use super::study::Study;
 use crate::identify::{
-    FitError, Identifiability, Open, Shooting, Values, fit, fit_torques, identifiability, open,
+    FitError, Identifiability, Open, Shooting, Values, cut, fit, fit_torques, identifiability, open,
     uncertainty,
 };
 use crate::model::{Effect, FittedEffect, Model};
@@ -61,7 +61,9 @@ impl Study<'_> {
             .with_effects([own, friction.as_slice()].concat());
         self.choose_sign_widths(&model)?;
         let beside = fit_torques(&self.smoothed(&model), self.declared, self.logs)?;
-        self.weigh_by(&beside.shooting.noise);
+        // The logs are smoothed there as they are to be here.
+        let windows = cut(self.logs, self.settings.fit.window_s);
+        *self = self.over(beside.shooting.over(windows));
         let alone = beside.model.effects[..own.len()].to_vec();
         let fitted = self.fitted_over(&self.shooting, &beside.model.with_effects(alone))?;
         self.identifiability = self.identifiability_of(&fitted);

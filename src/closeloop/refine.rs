@@ -47,7 +47,7 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
             }
             (Err(error), _) | (_, Err(error)) => {
                 let (before, after) = (declared.clone(), chosen.clone());
-                break (study.again(), before, after, Some(error));
+                break (study.clone(), before, after, Some(error));
             }
         }
     };
@@ -80,13 +80,11 @@ impl Study<'_> {
             };
         let widths = self.sign_widths.iter().zip(&self.top_speed);
         let sign_widths: Vec<f64> = widths.map(of_joint).collect();
-        let windows = self.shooting.windows.clone();
-        let shooting = self.shooting.over(windows);
         Self {
             sign_widths,
             held: self.identifiability.hold.clone(),
-            shooting: shooting.in_steps_of(step_s),
-            ..self.again()
+            shooting: self.shooting.clone().in_steps_of(step_s),
+            ..self.clone()
         }
     }
 }
@@ -107,9 +105,7 @@ impl Study<'_> {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
         let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.locals);
-        let mut study = self.again();
-        study.weigh_by(&noise);
-        study
+        self.over(self.shooting.with_noise(&noise))
     }
 }
 

@@ -41,8 +41,7 @@ impl Study<'_> {
     fn loss_with(&self, fitted: &Fitted, widths: &[f64]) -> Option<f64> {
         let study = Study {
             sign_widths: widths.to_vec(),
-            identifiability: self.identifiability.clone(),
-            ..self.again()
+            ..self.clone()
         };
         let again = study.estimate(fitted).ok()?;
         Some(Loss::of(&study, &again).total())

@@ -1,5 +1,5 @@
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use super::fitted::Fitted;
@@ -10,7 +10,9 @@ use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
 use crate::model::{Dynamics, FittedEffect, Model, Parameter};
 
-/// A declared model and the logs to learn from, with what follows from both.
+/// A declared model and the logs to learn from, with what follows from both. A copy shares what is large: the audits, the
+/// smoothed logs and the batches of windows.
+#[derive(Clone)]
 pub struct Study<'a> {
     /// With the values in its file.
     pub declared: &'a Model,
@@ -18,7 +20,7 @@ pub struct Study<'a> {
     pub settings: &'a Settings,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
-    pub(super) audits: OnceLock<Vec<Audit>>,
+    pub(super) audits: Arc<OnceLock<Vec<Audit>>>,
     /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
     /// Top speed, top torque and largest torque or command in the logs of each joint.
@@ -40,6 +42,7 @@ pub struct Study<'a> {
 }
 
 /// Some of a study's windows.
+#[derive(Clone)]
 pub struct Sample<'a> {
     pub shooting: Shooting<'a>,
     /// Which of the study's windows they are.
@@ -123,7 +126,7 @@ impl<'a> Study<'a> {
             space,
             settings,
             logs,
-            audits: audits.into(),
+            audits: Arc::new(audits.into()),
             sign_widths,
             sample: Sample::of(&shooting, sample_windows),
             shooting,
@@ -177,7 +180,7 @@ impl<'a> Study<'a> {
             space: self.space,
             settings: self.settings,
             logs,
-            audits: OnceLock::new(),
+            audits: Arc::default(),
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
@@ -191,32 +194,23 @@ impl<'a> Study<'a> {
         }
     }
 
-    /// Take this as the noise of the joints.
-    pub(super) fn weigh_by(&mut self, noise: &[f64]) {
-        let FitSettings {
-            window_s,
-            sample_windows,
-            ..
-        } = self.settings.fit;
-        let windows = cut(self.logs, window_s);
-        let shooting = (self.space).shooting(self.logs, windows, noise, &self.sign_widths);
-        self.shooting = shooting.near(self.declared);
-        self.sample = Sample::of(&self.shooting, sample_windows);
+    /// The same study over other windows of its logs, or with another noise of its joints.
+    pub(super) fn over(&self, shooting: Shooting<'a>) -> Self {
+        Self {
+            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
+            shooting,
+            ..self.clone()
+        }
     }
 
     /// Its logs, cut into windows of this length in s.
     pub(super) fn windows_of(&self, length_s: f64) -> Shooting<'a> {
-        self.shooting.over(cut(self.logs, length_s))
+        self.shooting.cut_into(length_s)
     }
 
     /// The same study over windows in which even a poor start does not diverge.
     pub(super) fn over_short_windows(&self) -> Self {
-        let shooting = self.windows_of(self.settings.fit.short_window_s);
-        Self {
-            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
-            shooting,
-            ..self.again()
-        }
+        self.over(self.windows_of(self.settings.fit.short_window_s))
     }
 
     /// The declared model at the values that its fit began with.
@@ -230,16 +224,6 @@ impl<'a> Study<'a> {
             *parameter = moved.unwrap_or(parameter).clone();
         }
         model
-    }
-
-    /// This study once more.
-    pub(super) fn again(&self) -> Self {
-        Self {
-            moved_to: self.moved_to.clone(),
-            identifiability: self.identifiability.clone(),
-            held: self.held.clone(),
-            ..self.on(self.logs)
-        }
     }
 
     /// The audits of the logs, in their order.
