@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::problem::Problem;
 use super::space::Space;
-use super::study::Study;
 use crate::data::{Audit, Finding, Severity, Smooth};
 use crate::decomposition::least_squares;
 use crate::model::Model;
@@ -50,14 +50,14 @@ fn told(share: f64) -> String {
     )
 }
 
-/// The share of the declared gravity in each log of a study by torques, where it tells.
-pub(super) fn shares_of_gravity(study: &Study<'_>) -> Vec<Option<f64>> {
-    if study.space != Space::Torque {
+/// The share of the declared gravity in each log of a problem by torques, where it tells.
+pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
+    if problem.space != Space::Torque {
         return Vec::new();
     }
-    let bodies = study.declared.with_effects(Vec::new());
+    let bodies = problem.declared.with_effects(Vec::new());
     let of_log = |log| share(&bodies, &Smooth::of(log));
-    study.logs.iter().map(of_log).collect()
+    problem.logs.iter().map(of_log).collect()
 }
 
 /// The share of the declared gravity in the torques, by least squares beside acceleration, friction and an offset joint by

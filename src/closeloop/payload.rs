@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::establish::Standing;
 use super::fitted::Fitted;
-use super::study::Study;
+use super::problem::Problem;
 use crate::data::Joint;
 use crate::identify::Fit;
 use crate::model::{Effect, Entry, FittedEffect, Status};
@@ -20,7 +20,7 @@ fn whole(fit: &Fit) -> f64 {
     fit.cost + fit.departure
 }
 
-impl Study<'_> {
+impl Problem<'_> {
     /// Whether the fit may change the bodies of a chain.
     pub(super) fn has_free_bodies(&self) -> bool {
         let mut parts = self.declared.inertias().into_iter().flatten();
@@ -28,16 +28,12 @@ impl Study<'_> {
     }
 
     /// The chosen model with a load at its tip, where most of what its bodies depart from the declared ones is one load.
-    pub(super) fn with_payload(
-        &self,
-        chosen: &Fitted,
-        library: &[Effect],
-    ) -> Option<(Fitted, Standing)> {
+    pub(super) fn with_payload(&self, chosen: &Fitted) -> Option<(Fitted, Standing)> {
         if !self.has_free_bodies() {
             return None;
         }
         let is_load = |effect: &&Effect| matches!(effect.entry, Entry::Payload(_));
-        let effect = library.iter().find(is_load)?;
+        let effect = self.effects().iter().find(is_load)?;
         let tip = Joint::at(self.declared.joints - 1);
         let is_there = chosen
             .model

@@ -1,8 +1,8 @@
 //! Forces that no column holds: a person pushes, a cable pulls, a limb touches. The fitted model follows the log there
 //! only with a further torque that is far beyond what it needs elsewhere.
 
+use super::problem::Problem;
 use super::remainder::ForceSample;
-use super::study::Study;
 use crate::data::statistics::{SIGMA_PER_MAD, median};
 use crate::data::{Audit, Finding, Interval, Joint, Severity};
 
@@ -30,13 +30,13 @@ struct Push {
     times: f64,
 }
 
-/// Add to the audits of the study's logs where something pushed, as far as the residual forces of a fitted model tell.
-pub(super) fn tell_pushes(study: &Study<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
-    let stretch_s = study.settings.remainder.stretch_s;
-    for joint in Joint::all(study.declared.joints) {
-        let least = PUSH_SHARE * study.top_torque[joint];
+/// Add to the audits of the problem's logs where something pushed, as far as the residual forces of a fitted model tell.
+pub(super) fn tell_pushes(problem: &Problem<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
+    let stretch_s = problem.settings.remainder.stretch_s;
+    for joint in Joint::all(problem.declared.joints) {
+        let least = PUSH_SHARE * problem.top_torque[joint];
         for push in pushes(forces, joint, stretch_s, least) {
-            audits[push.log].add(push.finding(&study.logs[push.log].name()));
+            audits[push.log].add(push.finding(&problem.logs[push.log].name()));
         }
     }
 }

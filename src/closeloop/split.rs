@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::settings::SplitSettings;
 use crate::data::{Log, row_after, row_from};
 
-/// Which logs a study learns from and which it is judged by.
+/// Which logs a problem learns from and which it is judged by.
 #[derive(Debug, Clone)]
 pub struct Split {
     pub train: Vec<Log>,

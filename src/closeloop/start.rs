@@ -1,6 +1,6 @@
 //! Starting values for a model that diverges with those in its file.
 
-use super::study::{Sample, Study};
+use super::problem::{Problem, Sample};
 use crate::identify::Values;
 use crate::model::{Model, Parameter};
 
@@ -13,12 +13,12 @@ const BASES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47
 
 /// The declared model at values around those in its file with which it does not diverge over short windows, the nearest
 /// first.
-pub(super) fn around(study: &Study<'_>) -> impl Iterator<Item = Model> {
-    let short = study.windows_of(study.settings.fit.short_window_s);
-    let sample = Sample::of(&short, study.settings.fit.sample_windows).shooting;
-    spread(study.declared).filter(move |model| {
-        let dynamics = study.compiled(model);
-        let values = Values::of(&dynamics, study.logs);
+pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
+    let short = problem.windows_of(problem.settings.fit.short_window_s);
+    let sample = Sample::of(&short, problem.settings.fit.sample_windows).shooting;
+    spread(problem.declared).filter(move |model| {
+        let dynamics = problem.compiled(model);
+        let values = Values::of(&dynamics, problem.logs);
         let costs = sample.costs(&dynamics, &values, &sample.initial_locals(0), 1.0);
         costs.iter().all(|cost| cost.is_finite())
     })

@@ -380,8 +380,9 @@ fn half_widths(logs: &[Log]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::sync::Arc;
 
-    use super::{Shooting, Values};
+    use super::{Measure, Pack, Shooting, Values};
     use crate::data::{Joint, Log, Quantity};
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
@@ -403,6 +404,26 @@ mod tests {
             notes: Vec::new(),
             time,
         }
+    }
+
+    fn packs(shooting: &Shooting<'_>) -> Arc<Vec<Pack>> {
+        match &shooting.measure {
+            Measure::Motion(packs) => Arc::clone(packs),
+            Measure::Torques { .. } => panic!("of a motion"),
+        }
+    }
+
+    #[test]
+    fn copies_share_their_windows_until_one_is_changed() {
+        let logs = [log()];
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
+        let copy = shooting.clone();
+        assert!(Arc::ptr_eq(&packs(&shooting), &packs(&copy)));
+        let [first, again] = [&shooting, &copy].map(|of| of.cut_into(0.15));
+        assert_eq!(first.windows, cut(&logs, 0.15));
+        assert!(Arc::ptr_eq(&packs(&first), &packs(&again)));
+        let fine = copy.in_steps_of(1e-3);
+        assert!(!Arc::ptr_eq(&packs(&shooting), &packs(&fine)));
     }
 
     #[test]

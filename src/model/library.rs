@@ -29,7 +29,7 @@ impl Library {
     }
 
     /// A library without effects and probes, in which nothing can be found.
-    pub fn empty() -> Self {
+    pub const fn empty() -> Self {
         Self {
             effects: Vec::new(),
             probes: Vec::new(),

@@ -8,7 +8,7 @@ use crate::sim::{Commands, FIT_S, RK4, Simulator};
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
-    /// Number of the study's log that it begins in.
+    /// Number of the problem's log that it begins in.
     pub log: usize,
     /// Angles, then velocities.
     pub start: Vec<f64>,
@@ -26,7 +26,7 @@ const PAUSE_S: f64 = 2.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Record {
     pub logs: Vec<Log>,
-    /// For each of them the log of the study that its motions begin in: what differs by log is as it was there.
+    /// For each of them the log of the problem that its motions begin in: what differs by log is as it was there.
     pub origins: Vec<usize>,
     /// The rows of each motion.
     pub motions: Vec<Window>,
@@ -65,7 +65,7 @@ impl Record {
         Some(record)
     }
 
-    /// Number of the record's log for motions that begin in a log of the study: it is called as that log is.
+    /// Number of the record's log for motions that begin in a log of the problem: it is called as that log is.
     fn log_of(&mut self, origin: usize, log: &Log) -> usize {
         if let Some(known) = self.origins.iter().position(|known| *known == origin) {
             return known;

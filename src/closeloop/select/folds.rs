@@ -1,9 +1,9 @@
 use nalgebra::{DMatrix, DVector};
 
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::identify::{Fit, WindowTerms, blocks, with_unit_diagonal};
 
-/// The windows of a study in stretches that losses are given for, and in groups that are left out of a fit together.
+/// The windows of a problem in stretches that losses are given for, and in groups that are left out of a fit together.
 pub struct Folds {
     /// The stretch of each window.
     pub stretches: Vec<usize>,
@@ -12,8 +12,8 @@ pub struct Folds {
 }
 
 impl Folds {
-    pub fn of(study: &Study<'_>) -> Self {
-        let shooting = &study.shooting;
+    pub fn of(problem: &Problem<'_>) -> Self {
+        let shooting = &problem.shooting;
         let stretches = blocks(shooting);
         let count = stretches.last().map_or(0, |last| last + 1);
         let mut log_of = vec![0; count];
@@ -21,7 +21,7 @@ impl Folds {
             log_of[stretch] = window.log;
         }
         let logs = shooting.logs.len();
-        let parts = study.settings.select.fewest_groups.div_ceil(logs);
+        let parts = problem.settings.select.fewest_groups.div_ceil(logs);
         // What is left out together is connected: a model is to hold for motion that it was not fitted to.
         let group = |(stretch, &log): (usize, &usize)| {
             let first = log_of.partition_point(|of| *of < log);
@@ -63,12 +63,12 @@ impl Folds {
     }
 }
 
-/// The loss on each stretch of a study's windows, with the parameters that a fit without the stretch's group would give.
+/// The loss on each stretch of a problem's windows, with the parameters that a fit without the stretch's group would give.
 /// The fit is not repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a group
 /// moves the parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since
 /// no other log determines them.
-pub fn left_out_losses(study: &Study<'_>, fit: &Fit) -> Vec<f64> {
-    losses_by(&Folds::of(study), fit)
+pub fn left_out_losses(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+    losses_by(&Folds::of(problem), fit)
 }
 
 /// The same with given folds.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::candidate::{beside, best_start, has_switch, promise_on_sample};
 use super::folds::{Folds, predicted, step_without};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::identify::{Column, Fit, WindowTerms, as_it_stands, with_unit_diagonal};
 use crate::model::{Dynamics, EffectParameter, FittedEffect};
 
@@ -47,12 +47,12 @@ struct Minimum {
 
 impl Outlook {
     /// The loss of `fitted` and of all candidates beside it; `None` where the model diverges.
-    pub fn of(study: &Study<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
+    pub fn of(problem: &Problem<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
         let options: Vec<FittedEffect> = candidates
             .par_iter()
             .filter(|candidate| has_switch(candidate))
             .filter_map(|candidate| {
-                let beside = beside(study, fitted, candidate)?;
+                let beside = beside(problem, fitted, candidate)?;
                 if candidate
                     .effect
                     .parameters
@@ -61,15 +61,15 @@ impl Outlook {
                 {
                     return Some(candidate.clone());
                 }
-                best_start(study, &beside, candidate)
+                best_start(problem, &beside, candidate)
             })
             .collect();
-        let options = together(study, fitted, options);
+        let options = together(problem, fitted, options);
         let model = fitted.model.with_effects(fitted.effects_and(&options));
-        let dynamics = study.compiled(&model);
-        let added = study.declared.effects.len()..model.effects.len();
+        let dynamics = problem.compiled(&model);
+        let added = problem.declared.effects.len()..model.effects.len();
         let places: Vec<Range<usize>> = added.clone().map(|k| model.place_of(k)).collect();
-        let present = study.added(&fitted.model).len();
+        let present = problem.added(&fitted.model).len();
         // Beside an absent effect the values that give it its shape change nothing.
         let shapes = |k: &usize| {
             let item = places.iter().position(|place| place.contains(k));
@@ -78,25 +78,25 @@ impl Outlook {
                 item >= present && !parameters[k - places[item].start].is_switch()
             })
         };
-        let mut active = study.active(&dynamics);
+        let mut active = problem.active(&dynamics);
         active.retain(|k| !shapes(k));
         let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
-        let fit = as_it_stands(&study.shooting, &dynamics, &active, locals, scale).ok()?;
+        let fit = as_it_stands(&problem.shooting, &dynamics, &active, locals, scale).ok()?;
         let items = model.effects[added].to_vec();
         Some(Self::from_fit(
-            study, &dynamics, &fit, items, &places, present,
+            problem, &dynamics, &fit, items, &places, present,
         ))
     }
 
     fn from_fit(
-        study: &Study<'_>,
+        problem: &Problem<'_>,
         dynamics: &Dynamics,
         fit: &Fit,
         items: Vec<FittedEffect>,
         places: &[Range<usize>],
         present: usize,
     ) -> Self {
-        let values = crate::identify::Values::of(dynamics, study.logs);
+        let values = crate::identify::Values::of(dynamics, problem.logs);
         let of_item = |place: &Range<usize>| -> Vec<usize> {
             let columns = fit.columns.iter().enumerate();
             let own = columns.filter(|(_, column)| place.contains(&column.parameter));
@@ -117,10 +117,10 @@ impl Outlook {
             });
             if is_switch { -values.get(*column) } else { 0.0 }
         };
-        let folds = Folds::of(study);
+        let folds = Folds::of(problem);
         let (stretches, groups) = folds.equations(fit);
         let base: Vec<usize> = (0..fit.columns.len()).filter(is_base).collect();
-        let told = |i: &&usize| study.is_told(fit.columns[**i].parameter);
+        let told = |i: &&usize| problem.is_told(fit.columns[**i].parameter);
         Self {
             told: base.iter().filter(told).copied().collect(),
             base,
@@ -235,9 +235,13 @@ impl Outlook {
 }
 
 /// The candidates that are compared at once: all or, of more than there is memory for, those that promise most alone.
-fn together(study: &Study<'_>, fitted: &Fitted, options: Vec<FittedEffect>) -> Vec<FittedEffect> {
+fn together(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    options: Vec<FittedEffect>,
+) -> Vec<FittedEffect> {
     // Each window's as they come and without its own values, and those of stretches.
-    let equations = 3 * study.shooting.windows.len().max(1);
+    let equations = 3 * problem.shooting.windows.len().max(1);
     #[allow(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
@@ -254,7 +258,7 @@ fn together(study: &Study<'_>, fitted: &Fitted, options: Vec<FittedEffect>) -> V
     }
     let promises = options.par_iter().enumerate();
     let promises =
-        promises.filter_map(|(k, option)| Some((promise_on_sample(study, fitted, option)?, k)));
+        promises.filter_map(|(k, option)| Some((promise_on_sample(problem, fitted, option)?, k)));
     let mut promises: Vec<(f64, usize)> = promises.collect();
     promises.sort_by(|a, b| a.0.total_cmp(&b.0));
     let fits = promises.iter().scan(0, |sum, (_, k)| {

@@ -3,14 +3,14 @@ use std::collections::HashSet;
 use rayon::prelude::*;
 
 use super::outlook::{Outlook, Set};
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 
 /// Sets of an outlook's items that promise to lower the loss on left-out stretches, found by a beam search: from the
 /// items of the model, one is added or dropped at a time, and the best few sets of a step lead to the next.
-pub fn promising(outlook: &Outlook, study: &Study<'_>) -> Vec<Set> {
-    let settings = &study.settings.select;
-    let most = settings.most_effects_of(study.declared.joints);
-    let step = study.of_whole(settings.step);
+pub fn promising(outlook: &Outlook, problem: &Problem<'_>) -> Vec<Set> {
+    let settings = &problem.settings.select;
+    let most = settings.most_effects_of(problem.declared.joints);
+    let step = problem.of_whole(settings.step);
     let start = outlook.present();
     let total = |set: &Set| Some(outlook.losses(set)?.iter().sum::<f64>());
     let Some(first) = total(&start) else {

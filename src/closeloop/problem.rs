@@ -1,6 +1,5 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
-use std::time::Instant;
 
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
@@ -8,14 +7,18 @@ use super::space::Space;
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
-use crate::model::{Dynamics, FittedEffect, Model, Parameter};
+use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
-/// A declared model and the logs to learn from, with what follows from both. A copy shares what is large: the audits, the
-/// smoothed logs and the batches of windows.
+/// A declared model, the effects that it may lack, and the logs to learn from, with what follows from them.
+///
+/// Nothing changes it: what a stage finds out is in the copy that it returns. Copies share what is large, the audits, the smoothed
+/// logs and the batches of windows.
 #[derive(Clone)]
-pub struct Study<'a> {
+pub struct Problem<'a> {
     /// With the values in its file.
     pub declared: &'a Model,
+    /// The effects that it may lack.
+    pub library: &'a Library,
     pub space: Space,
     pub settings: &'a Settings,
     pub logs: &'a [Log],
@@ -30,8 +33,6 @@ pub struct Study<'a> {
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
-    /// When the search has to stop.
-    pub deadline: Option<Instant>,
     /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
     /// else empty.
     pub moved_to: Vec<Parameter>,
@@ -41,11 +42,11 @@ pub struct Study<'a> {
     pub held: Vec<usize>,
 }
 
-/// Some of a study's windows.
+/// Some of a problem's windows.
 #[derive(Clone)]
 pub struct Sample<'a> {
     pub shooting: Shooting<'a>,
-    /// Which of the study's windows they are.
+    /// Which of the problem's windows they are.
     members: Vec<usize>,
 }
 
@@ -66,20 +67,25 @@ impl<'a> Sample<'a> {
     }
 }
 
-impl<'a> Study<'a> {
-    /// A study of the motion.
-    pub fn new(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
+impl<'a> Problem<'a> {
+    /// A problem of the motion.
+    pub fn new(
+        declared: &'a Model,
+        library: &'a Library,
+        logs: &'a [Log],
+        settings: &'a Settings,
+    ) -> Self {
         let audits = logs.iter().map(|log| audit(log, &declared.columns));
         let audits = audits.collect();
-        Self::audited(declared, Space::Motion, logs, audits, settings)
+        Self::audited(declared, library, Space::Motion, (logs, audits), settings)
     }
 
-    /// A study of logs with their audits.
+    /// A problem of logs with their audits.
     pub(super) fn audited(
         declared: &'a Model,
+        library: &'a Library,
         space: Space,
-        logs: &'a [Log],
-        audits: Vec<Audit>,
+        (logs, audits): (&'a [Log], Vec<Audit>),
         settings: &'a Settings,
     ) -> Self {
         let FitSettings {
@@ -123,6 +129,7 @@ impl<'a> Study<'a> {
         let shooting = shooting.near(declared);
         Self {
             declared,
+            library,
             space,
             settings,
             logs,
@@ -133,7 +140,6 @@ impl<'a> Study<'a> {
             top_speed,
             top_torque,
             top_driving,
-            deadline: None,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
@@ -159,14 +165,13 @@ impl<'a> Study<'a> {
         share / self.parts() as f64
     }
 
-    /// Whether the search may go on.
-    pub(super) fn has_time(&self) -> bool {
-        self.deadline
-            .is_none_or(|deadline| Instant::now() < deadline)
+    /// The effects that the model may lack.
+    pub(super) fn effects(&self) -> &'a [Effect] {
+        self.library.effects()
     }
 
     /// The same model on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
-    pub fn on<'b>(&self, logs: &'b [Log]) -> Study<'b>
+    pub fn on<'b>(&self, logs: &'b [Log]) -> Problem<'b>
     where
         'a: 'b,
     {
@@ -175,8 +180,9 @@ impl<'a> Study<'a> {
             .space
             .shooting(logs, windows, &self.shooting.noise, &self.sign_widths)
             .near(self.declared);
-        Study {
+        Problem {
             declared: self.declared,
+            library: self.library,
             space: self.space,
             settings: self.settings,
             logs,
@@ -187,14 +193,13 @@ impl<'a> Study<'a> {
             top_driving: self.top_driving.clone(),
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
-            deadline: self.deadline,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
         }
     }
 
-    /// The same study over other windows of its logs, or with another noise of its joints.
+    /// The same problem over other windows of its logs, or with another noise of its joints.
     pub(super) fn over(&self, shooting: Shooting<'a>) -> Self {
         Self {
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
@@ -203,14 +208,26 @@ impl<'a> Study<'a> {
         }
     }
 
+    /// The same problem, of which this is known.
+    pub(super) fn knowing(&self, identifiability: Identifiability) -> Self {
+        Self {
+            identifiability,
+            ..self.clone()
+        }
+    }
+
+    /// The same problem where dry friction reverses over these speeds. Of torques the logs are smoothed with it: they need other
+    /// windows as well.
+    pub(super) fn with_sign_widths(&self, sign_widths: Vec<f64>) -> Self {
+        Self {
+            sign_widths,
+            ..self.clone()
+        }
+    }
+
     /// Its logs, cut into windows of this length in s.
     pub(super) fn windows_of(&self, length_s: f64) -> Shooting<'a> {
         self.shooting.cut_into(length_s)
-    }
-
-    /// The same study over windows in which even a poor start does not diverge.
-    pub(super) fn over_short_windows(&self) -> Self {
-        self.over(self.windows_of(self.settings.fit.short_window_s))
     }
 
     /// The declared model at the values that its fit began with.
@@ -239,10 +256,10 @@ impl<'a> Study<'a> {
         self.audits().iter().any(moves)
     }
 
-    /// Fit a model, starting from its values, with the study's smoothing of friction.
+    /// Fit a model, starting from its values, with the problem's smoothing of friction.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub fn refit(
         &self,
         model: &Model,
@@ -259,7 +276,7 @@ impl<'a> Study<'a> {
     /// Fit a model anew, starting from its values; the scale of its residuals is estimated again.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub fn estimate(&self, fitted: &Fitted) -> Result<Fitted, FitError> {
         self.refit(&fitted.model, fitted.fit.locals.clone(), None)
     }
@@ -268,7 +285,7 @@ impl<'a> Study<'a> {
     /// losses of the two can be compared.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub(super) fn with_effects(
         &self,
         fitted: &Fitted,
@@ -278,7 +295,7 @@ impl<'a> Study<'a> {
         self.refit(&fitted.model.with_effects(effects), locals, Some(scale))
     }
 
-    /// As [`Study::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
+    /// As [`Problem::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
     /// not come down to it.
     pub(super) fn with_better_effects(
         &self,
@@ -306,18 +323,18 @@ impl<'a> Study<'a> {
         self.declared.effects.len()..model.effects.len()
     }
 
-    /// A model with the study's smoothing of friction.
+    /// A model with the problem's smoothing of friction.
     pub(super) fn smoothed(&self, model: &Model) -> Model {
         model.with_sign_widths(self.sign_widths.clone())
     }
 
-    /// A fitted model with more effects, compiled with the study's smoothing of friction.
+    /// A fitted model with more effects, compiled with the problem's smoothing of friction.
     pub(super) fn extended(&self, fitted: &Fitted, more: &[FittedEffect]) -> Dynamics {
         let model = fitted.model.with_effects(fitted.effects_and(more));
         self.compiled(&model)
     }
 
-    /// A model compiled for the errors that the study compares, with its smoothing of friction.
+    /// A model compiled for the errors that the problem compares, with its smoothing of friction.
     pub(super) fn compiled(&self, model: &Model) -> Dynamics {
         self.space.compile(&self.smoothed(model))
     }
