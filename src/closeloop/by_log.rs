@@ -22,14 +22,11 @@ pub struct OfLog {
     pub errors: Vec<f64>,
 }
 
-/// More logs than this are not fitted one by one, and of more than this the errors of each on each are left out.
-const MOST_FITTED: usize = 32;
-const MOST_CROSSED: usize = 8;
-
 impl Problem<'_> {
     /// The chosen model by log; nothing for a single log.
     pub(super) fn by_log(&self, chosen: &Fitted, watch: &dyn Watch) -> Vec<OfLog> {
-        if !(2..=MOST_FITTED).contains(&self.logs.len()) || watch.has_to_end() {
+        let most = self.settings.score.most_logs_fitted_alone;
+        if !(2..=most).contains(&self.logs.len()) || watch.has_to_end() {
             return Vec::new();
         }
         let of_log = |log: &Log| {
@@ -58,7 +55,7 @@ impl Problem<'_> {
     }
 
     fn crossed(&self, fitted: &Fitted) -> Vec<f64> {
-        let logs = if self.logs.len() > MOST_CROSSED {
+        let logs = if self.logs.len() > self.settings.score.most_logs_crossed {
             &[]
         } else {
             self.logs

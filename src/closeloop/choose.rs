@@ -10,12 +10,6 @@ use crate::model::Model;
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, torque_error};
 
-/// A window in which a joint moves by less than this share of its farthest way (as squares) is one at rest.
-const AT_REST: f64 = 1e-2;
-
-/// With more joints than this a fit of the motion takes minutes before any search begins, and torques are compared.
-const FITTED_JOINTS: usize = 3;
-
 impl Problem<'_> {
     /// Whether a controller prescribes the motion, so that the declared model, with the friction that most machines have,
     /// explains far more of the torques than of half a second of open-loop motion, or so many joints move that no other errors
@@ -33,10 +27,10 @@ impl Problem<'_> {
             .with_effects([own, friction.as_slice()].concat());
         let fitted = fit_torques(&self.smoothed(&model), self.declared, self.logs).ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
-        if self.declared.joints > FITTED_JOINTS {
+        if self.declared.joints > self.settings.fit.most_joints_by_motion {
             return Some(true);
         }
-        let far = self.settings.fit.prescribed * torque;
+        let far = self.settings.fit.motion_over_torque * torque;
         if self.motion_error(&fitted.model) < far {
             return Some(false);
         }
@@ -63,7 +57,7 @@ impl Problem<'_> {
             let moving = errors
                 .iter()
                 .zip(&ways)
-                .filter(|(_, way)| **way > AT_REST * farthest);
+                .filter(|(_, way)| **way > self.settings.fit.at_rest_share * farthest);
             let shares: Vec<f64> = moving.map(|(error, way)| error.position[j] / way).collect();
             upper_median(&shares)
         };

@@ -185,7 +185,7 @@ impl Evidence {
     /// The p-value of the values or, where they say little, the smaller one.
     fn p(&self, settings: &EstablishSettings) -> f64 {
         let alone = self.p_alone();
-        match alone < settings.significant_alone {
+        match alone < settings.uncorrected_false_alarm {
             true => alone,
             false => alone.min(self.p_of_falls),
         }
@@ -196,9 +196,9 @@ impl Evidence {
         #[allow(clippy::cast_precision_loss)] // few trials
         let level = settings.false_alarm / trials.max(1) as f64;
         let p = self.p(settings);
-        let significant =
-            self.p_alone() < level || self.gain > settings.plain && p < settings.significant_alone;
-        if self.gain < settings.worthwhile {
+        let significant = self.p_alone() < level
+            || self.gain > settings.plain_gain && p < settings.uncorrected_false_alarm;
+        if self.gain < settings.worthwhile_gain {
             return Some(format!(
                 "it lowers the loss on left-out stretches by {:.1} % only",
                 100.0 * self.gain
@@ -209,8 +209,8 @@ impl Evidence {
                 "p = {p:.2e} is too large among {trials} candidates"
             ));
         }
-        let confirmed =
-            self.p_of_falls <= settings.confirmed || self.crossed_gain >= settings.plain;
+        let confirmed = self.p_of_falls <= settings.confirming_false_alarm
+            || self.crossed_gain >= settings.plain_gain;
         (!confirmed).then(|| {
             format!(
                 "with values fitted to one half of the stretches it changes the loss on the other by {:.0} % (p = {:.2})",

@@ -26,9 +26,6 @@ pub struct Declared<'a> {
 /// The declared model, fitted to its motion, and what the logs determine of it.
 type ByMotion = (Fitted, Identifiability);
 
-/// So many fits that begin at values around the declared ones are compared: one alone may end in a local minimum.
-const FITTED_AROUND: usize = 3;
-
 /// Nothing can be found in it.
 pub(super) static NOTHING: Library = Library::empty();
 
@@ -121,7 +118,7 @@ impl<'a> Problem<'a> {
             let found = fit_torques(&model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))
         };
-        let shares = self.settings.fit.sign_widths;
+        let shares = self.settings.fit.wider_sign_shares;
         let tried: Vec<(Vec<f64>, Vec<f64>)> =
             shares.iter().map(fitted).collect::<Result<_, FitError>>()?;
         for (j, width) in best.iter_mut().enumerate() {
@@ -134,7 +131,9 @@ impl<'a> Problem<'a> {
     /// The best of a few fits that begin at values around the declared ones, and where it began.
     fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, ByMotion)> {
         let fit = |start: Model| Some((self.fitted_from(&start, friction).ok()?, start));
-        let found = around(self).filter_map(fit).take(FITTED_AROUND);
+        let found = around(self)
+            .filter_map(fit)
+            .take(self.settings.fit.fitted_starts);
         let (found, start) = found.min_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)))?;
         Some((start, found))
     }

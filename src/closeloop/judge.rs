@@ -51,7 +51,7 @@ pub(super) fn judge<'a>(
         }
     }
     let gravity = shares_of_gravity(&problem);
-    if against_gravity(&gravity).is_some() {
+    if against_gravity(&gravity, &problem.settings.notes).is_some() {
         demote(&mut chosen.standings, |_| Some(ANOTHER_GRAVITY.into()));
     }
     chosen.mark(&problem);
@@ -88,11 +88,12 @@ impl Chosen {
             of.on(effect) / declared.on(effect).max(f64::MIN_POSITIVE)
         };
         let masks = |effect: &FittedEffect| {
-            remainder.matters_on(problem, effect.joint) && left(&with, effect) > settings.masking
+            remainder.matters_on(problem, effect.joint)
+                && left(&with, effect) > settings.masking_share
         };
         let is_outweighed = |standing: &Standing| {
             let effect = &standing.effect;
-            let least = settings.outweighed * remainder.fraction_on(problem, effect.joint);
+            let least = settings.outweighed_share * remainder.fraction_on(problem, effect.joint);
             let without = standing.without.as_ref();
             let without = without.map(|without| Loss::of(problem, without));
             without.is_ok_and(|without| left(&without, effect) - left(&with, effect) < least)

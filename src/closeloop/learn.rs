@@ -109,12 +109,12 @@ impl NetworkCheck {
     fn of(errors: &[[f64; 2]], settings: &LearnSettings) -> Self {
         let ratio = |[without, with]: &[f64; 2]| with / without;
         let total = |k: usize| errors.iter().map(|e| e[k].powi(2)).sum::<f64>().sqrt();
-        let harms = errors.iter().any(|e| ratio(e) > settings.harmful);
+        let harms = errors.iter().any(|e| ratio(e) > settings.harmful_ratio);
         Self {
             without: errors.iter().map(|e| e[0]).collect(),
             with: errors.iter().map(|e| e[1]).collect(),
             // Not a number where a prediction is none: then it is not used.
-            used: !harms && total(1) <= settings.helpful * total(0),
+            used: !harms && total(1) <= settings.helpful_ratio * total(0),
             failure: None,
         }
     }
@@ -175,7 +175,7 @@ type Train<'a> = dyn FnMut(&[Log]) -> Result<Option<Box<dyn LearnedResidual>>, L
 /// Whether networks help on parts of the logs that they were not trained on. `None` where the logs are too few to train one.
 fn checked(problem: &Problem<'_>, fitted: &Fitted, train: &mut Train<'_>) -> Option<NetworkCheck> {
     let settings = &problem.settings.learn;
-    let parts = parts(problem.logs, settings.parts);
+    let parts = parts(problem.logs, settings.check_parts);
     let horizon_s = [problem.settings.score.middle_s()];
     let error = |model: &Dynamics, logs: &[Log]| assess(model, logs, &horizon_s).position_rms();
     let mut errors = Vec::new();
@@ -226,7 +226,7 @@ fn task(
     let stretches = logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
     for (k, stretch) in stretches.enumerate() {
-        match (k + 1).is_multiple_of(settings.every) {
+        match (k + 1).is_multiple_of(settings.validation_every) {
             true => validation.push(stretch),
             false => training.push(stretch),
         }

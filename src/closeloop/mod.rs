@@ -71,8 +71,8 @@ pub use score::{
 pub use select::{Rival, Round, Selected, Tried, candidates, screen, select};
 pub use settings::{
     CalibrateSettings, CurveSettings, DiscriminateSettings, EstablishSettings, FitSettings,
-    LearnSettings, ProposalSettings, RefineSettings, RemainderSettings, ScoreSettings,
-    SelectSettings, Settings, SplitSettings, VerdictSettings,
+    LearnSettings, NoteSettings, ProposalSettings, RefineSettings, RemainderSettings,
+    ScoreSettings, SelectSettings, Settings, SplitSettings, VerdictSettings,
 };
 pub use space::Space;
 pub(crate) use split::between;

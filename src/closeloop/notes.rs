@@ -24,14 +24,18 @@ pub(super) fn noted(
     let [mut of_train, mut of_test] =
         [&prepared.train, &prepared.test].map(|ready| ready.audits.clone());
     problem.tell_reversed(usual, &mut of_train);
-    tell_gravity(&found.gravity, &mut of_train);
+    tell_gravity(&found.gravity, &problem.settings.notes, &mut of_train);
     tell_too_many(problem, &mut of_train);
     // A model that diverges over the logs has no residual force to see a push in.
     if let Ok(residual) = &remainder.after {
         tell_pushes(problem, &residual.samples, &mut of_train);
     }
     let tested = problem.on(&prepared.test.for_fits);
-    tell_gravity(&shares_of_gravity(&tested), &mut of_test);
+    tell_gravity(
+        &shares_of_gravity(&tested),
+        &problem.settings.notes,
+        &mut of_test,
+    );
     if let Ok(forces) = residual_force(&tested, &found.chosen.after) {
         tell_pushes(&tested, &forces, &mut of_test);
     }
@@ -52,7 +56,7 @@ fn tell_too_many(problem: &Problem<'_>, audits: &mut [Audit]) {
             "{} has a value for each log and is not looked for in {} logs, but in at most {}: give fewer if the logs may differ by it",
             effect.name,
             problem.logs.len(),
-            problem.settings.select.most_by_log
+            problem.settings.select.most_logs_of_own_values
         );
         audit.add(Finding::new(Severity::Warning, text));
     }

@@ -11,10 +11,6 @@ use crate::data::Joint;
 use crate::identify::Fit;
 use crate::model::{Effect, Entry, FittedEffect, Status};
 
-/// Masses of loads that fits start from, in those of the last body: a fit from a light one may end where the bodies stand for
-/// the load.
-const MASSES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
-
 /// What a fit costs, with what the declared values do.
 fn whole(fit: &Fit) -> f64 {
     fit.cost + fit.departure
@@ -52,7 +48,7 @@ impl Problem<'_> {
         let settings = &self.settings.establish;
         let p_value = p_of(2.0 * saved, effect.parameters.len());
         let is_clear =
-            saved > settings.of_departure * chosen.fit.departure && p_value < settings.false_alarm;
+            saved > settings.payload_share * chosen.fit.departure && p_value < settings.false_alarm;
         let effect = with.model.effects.last()?.clone();
         is_clear.then(|| {
             let standing = Standing {
@@ -68,12 +64,7 @@ impl Problem<'_> {
     }
 
     /// Loads of some masses, at the place where they change the last body's first moments as the chosen model did.
-    fn loads(
-        &self,
-        chosen: &Fitted,
-        effect: &Effect,
-        tip: Joint,
-    ) -> Option<[FittedEffect; MASSES.len()]> {
+    fn loads(&self, chosen: &Fitted, effect: &Effect, tip: Joint) -> Option<[FittedEffect; 4]> {
         let last = *self.declared.inertias().last()?;
         let declared = |part: usize| self.declared.parameters[last[part]].value;
         let fitted = |part: usize| chosen.model.parameters[last[part]].value;
@@ -91,7 +82,7 @@ impl Problem<'_> {
             }
             load
         };
-        Some(MASSES.map(load))
+        Some(self.settings.establish.payload_masses.map(load))
     }
 
     /// The chosen model with a load, fitted from the declared bodies: those of the chosen model stand for the load already.

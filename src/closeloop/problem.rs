@@ -91,7 +91,7 @@ impl<'a> Problem<'a> {
         let FitSettings {
             window_s,
             sample_windows,
-            sign_width,
+            sign_width_share,
             ..
         } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
@@ -116,7 +116,7 @@ impl<'a> Problem<'a> {
         let by_speed = || {
             top_speed
                 .iter()
-                .map(|speed| sign_width * speed.max(1e-6))
+                .map(|speed| sign_width_share * speed.max(1e-6))
                 .collect()
         };
         let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);

@@ -82,10 +82,13 @@ impl<'a> Problem<'a> {
     /// the model file gives stays, and so do parameters that the logs do not determine: the intervals of the others are
     /// relative to them.
     pub fn refined(&self) -> Self {
-        let RefineSettings { step_s, narrower } = self.settings.refine;
+        let RefineSettings {
+            step_s,
+            sign_width_factor: narrower,
+        } = self.settings.refine;
         let narrower = self.declared.sign_width.as_ref().map_or(narrower, |_| 1.0);
         let of_joint =
-            |(width, top): (&f64, &f64)| match *width > self.settings.fit.sign_width * top {
+            |(width, top): (&f64, &f64)| match *width > self.settings.fit.sign_width_share * top {
                 // Friction of the rig reverses over it.
                 true => *width,
                 false => narrower * width,

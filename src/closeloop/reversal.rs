@@ -21,13 +21,13 @@ impl Problem<'_> {
         if self.space == Space::Torque || self.declared.sign_width.is_some() {
             return None;
         }
-        let enough = 1.0 - self.settings.select.step;
+        let enough = 1.0 - self.settings.select.round_gain;
         let first = Loss::of(self, fitted).total();
         let (mut best, mut least) = (self.sign_widths.clone(), first);
         for joint in Joint::all(self.declared.joints) {
             let before = best.clone();
             let reverses = reversing(fitted, &before);
-            for share in self.settings.fit.sign_widths {
+            for share in self.settings.fit.wider_sign_shares {
                 let mut widths = before.clone();
                 widths[joint] = share * self.top_speed[joint].max(1e-6);
                 let is_wider = widths[joint] > before[joint];

@@ -4,9 +4,6 @@ use super::fitted::Fitted;
 use super::problem::Problem;
 use crate::data::{Audit, Log, Remedy, reversed_driving};
 
-/// The torques have the opposite sign where the model leaves this share of its loss with all of them reversed: half the error.
-const MUCH_LESS: f64 = 0.25;
-
 impl Problem<'_> {
     /// Add to the audits of the problem's logs that their torques, or commands, look reversed on all joints at once. The audit
     /// of a log alone tells so of single joints, where the acceleration follows them closely; here the model tells.
@@ -21,7 +18,7 @@ impl Problem<'_> {
             return;
         };
         let share = other.loss() / usual.loss().max(f64::MIN_POSITIVE);
-        if share < MUCH_LESS {
+        if share < self.settings.notes.reversed_loss {
             let columns = &self.declared.columns;
             let driven_by = self.declared.driven_by();
             for audit in audits {

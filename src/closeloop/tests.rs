@@ -272,11 +272,11 @@ fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
     let outcome = |significance: f64| {
         let mut request = Request::of(&declared, &library, logs());
         // Every effect counts as worse, and every remainder as noteworthy.
-        request.settings.verdict.worse = 0.0;
-        request.settings.establish.masking = f64::INFINITY;
-        request.settings.establish.outweighed = 0.0;
+        request.settings.verdict.trusted_rise = 0.0;
+        request.settings.establish.masking_share = f64::INFINITY;
+        request.settings.establish.outweighed_share = 0.0;
         let remainder = &mut request.settings.remainder;
-        (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
+        (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
         remainder.significance = significance;
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         close_loop(request, &mut rng, &()).unwrap()
@@ -298,9 +298,9 @@ fn an_effect_that_a_remainder_outweighs_is_not_established() {
     let (declared, library) = (pendulum(), Library::built_in());
     let mut request = Request::of(&declared, &library, logs());
     let remainder = &mut request.settings.remainder;
-    (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
+    (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
     remainder.significance = 2.0;
-    request.settings.establish.outweighed = f64::INFINITY;
+    request.settings.establish.outweighed_share = f64::INFINITY;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let outcome = close_loop(request, &mut rng, &()).unwrap();
     assert!(outcome.effects.findings.is_empty());
@@ -333,7 +333,7 @@ fn without_effects_the_error_reduction_is_zero() {
     let (declared, library) = (pendulum(), Library::built_in());
     let mut request = Request::of(&declared, &library, logs());
     request.settings.select.most_effects = 0;
-    request.settings.select.most_of_joint = 0;
+    request.settings.select.most_effects_per_joint = 0;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let outcome = close_loop(request, &mut rng, &()).unwrap();
     assert!(outcome.effects.findings.is_empty());
@@ -354,7 +354,7 @@ fn a_changed_setting_changes_the_search() {
     let mut settings = Settings::default();
     assert_eq!(named(&settings), 1);
     settings.select.most_effects = 0;
-    settings.select.most_of_joint = 0;
+    settings.select.most_effects_per_joint = 0;
     assert_eq!(named(&settings), 0);
 }
 

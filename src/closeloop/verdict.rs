@@ -33,10 +33,10 @@ pub(super) fn verdict(
     let added = problem.added(&found.chosen.after.model).len();
     let established = found.chosen.established();
     let [before, after] = errors.compared(problem.space);
-    let are_worse = after > problem.settings.verdict.worse * before;
+    let are_worse = after > problem.settings.verdict.trusted_rise * before;
     match at_rest(problem)
         .or_else(|| failure(found, refined))
-        .or_else(|| against_gravity(&found.gravity))
+        .or_else(|| against_gravity(&found.gravity, &problem.settings.notes))
         .or_else(|| inconclusive(problem, &refined.identifiability))
     {
         Some(reason) => (Verdict::Inconclusive, reason),

@@ -156,7 +156,7 @@ impl<'a> Baseline<'a> {
             calibrate,
             ..
         } = &self.problem.settings;
-        let power = calibrate.power;
+        let power = calibrate.power_quantile;
         let information = own_information(fit, calibrate.own_information)?;
         let known = uncertainty(&self.problem.shooting, fit);
         let last = fit.columns.len() - 1;
@@ -166,8 +166,8 @@ impl<'a> Baseline<'a> {
             let worthwhile = (2.0 * self.loss * gain / (1.0 - gain) / information).sqrt();
             Some(significant.max(worthwhile) + power * deviation)
         };
-        let plain = needed(settings.significant_alone, settings.plain)?;
-        Some(needed(level, settings.worthwhile)?.min(plain))
+        let plain = needed(settings.uncorrected_false_alarm, settings.plain_gain)?;
+        Some(needed(level, settings.worthwhile_gain)?.min(plain))
     }
 
     /// The accepted model with one more free value, a switch of the effect, at zero.

@@ -152,7 +152,7 @@ impl<'a> Calibrator<'a> {
             return Err(StudyError::NotOfMotion);
         }
         let limits = detection_limits(problem, accepted)?;
-        let multiple = problem.settings.calibrate.hidden;
+        let multiple = problem.settings.calibrate.hidden_multiple;
         let common = limits.iter().filter_map(|limit| hidden(limit, multiple));
         let all = std::iter::repeat_n(None, runs).chain(common.map(Some));
         let seed = rng.random();
@@ -227,7 +227,7 @@ impl<'a> Calibrator<'a> {
             named,
             unexplained,
             limits: self.limits,
-            hidden: self.problem.settings.calibrate.hidden,
+            hidden: self.problem.settings.calibrate.hidden_multiple,
             top_torque: self.problem.top_torque.clone(),
         }
     }

@@ -81,7 +81,7 @@ impl<'a> SimulatedLogs<'a> {
 /// The rows of the windows alone. Before each stands one row at the edge of what the estimate of its start state
 /// reads, and before that a pause that no estimate and no window spans.
 fn apart(problem: &Problem<'_>) -> Vec<Log> {
-    let pause = problem.settings.calibrate.pause;
+    let pause = problem.settings.calibrate.pause_half_widths;
     let windows = &problem.shooting.windows;
     let stretch = |index: usize, log: &Log| {
         let reach = half_width_s(log.median_step());

@@ -6,7 +6,7 @@ use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
-use crate::closeloop::settings::DiscriminateSettings;
+use crate::closeloop::settings::{DiscriminateSettings, Settings};
 use crate::data::{Joint, Log};
 use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect, Model};
@@ -22,7 +22,7 @@ impl Hypothesis {
     pub fn new(problem: &Problem<'_>, model: &Model) -> Self {
         Self {
             dynamics: problem.smoothed(model).dynamics(),
-            scale: problem.settings.discriminate.scale,
+            scale: problem.settings.discriminate.refit_scale,
         }
     }
 
@@ -52,8 +52,11 @@ impl Hypothesis {
 
     /// The motion that it predicts; `None` where it diverges.
     fn simulate(&self, problem: &Problem<'_>, motions: &[Motion]) -> Option<Record> {
-        let window_s = problem.settings.fit.window_s;
-        Record::of(motions, problem.logs, &self.dynamics, window_s)
+        let Settings {
+            fit, discriminate, ..
+        } = problem.settings;
+        let lengths_s = (fit.window_s, discriminate.pause_s);
+        Record::of(motions, problem.logs, &self.dynamics, lengths_s)
     }
 
     /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
@@ -111,7 +114,7 @@ impl<'a> Comparison<'a> {
         let settings = &problem.settings.discriminate;
         let noise = &problem.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
-            .map(|noise| (noise * fitted.fit.scale).max(settings.finest))
+            .map(|noise| (noise * fitted.fit.scale).max(settings.finest_position))
             .collect();
         let motions: Vec<Motion> = spread(problem.shooting.windows.len(), settings.present_windows)
             .into_iter()
@@ -165,7 +168,7 @@ impl<'a> Comparison<'a> {
         Payload::all(
             &truth.dynamics,
             declared,
-            self.settings().payload,
+            self.settings().payload_share,
             2.0 * latest_s + 10.0,
         )
     }
@@ -210,7 +213,7 @@ impl<'a> Comparison<'a> {
     }
 
     fn is_possible(&self, record: &Record, turns: Option<Joint>) -> bool {
-        let fastest = self.settings().fastest;
+        let fastest = self.settings().top_speeds;
         let slow = |log: &Log| {
             let mut joints = log.qd.iter().zip(&self.problem.top_speed);
             joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= fastest * top))

@@ -3,9 +3,6 @@ use crate::closeloop::fitted::Fitted;
 use crate::closeloop::problem::Problem;
 use crate::data::{Joint, Quantity, row_after};
 
-/// Rows of a motion at most, where those of the log are denser than any motion needs.
-const MOST_ROWS: f64 = 1e5;
-
 /// The torque, or the command, of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Drive {
@@ -233,10 +230,10 @@ impl MenuItem {
         let window = problem.shooting.windows[w];
         let log = &problem.logs[window.log];
         let length_s = match self.drive {
-            Drive::Ramps(_) => settings.ramps_s,
+            Drive::Ramps(_) => settings.ramp_period_s,
             _ => settings.motion_s,
         };
-        let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / MOST_ROWS);
+        let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / settings.most_rows);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (length_s / step_s).round() as usize;
         let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);
@@ -264,8 +261,9 @@ impl MenuItem {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
                 Drive::Added(share) => with(logged, joint, share * problem.top_driving[joint]),
                 Drive::Ramps(share) => {
-                    let ramp =
-                        share * problem.top_driving[joint] * triangle(since / settings.ramps_s);
+                    let ramp = share
+                        * problem.top_driving[joint]
+                        * triangle(since / settings.ramp_period_s);
                     with(logged.map(|_| 0.0), joint, ramp)
                 }
                 Drive::Nothing => logged.map(|_| 0.0).collect(),

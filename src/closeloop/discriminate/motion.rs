@@ -18,10 +18,6 @@ pub(super) struct Motion {
     pub tau: Vec<Vec<f64>>,
 }
 
-/// Between motions of one log the rig stands for so long (s) under the torque that the next begins with: longer than
-/// any memory of its drive.
-const PAUSE_S: f64 = 2.0;
-
 /// Simulated logs, each of motions one after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Record {
@@ -35,13 +31,14 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`. What differs by log is as
+    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`; the rig stands for
+    /// `pause_s` between two of one log. What differs by log is as
     /// it is there. `None` where the model diverges.
     pub fn of(
         motions: &[Motion],
         logs: &[Log],
         dynamics: &Dynamics,
-        length_s: f64,
+        (length_s, pause_s): (f64, f64),
     ) -> Option<Self> {
         let mut record = Self {
             logs: Vec::new(),
@@ -51,7 +48,7 @@ impl Record {
         };
         for motion in motions {
             let index = record.log_of(motion.log, &logs[motion.log]);
-            let first = append(&mut record.logs[index], motion);
+            let first = append(&mut record.logs[index], motion, pause_s);
             let model = dynamics.in_log(&logs[motion.log]);
             simulate(&mut record.logs[index], first, &motion.start, &model)?;
             let log = &record.logs[index];
@@ -114,13 +111,13 @@ impl Record {
 }
 
 /// Add the torques of a motion to a log, after a pause; the row at which it begins.
-fn append(log: &mut Log, motion: &Motion) -> usize {
+fn append(log: &mut Log, motion: &Motion, pause_s: f64) -> usize {
     let earliest = log
         .time
         .last()
-        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * PAUSE_S);
+        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * pause_s);
     let delay = (earliest - motion.time[0]).max(0.0);
-    let pause = (motion.time[0] - PAUSE_S, &motion.tau[0]);
+    let pause = (motion.time[0] - pause_s, &motion.tau[0]);
     let rows = motion.time.iter().copied().zip(&motion.tau);
     for (time, tau) in std::iter::once(pause).chain(rows) {
         log.time.push(time + delay);

@@ -96,11 +96,11 @@ impl Separation {
 impl Trial {
     /// Length in s by which experiments are ranked: short ones are equal.
     fn worth(&self, settings: &DiscriminateSettings) -> f64 {
-        self.seconds.max(settings.short_s)
+        self.seconds.max(settings.equally_short_s)
     }
 
     fn tells(&self, settings: &DiscriminateSettings) -> bool {
-        self.seconds < settings.long_s && self.deviation() > settings.visible
+        self.seconds < settings.longest_s && self.deviation() > settings.visible_share
     }
 
     fn deviation(&self) -> f64 {

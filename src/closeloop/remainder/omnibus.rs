@@ -73,7 +73,7 @@ pub fn omnibus(
             let [declared, found] =
                 [before, after].map(|fitted| TorqueNoise::new(problem, &fitted.model, &chosen));
             let test = Test::new(problem, declared.residuals(), found.residuals());
-            test.against(settings.torque_draws, rng, |rng| found.draw(rng))
+            test.against(settings.torque_noise_draws, rng, |rng| found.draw(rng))
         }
     }
 }

@@ -70,7 +70,7 @@ pub fn proposal(problem: &Problem<'_>, fitted: &Fitted, left: &Unexplained) -> O
     if !left.is_significant() {
         return None;
     }
-    let noteworthy = problem.settings.remainder.noteworthy;
+    let noteworthy = problem.settings.remainder.noteworthy_share;
     let without = Losses::of(problem, fitted).of_joint(left.joint);
     let mut found: Option<Sum> = None;
     for _ in 0..problem.settings.proposal.most_terms {
@@ -119,7 +119,7 @@ fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -
         })
         .collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
-    screened.truncate(problem.settings.proposal.fitted);
+    screened.truncate(problem.settings.proposal.fitted_terms);
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {

@@ -67,7 +67,7 @@ impl Unexplained {
 
     /// Whether a significant remainder is one of what a joint is judged by.
     pub fn matters_on(&self, problem: &Problem<'_>, joint: Joint) -> bool {
-        let least = problem.settings.remainder.noteworthy;
+        let least = problem.settings.remainder.noteworthy_share;
         problem.space == Space::Motion || self.omnibus.shares[joint] > least
     }
 }
@@ -101,7 +101,7 @@ pub fn unexplained(
     let asked = probed.len().max(1) as f64;
     let seen = probed
         .iter()
-        .filter(|p| p.gain > problem.settings.remainder.noteworthy);
+        .filter(|p| p.gain > problem.settings.remainder.noteworthy_share);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
     let (place, joint) = place(problem, &omnibus, &probed);
     Unexplained {
@@ -136,22 +136,24 @@ fn ask(
 fn place(problem: &Problem<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
     let RemainderSettings {
         significance,
-        noteworthy,
-        located,
-        unlocated,
+        noteworthy_share,
+        located_share,
+        unlocated_share,
         ..
     } = problem.settings.remainder;
     #[allow(clippy::cast_precision_loss)] // few probes
     let level = 0.5 * significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
-    let matters = noteworthy.max(located * share);
+    let matters = noteworthy_share.max(located_share * share);
     // What friction leaves of low-passed torques near its reversals is located by the velocity.
-    let is_smoothing =
-        |joint: Joint| problem.space == Space::Torque && omnibus.fractions[joint] <= unlocated;
+    let is_smoothing = |joint: Joint| {
+        problem.space == Space::Torque && omnibus.fractions[joint] <= unlocated_share
+    };
     let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters && !is_smoothing(p.joint);
     let most = probed.iter().filter(stands_out);
-    let structured =
-        omnibus.p_value < 0.5 * significance && share > noteworthy && omnibus.fraction > unlocated;
+    let structured = omnibus.p_value < 0.5 * significance
+        && share > noteworthy_share
+        && omnibus.fraction > unlocated_share;
     match most.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
         Some(most) => (most.place.clone(), most.joint),
         None if structured => (UNKNOWN.to_owned(), joint),

@@ -33,7 +33,8 @@ impl Ahead {
     pub fn is_worse_than(&self, other: &Self, settings: &SelectSettings) -> bool {
         let rises = differences(&self.squares, &other.squares);
         let rise = rises.iter().sum::<f64>() / other.squares.iter().sum::<f64>();
-        mean(&rises) > settings.worse_by * standard_error(&rises) && rise > settings.worse
+        mean(&rises) > settings.worse_standard_errors * standard_error(&rises)
+            && rise > settings.worse_share
     }
 }
 

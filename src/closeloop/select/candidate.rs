@@ -47,7 +47,7 @@ fn is_told_by_bodies(problem: &Problem<'_>, effect: &Effect) -> bool {
 
 /// An effect with a value for each log, of more logs than those are looked for in.
 pub fn is_of_too_many(problem: &Problem<'_>, effect: &Effect) -> bool {
-    problem.logs.len() > problem.settings.select.most_by_log
+    problem.logs.len() > problem.settings.select.most_logs_of_own_values
         && effect.parameters.iter().any(|parameter| parameter.per_log)
 }
 

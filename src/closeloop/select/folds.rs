@@ -9,6 +9,8 @@ pub struct Folds {
     pub stretches: Vec<usize>,
     /// The group of each stretch: its log or, where there are few logs, a part of it.
     pub groups: Vec<usize>,
+    /// What is known of each value without its group, as a share of the information of all.
+    kept_information: f64,
 }
 
 impl Folds {
@@ -29,7 +31,11 @@ impl Folds {
             log * parts + (stretch - first) * parts / own
         };
         let groups = log_of.iter().enumerate().map(group).collect();
-        Self { stretches, groups }
+        Self {
+            stretches,
+            groups,
+            kept_information: problem.settings.select.kept_information,
+        }
     }
 
     /// The same stretches, each left out alone.
@@ -104,7 +110,7 @@ pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
     let step = |part: &WindowTerms| {
         // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
         let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
-        step_without(&all.hessian, &part.hessian, &own)
+        step_without(&all.hessian, &part.hessian, &own, folds.kept_information)
     };
     groups.iter().map(step).collect()
 }
@@ -115,17 +121,22 @@ fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
 }
 
 /// The step of the free values when a part of the windows, with this gradient where they stand, is left out of a fit.
-/// Directions that little else determines hardly move.
+/// Directions of which little more than `kept_information` is known otherwise, as a share of all, hardly move.
 pub fn step_without(
     all: &DMatrix<f64>,
     part: &DMatrix<f64>,
     gradient: &DVector<f64>,
+    kept_information: f64,
 ) -> DVector<f64> {
     // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
     let (_, unit) = with_unit_diagonal(all);
     let rest = DMatrix::from_fn(unit.len(), unit.len(), |i, j| {
         let known = (all[(i, j)] - part[(i, j)]) * unit[i] * unit[j];
-        if i == j { known + KNOWN } else { known }
+        if i == j {
+            known + kept_information
+        } else {
+            known
+        }
     });
     match rest.cholesky() {
         Some(factor) => factor
@@ -134,7 +145,3 @@ pub fn step_without(
         None => DVector::zeros(unit.len()),
     }
 }
-
-/// What is known of each value without the windows that are left out, as a share of the information of all: what they
-/// alone determine stays where it is.
-const KNOWN: f64 = 1e-2;

@@ -32,6 +32,9 @@ pub struct Outlook {
     all: WindowTerms,
     /// What the logs alone tell.
     information: DMatrix<f64>,
+    /// Of the settings.
+    own_information: f64,
+    kept_information: f64,
 }
 
 /// A set of items, in rising order.
@@ -129,6 +132,8 @@ impl Outlook {
             groups_of: folds.groups,
             all: fit.equations_and_prior(),
             information: fit.equations().hessian,
+            own_information: problem.settings.select.own_information,
+            kept_information: problem.settings.select.kept_information,
             items,
             present,
             columns_of,
@@ -157,7 +162,12 @@ impl Outlook {
         let without = |group: &WindowTerms| {
             let gradient =
                 group.gradient.select_rows(free) + sub(&group.hessian, free, &rows) * &at;
-            let step = step_without(&all, &sub(&group.hessian, free, free), &gradient);
+            let step = step_without(
+                &all,
+                &sub(&group.hessian, free, free),
+                &gradient,
+                self.kept_information,
+            );
             let mut there = at.clone();
             there.rows_mut(0, free.len()).add_assign(&step);
             there
@@ -195,7 +205,8 @@ impl Outlook {
         }
         let mut minimum = Minimum { free, held, moved };
         let told = [&self.told, &minimum.free[self.base.len()..]].concat();
-        if !tells_apart(&sub(&self.information, &told, &told), self.told.len()) {
+        let information = sub(&self.information, &told, &told);
+        if !tells_apart(&information, self.told.len(), self.own_information) {
             return None;
         }
         loop {
@@ -247,7 +258,7 @@ fn together(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss
     )] // at most the root of 2^28
-    let values = (NUMBERS as f64 / equations as f64).sqrt() as usize;
+    let values = (problem.settings.select.most_numbers as f64 / equations as f64).sqrt() as usize;
     let room = values.saturating_sub(fitted.fit.columns.len());
     let switches = |option: &FittedEffect| {
         let parameters = option.effect.parameters.iter();
@@ -271,8 +282,8 @@ fn together(
 }
 
 /// Whether the logs tell the values after the first `base` ones from each other and from those: the information of each
-/// that is left when those before it are free.
-pub fn tells_apart(matrix: &DMatrix<f64>, base: usize) -> bool {
+/// that is left when those before it are free, as a share of its own, is at least so much.
+pub fn tells_apart(matrix: &DMatrix<f64>, base: usize, least: f64) -> bool {
     let (mut scaled, _) = with_unit_diagonal(matrix);
     for i in 0..scaled.nrows() {
         scaled[(i, i)] += RIDGE;
@@ -281,9 +292,7 @@ pub fn tells_apart(matrix: &DMatrix<f64>, base: usize) -> bool {
         return false;
     };
     let own = factor.l_dirty().diagonal();
-    own.iter()
-        .skip(base)
-        .all(|own| own.powi(2) > OWN_INFORMATION)
+    own.iter().skip(base).all(|own| own.powi(2) > least)
 }
 
 fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
@@ -292,12 +301,8 @@ fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64>
     })
 }
 
-/// Numbers in the normal equations of all windows and candidates at most: 2 GB.
-const NUMBERS: usize = 1 << 28;
 /// Smallest information of a direction, in units in which each value alone has 1: items that say the same share it.
 const RIDGE: f64 = 1e-9;
-/// An effect of which less than this share of the information is its own is not told from the rest of the model.
-const OWN_INFORMATION: f64 = 1e-4;
 
 fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let (mut scaled, unit) = with_unit_diagonal(matrix);

@@ -70,14 +70,16 @@ fn instead_of(
         })
         .collect();
     options.sort_by(|a, b| a.0.total_cmp(&b.0));
-    options.retain(|(loss, _)| *loss <= settings.slack * settings.as_little * chosen.loss());
-    options.truncate(settings.rivals);
+    options.retain(|(loss, _)| {
+        *loss <= settings.prediction_slack * settings.rival_loss * chosen.loss()
+    });
+    options.truncate(settings.rivals_per_effect);
     let own = |trial: &Trial| trial.losses.of_effect(present);
     let gain = |trial: &Trial| gain(&own(less), &own(trial));
     let rival = |(_, effect): &(f64, &FittedEffect)| {
         let mut effects = chosen.fitted.model.effects.clone();
         effects[declared + k] = (*effect).clone();
-        let below = settings.as_little * chosen.loss();
+        let below = settings.rival_loss * chosen.loss();
         let fitted = problem.with_better_effects(&chosen.fitted, effects, below)?;
         let trial = Trial::of(problem, fitted);
         let is_as_good = is_as_good([&trial, chosen, less], present, settings);
@@ -104,7 +106,7 @@ fn is_as_good(
     let sum = |losses: &[f64]| losses.iter().sum::<f64>();
     let differences = differences(&trial, &chosen);
     let saved = |losses: &[f64]| sum(&less) - sum(losses);
-    mean(&differences) <= settings.as_good * standard_error(&differences)
-        && saved(&trial) > settings.as_much * saved(&chosen)
-        && sum(&trial) <= settings.as_little * sum(&chosen)
+    mean(&differences) <= settings.rival_standard_errors * standard_error(&differences)
+        && saved(&trial) > settings.rival_saving * saved(&chosen)
+        && sum(&trial) <= settings.rival_loss * sum(&chosen)
 }

@@ -128,7 +128,7 @@ impl<'a> Search<'a> {
     fn rounds_from(&mut self, mut best: Trial) -> Result<Trial, FitError> {
         let problem = self.problem;
         let mut passed = vec![best.key()];
-        for _ in 0..problem.settings.select.rounds {
+        for _ in 0..problem.settings.select.most_rounds {
             if self.watch.has_to_end() {
                 break;
             }
@@ -148,14 +148,15 @@ impl<'a> Search<'a> {
     /// wrong effect may be little more than that effect's error.
     fn next(&mut self, best: &Trial) -> Option<Trial> {
         let settings = &self.problem.settings.select;
-        let added = self.better(best, settings.step, Self::round);
-        let is_large = |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large);
+        let added = self.better(best, settings.round_gain, Self::round);
+        let is_large =
+            |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large_gain);
         if added.as_ref().is_some_and(is_large) {
             self.vain.clear();
             return added.map(|added| self.choose(added));
         }
         // An exchange adds nothing, so it goes first, and a smaller gain will do.
-        if let Some(exchanged) = self.better(best, settings.exchange, Self::exchanged) {
+        if let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged) {
             return Some(self.choose(exchanged));
         }
         self.vain.clear();
@@ -217,7 +218,7 @@ impl<'a> Search<'a> {
     /// The declared model or, where it helps, the model with what most machines have.
     fn first(&mut self, declared: Trial) -> Trial {
         let problem = self.problem;
-        let step = problem.settings.select.step;
+        let step = problem.settings.select.round_gain;
         let best = self.better(&declared, step, |search, declared| {
             search.say("fitting what most machines have");
             let blocks = blocks(problem);
@@ -244,7 +245,12 @@ impl<'a> Search<'a> {
     /// The declared model with each set of effects in place of those of a trial, the most promising first, fitted at its
     /// scale, to find the best one: those that cannot be better than the trial or the first few are left out.
     fn fitted_for_the_best(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
-        let first = self.problem.settings.select.first.min(sets.len());
+        let first = self
+            .problem
+            .settings
+            .select
+            .fitted_to_the_end
+            .min(sets.len());
         let rest = sets.split_off(first);
         let mut trials = self.fitted(from, sets, from.loss());
         let below = trials.iter().map(Trial::loss).fold(from.loss(), f64::min);
@@ -344,7 +350,9 @@ impl<'a> Search<'a> {
             if good.is_empty() {
                 // An exchange may make others needless.
                 other.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
-                let few = other.iter().take(problem.settings.select.exchanged);
+                let few = other
+                    .iter()
+                    .take(problem.settings.select.simplified_exchanges);
                 good = few.map(|trial| self.least(trial, best)).collect();
                 good.retain(is_simpler);
             }
@@ -370,7 +378,7 @@ impl<'a> Search<'a> {
         let within = |set: &Vec<usize>| {
             let losses = outlook.losses(set);
             let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
-            sum <= best.loss() * (1.0 + settings.slack * settings.simpler)
+            sum <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
         };
         let all = outlook.present();
         let mut unshifted = all.clone();
@@ -389,7 +397,7 @@ impl<'a> Search<'a> {
     /// The sets that explain the logs as well as the best one, fitted from a trial.
     fn as_good_as(&self, best: &Trial, from: &Trial, sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
         let settings = &self.problem.settings.select;
-        let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler));
+        let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler_rise));
         trials.retain(|trial| trial.is_as_good_as(best, settings));
         trials
     }

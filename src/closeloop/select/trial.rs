@@ -68,7 +68,11 @@ impl Trial {
         let base = told.iter().filter(|&&i| columns[i].parameter < first);
         let information = fit.equations().hessian;
         let information = information.select_rows(&told).select_columns(&told);
-        tells_apart(&information, base.count())
+        tells_apart(
+            &information,
+            base.count(),
+            problem.settings.select.own_information,
+        )
     }
 
     /// Whether the values of each added effect are consistent with each other and none stands at a bound.
@@ -99,8 +103,9 @@ impl Trial {
         let is_as_good = |own: &[f64], best: &[f64]| {
             let rise = -gain(best, own);
             let differences = differences(own, best);
-            let within = mean(&differences) <= settings.simplest * standard_error(&differences);
-            rise < settings.negligible || within && rise < settings.simpler
+            let within = mean(&differences)
+                <= settings.simpler_standard_errors * standard_error(&differences);
+            rise < settings.negligible_rise || within && rise < settings.simpler_rise
         };
         let on_joint =
             |joint: Joint| is_as_good(&self.losses.of_joint(joint), &best.losses.of_joint(joint));
