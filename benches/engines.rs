@@ -185,7 +185,7 @@ fn identify(c: &mut Criterion) {
     group.sample_size(10).bench_function("demo", |b| {
         b.iter(|| {
             let request = Request::new(&system, &library, split.clone());
-            black_box(close_loop(request, &mut rng.clone(), &mut |_| {}).expect("a model"));
+            black_box(close_loop(request, &mut rng.clone(), &()).expect("a model"));
         });
     });
 }

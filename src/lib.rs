@@ -28,7 +28,7 @@
 //! let library = Library::built_in();
 //! let model = library.model("pendulum")?; // or the path of a model file
 //! let logs = model.read_logs(["run1.csv", "run2.csv", "run3.csv"])?;
-//! let outcome = close_loop(Request::of(&model, &library, logs), &mut rng(0), &mut |_| ())?;
+//! let outcome = close_loop(Request::of(&model, &library, logs), &mut rng(0), &())?;
 //! for effect in &outcome.effects.findings {
 //!     println!("{effect}"); // name, joint, parameters with 95 % intervals
 //! }

@@ -47,7 +47,7 @@ fn a_network_that_diverges_leaves_the_report_without_one() {
     let learner = ResidualTrainer::default();
     request.learner = Some(&learner);
     request.settings.learn.learning_rate = 1e9;
-    let outcome = close_loop(request, &mut rng(0), &mut |_| ()).unwrap();
+    let outcome = close_loop(request, &mut rng(0), &()).unwrap();
     let folder = tempfile::tempdir().unwrap();
     report::write(folder.path(), &outcome, &Origin::of_seed(0)).unwrap();
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::fs;
 use std::path::Path;
 
-use residyn::closeloop::{Fitted, Split, SplitMethod, Study, Unexplained, unexplained};
+use residyn::closeloop::{Declared, Fitted, Problem, Split, SplitMethod, Unexplained, unexplained};
 use residyn::data::{Columns, Remedy, Severity, audit};
 use residyn::expr::SignForm;
 use residyn::model::Origin;
@@ -269,9 +269,10 @@ fn a_reading_that_jumps_is_placed_and_can_be_left_out() {
 fn left(logs: &[Log], model: &Model) -> (Fitted, Unexplained) {
     let settings = Settings::default();
     let logs: Vec<Log> = logs.iter().map(|log| log.for_fits(0.5)).collect();
-    let mut study = Study::new(model, &logs, &settings);
-    let fitted = study.fit_declared(&[]).unwrap();
-    let left = unexplained(&study, &[], &fitted, &fitted, &mut rng(0));
+    let nothing = Library::empty();
+    let problem = Problem::new(model, &nothing, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let left = unexplained(&problem, &[], &fitted, &fitted, &mut rng(0));
     (fitted, left)
 }
 
@@ -337,7 +338,7 @@ fn dropped_rows_leave_nothing_unexplained() {
 fn closed(model: &Model, train: Vec<Log>, test: Vec<Log>) -> Outcome {
     let library = Library::empty();
     let request = Request::new(model, &library, Split::given(train, test));
-    close_loop(request, &mut rng(0), &mut |_| {}).unwrap()
+    close_loop(request, &mut rng(0), &()).unwrap()
 }
 
 #[test]
@@ -410,7 +411,7 @@ fn horizons(duration_s: f64) -> [Vec<f64>; 2] {
     let log = plant.record(&mut rng(0)).unwrap();
     let (library, model) = (Library::empty(), whole_model());
     let request = Request::of(&model, &library, vec![log]);
-    let outcome = close_loop(request, &mut rng(0), &mut |_| {}).unwrap();
+    let outcome = close_loop(request, &mut rng(0), &()).unwrap();
     if duration_s < 5.0 {
         assert_eq!(outcome.verdict, Verdict::Inconclusive);
     }

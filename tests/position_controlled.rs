@@ -70,7 +70,7 @@ fn closed_on([train, test]: [Log; 2], space: Option<Space>) -> Outcome {
     let mut request = Request::new(&declared, &library, split);
     request.settings = Settings::default();
     request.space = space;
-    close_loop(request, &mut rng(0), &mut |_| {}).unwrap()
+    close_loop(request, &mut rng(0), &()).unwrap()
 }
 
 /// Names and joints of the established effects.
@@ -130,7 +130,7 @@ fn of_measured(arm: &str, logs: [&str; 2], share: f64, most_percent: f64) -> Opt
     };
     let library = Library::built_in();
     let request = Request::new(&declared, &library, Split::given(vec![train], vec![test]));
-    let outcome = close_loop(request, &mut rng(0), &mut |_| {}).unwrap();
+    let outcome = close_loop(request, &mut rng(0), &()).unwrap();
     assert_eq!(outcome.space, Space::Torque);
     assert!(!contradicts_gravity(&outcome), "{arm}");
     let percent = 100.0 * outcome.errors.torque.as_ref().unwrap().after.relative;

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use residyn::closeloop::{Proposal, Settings, Study, Unexplained, proposal, unexplained};
+use residyn::closeloop::{
+    Declared, Problem, Proposal, Settings, Unexplained, proposal, unexplained,
+};
 use residyn::data::{Joint, Log};
 use residyn::model::{FittedEffect, Library, Model};
 use residyn::plant::Plant;
@@ -66,25 +68,23 @@ fn declared(effects: &[&str]) -> Model {
 /// What the pendulum with these effects leaves unexplained of the logs, beside the pendulum without.
 fn left(logs: &[Log], effects: &[&str], seed: u64) -> Unexplained {
     let (bare, system) = (declared(&[]), declared(effects));
-    let settings = Settings::default();
-    let before = Study::new(&bare, logs, &settings)
-        .fit_declared(&[])
-        .unwrap();
-    let mut study = Study::new(&system, logs, &settings);
-    let after = study.fit_declared(&[]).unwrap();
-    let probes = Library::built_in();
-    unexplained(&study, probes.probes(), &before, &after, &mut rng(seed))
+    let (settings, nothing, probes) = (Settings::default(), Library::empty(), Library::built_in());
+    let fitted = |model| {
+        let problem = Problem::new(model, &nothing, logs, &settings);
+        problem.fit_declared().unwrap()
+    };
+    let (before, Declared { problem, fitted }) = (fitted(&bare).fitted, fitted(&system));
+    unexplained(&problem, probes.probes(), &before, &fitted, &mut rng(seed))
 }
 
 /// A formula for what the bare pendulum leaves of the logs.
 fn proposed(logs: &[Log], seed: u64) -> Option<Proposal> {
     let system = declared(&[]);
-    let settings = Settings::default();
-    let mut study = Study::new(&system, logs, &settings);
-    let fitted = study.fit_declared(&[]).unwrap();
-    let library = Library::built_in();
-    let left = unexplained(&study, library.probes(), &fitted, &fitted, &mut rng(seed));
-    proposal(&study, &fitted, &left)
+    let (settings, nothing, probes) = (Settings::default(), Library::empty(), Library::built_in());
+    let problem = Problem::new(&system, &nothing, logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let left = unexplained(&problem, probes.probes(), &fitted, &fitted, &mut rng(seed));
+    proposal(&problem, &fitted, &left)
 }
 
 /// An effect of the library that the model has leaves nothing that matters, sharper though the rig's friction is.

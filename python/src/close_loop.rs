@@ -1,9 +1,9 @@
 use std::path::PathBuf;
-use std::sync::Mutex;
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
-use residyn::closeloop::{Fits, Progress, Space, Split, Stage, StudyError};
+use residyn::closeloop::{Fits, Progress, Space, Split, Stage, StageTimes, StudyError, Watch};
 use residyn::report::{self, Report};
 use residyn::train::{Backend, ResidualTrainer};
 use residyn::{
@@ -100,6 +100,31 @@ struct Question {
 /// A stage, what is being done in it, and how many fits of how many are done.
 type Told = (&'static str, String, Option<(usize, usize)>);
 
+/// Tells Python what is done, and ends the search when its time is spent.
+struct Watcher<'l> {
+    listener: &'l Listener<Told>,
+    /// `None` where the search may take longer than a clock counts.
+    deadline: Option<Instant>,
+    times: Mutex<StageTimes>,
+}
+
+impl Watch for Watcher<'_> {
+    fn see(&self, now: Progress<'_>) {
+        let times = self.times.lock();
+        times
+            .unwrap_or_else(PoisonError::into_inner)
+            .note(now.stage, Instant::now());
+        let fits = now.fits.map(|Fits { done, of }| (done, of));
+        self.listener
+            .tell((now.stage.text(), now.text.to_owned(), fits));
+    }
+
+    fn has_to_end(&self) -> bool {
+        self.deadline
+            .is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
 impl Question {
     fn answer(&self, listener: &Listener<Told>) -> Result<residyn::Outcome, StudyError> {
         let learner = ResidualTrainer {
@@ -108,14 +133,20 @@ impl Question {
         let mut request = Request::new(&self.model, &self.library, self.split.clone());
         request.against.clone_from(&self.against);
         request.space = self.space;
-        request.budget = Some(self.budget);
         if self.network {
             request.learner = Some(&learner);
         }
-        residyn::close_loop(request, &mut rng(self.seed), &mut |now: Progress<'_>| {
-            let fits = now.fits.map(|Fits { done, of }| (done, of));
-            listener.tell((now.stage.text(), now.text.to_owned(), fits));
-        })
+        let start = Instant::now();
+        let watcher = Watcher {
+            listener,
+            deadline: start.checked_add(self.budget),
+            times: Mutex::new(StageTimes::since(start)),
+        };
+        let mut outcome = residyn::close_loop(request, &mut rng(self.seed), &watcher)?;
+        let times = watcher.times.into_inner();
+        let times = times.unwrap_or_else(PoisonError::into_inner);
+        outcome.seconds = times.end(Instant::now());
+        Ok(outcome)
     }
 
     fn origin(&self) -> Origin {

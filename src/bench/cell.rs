@@ -232,5 +232,5 @@ impl Cell {
 /// What is tested.
 fn close(model: &Model, library: &Library, split: Split, seed: u64) -> Result<Outcome, StudyError> {
     let request = Request::new(model, library, split);
-    close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &mut |_| ())
+    close_loop(request, &mut ChaCha8Rng::seed_from_u64(seed), &())
 }

@@ -6,7 +6,7 @@ use super::answer::{estimates, label_of};
 use super::coverage::{Coverage, coverage};
 use super::hidden::{Hidden, Label};
 use super::judge::{Estimate, Truth};
-use crate::closeloop::{Fitted, Settings, Split, Study, StudyError, with_intervals};
+use crate::closeloop::{Fitted, Problem, Settings, Split, StudyError, with_intervals};
 use crate::data::Log;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::{Fit, blocks, uncertainty};
@@ -20,7 +20,7 @@ const AS_GOOD: f64 = 1.05;
 
 /// A model with the true effects, fitted from their true values to the logs that a search has.
 pub struct Told<'a> {
-    study: Study<'a>,
+    problem: Problem<'a>,
     library: &'a Library,
     split: &'a Split,
     settings: &'a Settings,
@@ -49,22 +49,25 @@ impl<'a> Told<'a> {
         effects: &[Hidden],
         known: &BTreeMap<String, f64>,
     ) -> Option<Self> {
-        let mut study = Study::new(declared, &split.train, settings);
+        let mut problem = Problem::new(declared, library, &split.train, settings);
         let truth: Vec<FittedEffect> = effects
             .iter()
-            .map(|hidden| fitted(&study, library, hidden))
+            .map(|hidden| fitted(&problem, library, hidden))
             .collect::<Option<_>>()?;
         let mut free = declared.parameters.iter().filter(|p| !p.fixed);
         let (model, locals) = if free.all(|p| known.contains_key(&p.name)) {
-            let locals = study.shooting.initial_locals(0);
+            let locals = problem.shooting.initial_locals(0);
             (at_truth(declared, known), locals)
         } else {
-            let before = study.fit_declared(library.effects()).ok()?;
-            (before.model, before.fit.locals)
+            let before = problem.fit_declared().ok()?;
+            problem = before.problem;
+            (before.fitted.model, before.fitted.fit.locals)
         };
-        let found = study.refit(&model.with_effects(truth), locals, None).ok()?;
+        let found = problem
+            .refit(&model.with_effects(truth), locals, None)
+            .ok()?;
         Some(Self {
-            study,
+            problem,
             library,
             split,
             settings,
@@ -88,12 +91,12 @@ impl<'a> Told<'a> {
         let mut effects = self.fitted.model.effects.clone();
         let gone = effects.remove(place);
         for name in &gone.effect.contains {
-            let simpler = typical(&self.study, self.library, name, &gone);
+            let simpler = typical(&self.problem, self.library, name, &gone);
             effects.extend(simpler.filter(|new| !effects.iter().any(|old| old.excludes(new))));
         }
         let locals = self.fitted.fit.locals.clone();
         let other = self.fitted.model.with_effects(effects);
-        let other = self.study.refit(&other, locals, None);
+        let other = self.problem.refit(&other, locals, None);
         other.map_or(f64::INFINITY, |other| self.rise(&other))
     }
 
@@ -116,7 +119,7 @@ impl<'a> Told<'a> {
         let (of, mut others) = (&effects[place], effects.clone());
         others.remove(place);
         let names = of.effect.confused_with.iter();
-        let rivals = names.filter_map(|name| typical(&self.study, self.library, name, of));
+        let rivals = names.filter_map(|name| typical(&self.problem, self.library, name, of));
         let simple = rivals.filter(|rival| rival.values.len() <= of.values.len());
         simple
             .filter(|rival| !others.iter().any(|other| other.excludes(rival)))
@@ -131,10 +134,10 @@ impl<'a> Told<'a> {
         let Fitted { model, fit } = &self.fitted;
         let other = model.with_effects(effects.to_vec());
         let (locals, scale) = (fit.locals.clone(), Some(fit.scale));
-        let Ok(other) = self.study.refit(&other, locals, scale) else {
+        let Ok(other) = self.problem.refit(&other, locals, scale) else {
             return false;
         };
-        let blocks = blocks(&self.study.shooting);
+        let blocks = blocks(&self.problem.shooting);
         let losses = |fit: &Fit| {
             fit.equations_by(&blocks)
                 .into_iter()
@@ -164,7 +167,7 @@ impl<'a> Told<'a> {
     /// # Errors
     /// The fit in fine steps fails.
     pub fn coverage(&self, truth: &Truth) -> Result<Vec<Coverage>, StudyError> {
-        let fine = self.study.refined();
+        let fine = self.problem.refined();
         let refined = fine.estimate(&self.fitted)?;
         let uncertainty = uncertainty(&fine.shooting, &refined.fit);
         let model = with_intervals(&fine, &refined, &uncertainty, &self.fitted.model);
@@ -184,15 +187,15 @@ impl<'a> Told<'a> {
 
 /// An effect of the library on the joint of another, at the values that are typical of it.
 fn typical(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     library: &Library,
     name: &str,
     like: &FittedEffect,
 ) -> Option<FittedEffect> {
     let effect = library.effect(name).ok()?;
-    study.declared.can_carry(effect, like.joint).ok()?;
+    problem.declared.can_carry(effect, like.joint).ok()?;
     let joint = like.joint;
-    let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
+    let effect = effect.measured_by(problem.top_speed[joint], problem.top_torque[joint]);
     let mut fitted = FittedEffect::absent(&effect, joint);
     for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
         slot.0 = parameter.typical;
@@ -201,13 +204,13 @@ fn typical(
 }
 
 /// The effect with its true values; `None` where the library has no such effect.
-fn fitted(study: &Study<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
+fn fitted(problem: &Problem<'_>, library: &Library, hidden: &Hidden) -> Option<FittedEffect> {
     if hidden.name == "parameter_shift" {
-        return shift(study.declared, hidden);
+        return shift(problem.declared, hidden);
     }
     let joint = hidden.joint;
     let effect = library.effect(&hidden.name).ok()?;
-    let effect = effect.measured_by(study.top_speed[joint], study.top_torque[joint]);
+    let effect = effect.measured_by(problem.top_speed[joint], problem.top_torque[joint]);
     let mut fitted = FittedEffect::absent(&effect, joint);
     for (slot, parameter) in fitted.values.iter_mut().zip(&effect.parameters) {
         slot.0 = match hidden.values.get(&parameter.name) {

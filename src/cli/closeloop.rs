@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use super::call::{Begun, files};
 use super::{Answer, Common, inputs, interrupt, progress, remedy, voice};
 use crate::closeloop::{
-    Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, close_loop,
+    Calibrator, Outcome, Reference, Request, Settings, Space, Split, Verdict, prepare, solve,
 };
 use crate::data::{LeaveOut, Log};
 use crate::model::{Library, Model, Origin};
@@ -108,17 +108,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let folder = RunFolder::open(&arguments.out)?;
     let written = Arc::new(AtomicBool::new(false));
     let _orderly = interrupt::orderly(&folder, kept(&arguments.out, &written));
-    let mut stages = progress::Stages::new();
+    let stages = progress::Stages::new(arguments.budget);
     let learner = ResidualTrainer {
         backend: arguments.common.device,
     };
     let mut request = Request::new(&declared, &library, split);
     request.against = against;
     request.learner = Some(&learner);
-    request.budget = Some(arguments.budget);
     request.space = arguments.errors.map(Space::from);
-    let mut outcome = close_loop(request, &mut rng, &mut |now| stages.show(&now))?;
-    stages.finish();
+    let prepared = prepare(request, &stages);
+    stages.beside(|| inputs::print_faults(prepared.audits()));
+    let mut outcome = solve(&prepared, &mut rng, &stages)?;
+    outcome.seconds = stages.finish();
     let origin = || Origin {
         call: Some(begun.call(&inputs)),
         ..origin(arguments, &declared)
@@ -133,9 +134,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     let mut report = voice::stage("writing the report", || write(&outcome))?;
     if let Some(runs) = arguments.calibrate {
         // The report is safe before the long work begins.
-        let study = outcome.study(&declared);
+        let problem = outcome.problem(&declared, &library);
         let accepted = &outcome.models.after;
-        let calibrator = Calibrator::new(&study, accepted, &library, runs.get(), &mut rng)?;
+        let calibrator = Calibrator::new(&problem, accepted, runs.get(), &mut rng)?;
         let run = calibrate::run_id(&origin(), &accepted.model, &inputs)?;
         let (calibration, kept) = calibrate::carry_out(calibrator, &folder, &run)?;
         outcome.calibration = Some(calibration);
@@ -182,9 +183,9 @@ fn measured(arguments: &Arguments, model: &Path, library: &Library) -> Result<(M
     let mut train = inputs::logs(&arguments.train, &declared)?;
     let mut test = inputs::logs(&arguments.test, &declared)?;
     inputs::leave_out(&mut train, &mut test, &arguments.leave_out)?;
-    inputs::print_notes_and_faults(&train, &declared.columns);
-    inputs::print_notes_and_faults(&test, &declared.columns);
-    for log in train.iter().chain(&test).filter(|log| log.is_long()) {
+    let logs = || train.iter().chain(&test);
+    inputs::print_notes(logs());
+    for log in logs().filter(|log| log.is_long()) {
         voice::say(format!(
             "note: {}: a part of its {} rows is fitted, see the report",
             log.name(),

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::inputs::{self, Source};
 use super::status::NotFinite;
 use super::{Answer, Common, voice};
-use crate::data::{Joint, LeaveOut, Log};
+use crate::data::{Joint, LeaveOut, Log, audit_together};
 use crate::identify::calibrate;
 use crate::model::{Dynamics, Model};
 use crate::sim::metric::{Summary, TorqueError, assess, summarise, torque_error, torques_leave};
@@ -80,7 +80,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Answer> {
     if let Source::File(file) = arguments.model.source() {
         inputs::print_findings(file, &declared, arguments.common.seed);
     }
-    inputs::print_notes_and_faults(&logs, &declared.columns);
+    inputs::print_notes(&logs);
+    inputs::print_faults(&audit_together(&logs, &declared.columns));
     let steps = logs.iter().map(Log::median_step);
     let step_s = steps.fold(f64::INFINITY, f64::min);
     if let Some(short) = arguments.horizon.iter().find(|horizon| **horizon < step_s) {

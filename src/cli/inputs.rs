@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::{remedy, voice};
-use crate::data::{Columns, LeaveOut, Log, audit_together, leave_out};
+use crate::data::{Audit, LeaveOut, Log, leave_out};
 use crate::limits::RUNS;
 use crate::model::check::Severity;
 use crate::model::{Library, Model, effect_files};
@@ -112,18 +112,12 @@ pub(super) fn print_notes<'l>(logs: impl IntoIterator<Item = &'l Log>) {
     }
 }
 
-/// Print the notes of logs that are used together and what is serious about them on standard error, before anything is computed from them.
-pub(super) fn print_notes_and_faults<'l>(
-    logs: impl IntoIterator<Item = &'l Log>,
-    columns: &Columns,
-) {
-    let logs: Vec<&Log> = logs.into_iter().collect();
-    let audits = audit_together(logs.iter().copied(), columns);
-    for (log, audit) in logs.into_iter().zip(audits) {
-        print_notes([log]);
+/// Print on standard error what is serious about logs, before anything is computed from them.
+pub(super) fn print_faults<'a>(audits: impl IntoIterator<Item = &'a Audit>) {
+    for audit in audits {
         for finding in audit.serious() {
             let told = finding.told(&remedy::of_finding);
-            voice::say(format!("serious: {}: {told}", log.name()));
+            voice::say(format!("serious: {}: {told}", audit.log));
         }
     }
 }

@@ -2,13 +2,14 @@
 
 use std::ops::Deref;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::voice;
-use crate::closeloop::{Fits, Progress, Stage};
+use crate::closeloop::{Fits, Progress, Stage, StageTimes, Watch};
 
 /// How often a line is written where there is no terminal.
 const EVERY: Duration = Duration::from_secs(10);
@@ -87,47 +88,70 @@ fn stage_line(bar: &ProgressBar) -> String {
 }
 
 /// Shows the stages of closing the loop: how long the models that are being fitted will still take and, in a verbose run, how
-/// long each stage took.
+/// long each stage took. Ends the search when its time is spent.
 pub(super) struct Stages {
     bar: Bar,
-    now: Stage,
-    since: Instant,
+    /// `None` where the search may take longer than a clock counts.
+    deadline: Option<Instant>,
+    seen: Mutex<Seen>,
+}
+
+struct Seen {
+    times: StageTimes,
     fits_since: Instant,
 }
 
 impl Stages {
-    pub fn new() -> Self {
+    /// A search may take as long as `budget` from now on.
+    pub fn new(budget: Duration) -> Self {
+        let start = Instant::now();
         Self {
             bar: stages(),
-            now: Stage::ALL[0],
-            since: Instant::now(),
-            fits_since: Instant::now(),
+            deadline: start.checked_add(budget),
+            seen: Mutex::new(Seen {
+                times: StageTimes::since(start),
+                fits_since: start,
+            }),
         }
     }
 
-    pub fn show(&mut self, now: &Progress<'_>) {
-        if now.stage != self.now {
-            self.end();
-            (self.now, self.since) = (now.stage, Instant::now());
+    /// Say something while the bar is out of the way.
+    pub fn beside(&self, say: impl FnOnce()) {
+        self.bar.suspend(say);
+    }
+
+    /// The last stage is done; how long each took, in s.
+    pub fn finish(self) -> Vec<(Stage, f64)> {
+        let Seen { times, .. } = self
+            .seen
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        let (last, since) = times.now();
+        self.bar.suspend(|| voice::took(last.text(), since));
+        self.bar.finish_and_clear();
+        times.end(Instant::now())
+    }
+}
+
+impl Watch for Stages {
+    fn see(&self, now: Progress<'_>) {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((ended, since)) = seen.times.note(now.stage, Instant::now()) {
+            self.bar.suspend(|| voice::took(ended.text(), since));
         }
         self.bar.set_position(now.stage.number() as u64);
-        let message = self.message(now);
-        self.bar.set_message(message);
+        self.bar.set_message(seen.message(now));
     }
 
-    /// The last stage is done.
-    pub fn finish(self) {
-        self.end();
-        self.bar.finish_and_clear();
+    fn has_to_end(&self) -> bool {
+        self.deadline
+            .is_some_and(|deadline| Instant::now() >= deadline)
     }
+}
 
-    fn end(&self) {
-        self.bar
-            .suspend(|| voice::took(self.now.text(), self.since));
-    }
-
+impl Seen {
     /// What is being done and, where that is a number of models to fit, about how long it will still take.
-    fn message(&mut self, now: &Progress<'_>) -> String {
+    fn message(&mut self, now: Progress<'_>) -> String {
         match now.fits {
             Some(Fits { done, of }) if done > 0 => {
                 let each_s = self.fits_since.elapsed().as_secs_f64() / done as f64;
@@ -139,6 +163,19 @@ impl Stages {
                 now.text.to_owned()
             }
         }
+    }
+}
+
+/// Shows on a bar what is done in one of its steps.
+pub(super) struct Step<'b> {
+    pub bar: &'b ProgressBar,
+    /// The step, in a few words.
+    pub what: String,
+}
+
+impl Watch for Step<'_> {
+    fn see(&self, now: Progress<'_>) {
+        self.bar.set_message(format!("{}: {}", self.what, now.text));
     }
 }
 

@@ -6,9 +6,10 @@ use std::slice::from_ref;
 use rayon::prelude::*;
 
 use super::fitted::Fitted;
+use super::problem::Problem;
 use super::refine::with_intervals;
 use super::score::Scorer;
-use super::study::Study;
+use super::stage::Watch;
 use crate::data::Log;
 use crate::identify::{FitError, uncertainty};
 
@@ -21,14 +22,11 @@ pub struct OfLog {
     pub errors: Vec<f64>,
 }
 
-/// More logs than this are not fitted one by one, and of more than this the errors of each on each are left out.
-const MOST_FITTED: usize = 32;
-const MOST_CROSSED: usize = 8;
-
-impl Study<'_> {
+impl Problem<'_> {
     /// The chosen model by log; nothing for a single log.
-    pub(super) fn by_log(&self, chosen: &Fitted) -> Vec<OfLog> {
-        if !(2..=MOST_FITTED).contains(&self.logs.len()) || !self.has_time() {
+    pub(super) fn by_log(&self, chosen: &Fitted, watch: &dyn Watch) -> Vec<OfLog> {
+        let most = self.settings.score.most_logs_fitted_alone;
+        if !(2..=most).contains(&self.logs.len()) || watch.has_to_end() {
             return Vec::new();
         }
         let of_log = |log: &Log| {
@@ -45,19 +43,19 @@ impl Study<'_> {
     }
 
     fn fitted_to(&self, log: &Log, chosen: &Fitted) -> Result<Fitted, FitError> {
-        let study = Study {
+        let problem = Problem {
             held: self.identifiability.hold.clone(),
             ..self.on(from_ref(log))
         };
-        let locals = study.shooting.initial_locals(0);
-        let mut fitted = study.refit(&chosen.model, locals, None)?;
-        let uncertainty = uncertainty(&study.shooting, &fitted.fit);
-        fitted.model = with_intervals(&study, &fitted, &uncertainty, &fitted.model);
+        let locals = problem.shooting.initial_locals(0);
+        let mut fitted = problem.refit(&chosen.model, locals, None)?;
+        let uncertainty = uncertainty(&problem.shooting, &fitted.fit);
+        fitted.model = with_intervals(&problem, &fitted, &uncertainty, &fitted.model);
         Ok(fitted)
     }
 
     fn crossed(&self, fitted: &Fitted) -> Vec<f64> {
-        let logs = if self.logs.len() > MOST_CROSSED {
+        let logs = if self.logs.len() > self.settings.score.most_logs_crossed {
             &[]
         } else {
             self.logs

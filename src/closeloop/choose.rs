@@ -1,51 +1,47 @@
 //! Which errors say more about some logs.
 
+use super::fit::NOTHING;
+use super::problem::Problem;
 use super::select::usual_friction;
-use super::study::Study;
 use crate::data::Log;
 use crate::data::statistics::{mean, upper_median};
 use crate::identify::{Window, cut, fit_torques};
-use crate::model::{Effect, Model};
+use crate::model::Model;
 use crate::sim::FIT_S;
 use crate::sim::metric::{errors_in, torque_error};
 
-/// A window in which a joint moves by less than this share of its farthest way (as squares) is one at rest.
-const AT_REST: f64 = 1e-2;
-
-/// With more joints than this a fit of the motion takes minutes before any search begins, and torques are compared.
-const FITTED_JOINTS: usize = 3;
-
-impl Study<'_> {
+impl Problem<'_> {
     /// Whether a controller prescribes the motion, so that the declared model, with the friction that most machines have,
     /// explains far more of the torques than of half a second of open-loop motion, or so many joints move that no other errors
     /// can be lowered in time. Never of a model that gives accelerations, nor of one driven by commands.
-    pub(super) fn is_prescribed(&self, library: &[Effect]) -> bool {
-        self.tells_more_of_torques(library).unwrap_or(false)
+    pub(super) fn is_prescribed(&self) -> bool {
+        self.tells_more_of_torques().unwrap_or(false)
     }
 
     /// `None` where there are no torques to tell, or no motion.
-    fn tells_more_of_torques(&self, library: &[Effect]) -> Option<bool> {
+    fn tells_more_of_torques(&self) -> Option<bool> {
         let own = &self.declared.effects;
-        let friction = usual_friction(self, library);
+        let friction = usual_friction(self);
         let model = self
             .declared
             .with_effects([own, friction.as_slice()].concat());
         let fitted = fit_torques(&self.smoothed(&model), self.declared, self.logs).ok()?;
         let torque = torque_error(&fitted.model, self.logs)?.relative;
-        if self.declared.joints > FITTED_JOINTS {
+        if self.declared.joints > self.settings.fit.most_joints_by_motion {
             return Some(true);
         }
-        let far = self.settings.fit.prescribed * torque;
+        let far = self.settings.fit.motion_over_torque * torque;
         if self.motion_error(&fitted.model)? < far {
             return Some(false);
         }
         // Torques may be fitted well by what cannot move like the rig.
-        let mut by_motion = Study {
+        let by_motion = Problem {
             declared: &model,
-            ..self.again()
+            library: &NOTHING,
+            ..self.clone()
         };
-        let by_motion = by_motion.fit_declared(&[]).ok()?;
-        Some(self.motion_error(&by_motion.model)? >= far)
+        let by_motion = by_motion.fit_declared().ok()?;
+        Some(self.motion_error(&by_motion.fitted.model)? >= far)
     }
 
     /// The open-loop error of a model over a few windows of its logs, as a share of how far the joints move in them; of the
@@ -62,7 +58,7 @@ impl Study<'_> {
             let moving = errors
                 .iter()
                 .zip(&ways)
-                .filter(|(_, way)| **way > AT_REST * farthest);
+                .filter(|(_, way)| **way > self.settings.fit.at_rest_share * farthest);
             let shares: Vec<f64> = moving.map(|(error, way)| error.position[j] / way).collect();
             (!shares.is_empty()).then(|| upper_median(&shares))
         };

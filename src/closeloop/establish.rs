@@ -1,11 +1,15 @@
-//! Stage 5: which of the selected effects are established.
+//! Stage 4, second half: which of the selected effects are established.
 
 use rayon::prelude::*;
 
 use super::fitted::Fitted;
-use super::select::{Folds, Losses, Trial, gain, p_of_gains, p_value};
+use super::problem::Problem;
+use super::select::{
+    Folds, Losses, Rival, Round, Selected, Trial, candidates, gain, p_of_gains, p_value, rivals,
+    starts,
+};
 use super::settings::EstablishSettings;
-use super::study::Study;
+use super::stage::{Stage, Watch};
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Status};
 
@@ -24,18 +28,91 @@ pub struct Standing {
     pub without: Result<Fitted, FitError>,
 }
 
+/// The set of effects that was chosen.
+pub struct Chosen {
+    /// The model with them, fitted.
+    pub after: Fitted,
+    /// One for each added effect, in the order of the model.
+    pub standings: Vec<Standing>,
+    pub rounds: Vec<Round>,
+    /// Whether the search was stopped because its time was spent.
+    pub stopped: bool,
+    /// Effects that explain the logs as well as one that was chosen.
+    pub rivals: Vec<Rival>,
+    /// Why there are no effects, if the chosen model could not be fitted.
+    pub failure: Option<FitError>,
+}
+
+impl Chosen {
+    /// Number of established effects.
+    pub fn established(&self) -> usize {
+        let standings = self.standings.iter();
+        standings
+            .filter(|s| s.status == Status::Established)
+            .count()
+    }
+}
+
+/// Judge each effect of the set that was selected, and look for others that explain the logs as well. `before` is the declared model,
+/// which stays alone where no set could be fitted.
+pub fn establish(
+    problem: &Problem<'_>,
+    before: &Fitted,
+    selected: Selected,
+    watch: &dyn Watch,
+) -> Chosen {
+    let Selected {
+        chosen,
+        rounds,
+        stopped,
+    } = selected;
+    let chosen = match chosen {
+        Ok(chosen) => chosen,
+        Err(failure) => {
+            return Chosen {
+                after: before.clone(),
+                standings: Vec::new(),
+                rounds,
+                stopped,
+                rivals: Vec::new(),
+                failure: Some(failure),
+            };
+        }
+    };
+    watch.see(Stage::Establish.into());
+    let without = without_each(problem, &chosen);
+    let all = candidates(problem, &problem.declared.effects);
+    let trials = all.iter().map(|candidate| starts(candidate).len()).sum();
+    let standings = standings(problem, &chosen, &without, trials);
+    let established: Vec<bool> = (standings.iter())
+        .map(|standing| standing.status == Status::Established)
+        .collect();
+    Chosen {
+        rivals: if watch.has_to_end() {
+            Vec::new()
+        } else {
+            rivals(problem, &chosen, &without, &established)
+        },
+        standings,
+        rounds,
+        stopped,
+        after: chosen.fitted,
+        failure: None,
+    }
+}
+
 /// Judge each effect that a model has beyond the declared ones by the model refitted without it, `without`; where that
 /// failed, the model needs the effect. `trials` is the number of candidates, at all their starting points.
-pub(super) fn establish(
-    study: &Study<'_>,
+pub(super) fn standings(
+    problem: &Problem<'_>,
     chosen: &Trial,
     without: &[Result<Trial, FitError>],
     trials: usize,
 ) -> Vec<Standing> {
-    let halves = Folds::of(study).in_halves();
-    let crossed = |trial: &Trial| Losses::by(study, &halves, &trial.fitted);
+    let halves = Folds::of(problem).in_halves();
+    let crossed = |trial: &Trial| Losses::by(problem, &halves, &trial.fitted);
     let with = crossed(chosen);
-    let added = study.added(&chosen.fitted.model);
+    let added = problem.added(&chosen.fitted.model);
     let standing = |(k, less): (usize, &Result<Trial, FitError>)| {
         let effect = chosen.fitted.model.effects[k].clone();
         let less = match less {
@@ -55,11 +132,11 @@ pub(super) fn establish(
         let (crossed_less, with) = (of_joint(&crossed(less)), of_joint(&with));
         let evidence = Evidence {
             gain: gain(&of_joint(&less.losses), &of_joint(&chosen.losses)),
-            p_of_values: p_value(study, &chosen.fitted, k),
+            p_of_values: p_value(problem, &chosen.fitted, k),
             p_of_falls: p_of_gains(&crossed_less, &with),
             crossed_gain: gain(&crossed_less, &with),
         };
-        let reason = evidence.lack(trials, &study.settings.establish);
+        let reason = evidence.lack(trials, &problem.settings.establish);
         Standing {
             effect,
             status: if reason.is_none() {
@@ -68,7 +145,7 @@ pub(super) fn establish(
                 Status::Supported
             },
             gain: evidence.gain,
-            p_value: evidence.p(&study.settings.establish),
+            p_value: evidence.p(&problem.settings.establish),
             reason,
             without: Ok(less.fitted.clone()),
         }
@@ -77,12 +154,12 @@ pub(super) fn establish(
 }
 
 /// The models refitted without each of the added effects.
-pub(super) fn without_each(study: &Study<'_>, chosen: &Trial) -> Vec<Result<Trial, FitError>> {
+pub(super) fn without_each(problem: &Problem<'_>, chosen: &Trial) -> Vec<Result<Trial, FitError>> {
     let less = |k: usize| {
-        let fitted = study.without_effect(&chosen.fitted, k)?;
-        Ok(Trial::of(study, fitted))
+        let fitted = problem.without_effect(&chosen.fitted, k)?;
+        Ok(Trial::of(problem, fitted))
     };
-    study
+    problem
         .added(&chosen.fitted.model)
         .into_par_iter()
         .map(less)
@@ -108,7 +185,7 @@ impl Evidence {
     /// The p-value of the values or, where they say little, the smaller one.
     fn p(&self, settings: &EstablishSettings) -> f64 {
         let alone = self.p_alone();
-        match alone < settings.significant_alone {
+        match alone < settings.uncorrected_false_alarm {
             true => alone,
             false => alone.min(self.p_of_falls),
         }
@@ -119,9 +196,9 @@ impl Evidence {
         #[allow(clippy::cast_precision_loss)] // few trials
         let level = settings.false_alarm / trials.max(1) as f64;
         let p = self.p(settings);
-        let significant =
-            self.p_alone() < level || self.gain > settings.plain && p < settings.significant_alone;
-        if self.gain < settings.worthwhile {
+        let significant = self.p_alone() < level
+            || self.gain > settings.plain_gain && p < settings.uncorrected_false_alarm;
+        if self.gain < settings.worthwhile_gain {
             return Some(too_small(self.gain));
         }
         if !significant {
@@ -129,8 +206,8 @@ impl Evidence {
                 "p = {p:.2e} is too large among {trials} candidates"
             ));
         }
-        let confirmed =
-            self.p_of_falls <= settings.confirmed || self.crossed_gain >= settings.plain;
+        let confirmed = self.p_of_falls <= settings.confirming_false_alarm
+            || self.crossed_gain >= settings.plain_gain;
         (!confirmed).then(|| {
             format!(
                 "with values fitted to one half of the stretches it changes the loss on the other by {:.0} % (p = {:.2})",

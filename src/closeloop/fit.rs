@@ -1,30 +1,60 @@
 //! Stage 3: fit the declared model.
 
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
 use super::error::StudyError;
 use super::fitted::Fitted;
+use super::prepare::Prepared;
+use super::problem::Problem;
 use super::select::usual_friction;
 use super::space::Space;
+use super::stage::{Stage, Watch};
 use super::start::around;
-use super::study::Study;
 use crate::identify::{
-    FitError, Identifiability, Open, Shooting, Values, fit, fit_torques, identifiability, open,
-    uncertainty,
+    FitError, Identifiability, Open, Shooting, Values, cut, fit as fit_windows, fit_torques,
+    identifiability, open, uncertainty,
 };
-use crate::model::{Effect, FittedEffect, Model};
+use crate::model::{FittedEffect, Library, Model};
 
-/// The declared model, fitted, and what the logs determine of it.
-type Declared = (Fitted, Identifiability);
+/// The declared model, fitted.
+#[derive(Clone)]
+pub struct Declared<'a> {
+    /// What was to be explained, and what the fit tells of it: the width of friction's reversal, the noise of torques, and what the
+    /// logs determine.
+    pub problem: Problem<'a>,
+    pub fitted: Fitted,
+}
 
-/// So many fits that begin at values around the declared ones are compared: one alone may end in a local minimum.
-const FITTED_AROUND: usize = 3;
+/// The declared model, fitted to its motion, and what the logs determine of it.
+type ByMotion = (Fitted, Identifiability);
 
-fn cost((fitted, _): &Declared) -> f64 {
+/// Nothing can be found in it.
+pub(super) static NOTHING: LazyLock<Library> = LazyLock::new(Library::empty);
+
+fn cost((fitted, _): &ByMotion) -> f64 {
     fitted.loss()
 }
 
-impl Study<'_> {
+/// Choose the errors that say more about the logs, unless they are given, and fit the declared model by them. Where no joint moves,
+/// anything could be found, and no effect is looked for.
+///
+/// # Errors
+/// Test logs without a window to score, torques that cannot be compared, and as [`Problem::fit_declared`].
+pub fn fit<'a>(prepared: &'a Prepared<'_>, watch: &dyn Watch) -> Result<Declared<'a>, StudyError> {
+    prepared.check()?;
+    let mut problem = prepared.problem(prepared.space.unwrap_or(Space::Motion));
+    if prepared.space.is_none() && problem.is_prescribed() {
+        problem = prepared.problem(Space::Torque);
+    }
+    if !problem.moves() {
+        problem.library = &NOTHING;
+    }
+    watch.see(Stage::Fit.into());
+    problem.fit_declared()
+}
+
+impl<'a> Problem<'a> {
     /// Fit the declared model, with the effects that its file carries, from its declared values: over short
     /// windows, in which even a poor start does not diverge, then over longer ones. It is fitted twice: alone, and with
     /// the friction that most machines have on every joint until the last fit, since without friction the first optimum
@@ -33,47 +63,53 @@ impl Study<'_> {
     ///
     /// # Errors
     /// No window, or a model that diverges even over short windows, from all starting values.
-    pub fn fit_declared(&mut self, library: &[Effect]) -> Result<Fitted, StudyError> {
-        let friction = usual_friction(self, library);
+    pub fn fit_declared(&self) -> Result<Declared<'a>, StudyError> {
+        let friction = usual_friction(self);
         if self.space == Space::Torque {
-            return Ok(self.fitted_by_torques(friction)?);
+            return Ok(self.fitted_by_torques(&friction)?);
         }
-        let found = match self.fitted_from(self.declared, &friction) {
+        let (moved_to, found) = match self.fitted_from(self.declared, &friction) {
             Err(FitError::Diverged { diverged, windows }) => {
                 let (start, found) = self
                     .fitted_around(&friction)
                     .ok_or(FitError::Diverged { diverged, windows })?;
-                self.moved_to = start.parameters;
-                self.moved_to.retain(|parameter| !parameter.fixed);
-                found
+                let mut moved_to = start.parameters;
+                moved_to.retain(|parameter| !parameter.fixed);
+                (moved_to, found)
             }
-            found => found?,
+            found => (Vec::new(), found?),
         };
         let (fitted, identifiability) = found;
-        self.identifiability = identifiability;
-        Ok(fitted)
+        let problem = Self {
+            moved_to,
+            ..self.knowing(identifiability)
+        };
+        Ok(Declared { problem, fitted })
     }
 
     /// The declared model, fitted by torques, in which it is so nearly linear that no start is poor. What the usual friction
     /// leaves beside it is the noise of each joint's torque.
-    fn fitted_by_torques(&mut self, friction: Vec<FittedEffect>) -> Result<Fitted, FitError> {
+    fn fitted_by_torques(&self, friction: &[FittedEffect]) -> Result<Declared<'a>, FitError> {
         let own = &self.declared.effects;
-        let model = self
-            .declared
-            .with_effects([own, friction.as_slice()].concat());
-        self.choose_sign_widths(&model)?;
-        let beside = fit_torques(&self.smoothed(&model), self.declared, self.logs)?;
-        self.weigh_by(&beside.shooting.noise);
+        let model = self.declared.with_effects([own, friction].concat());
+        let problem = self.with_sign_widths(self.best_sign_widths(&model)?);
+        let beside = fit_torques(&problem.smoothed(&model), self.declared, self.logs)?;
+        // The logs are smoothed there as they are to be here.
+        let windows = cut(self.logs, self.settings.fit.window_s);
+        let problem = problem.over(beside.shooting.over(windows));
         let alone = beside.model.effects[..own.len()].to_vec();
-        let fitted = self.fitted_over(&self.shooting, &beside.model.with_effects(alone))?;
-        self.identifiability = self.identifiability_of(&fitted);
-        Ok(fitted)
+        let alone = beside.model.with_effects(alone);
+        let fitted = problem.fitted_over(&problem.shooting, &alone)?;
+        let problem = problem.knowing(problem.identifiability_of(&fitted));
+        Ok(Declared { problem, fitted })
     }
 
-    /// Unless the file gives them, smooth the friction of each joint over the speed with which a model's torques fit best.
-    fn choose_sign_widths(&mut self, model: &Model) -> Result<(), FitError> {
+    /// The speeds over which the friction of each joint reverses with which a model's torques fit best, unless the file gives
+    /// them.
+    fn best_sign_widths(&self, model: &Model) -> Result<Vec<f64>, FitError> {
+        let mut best = self.sign_widths.clone();
         if self.declared.sign_width.is_some() {
-            return Ok(());
+            return Ok(best);
         }
         let fitted = |share: &f64| {
             let widths: Vec<f64> = self
@@ -85,26 +121,28 @@ impl Study<'_> {
             let found = fit_torques(&model, self.declared, self.logs)?;
             Ok((found.shooting.noise, widths))
         };
-        let shares = self.settings.fit.sign_widths;
+        let shares = self.settings.fit.wider_sign_shares;
         let tried: Vec<(Vec<f64>, Vec<f64>)> =
             shares.iter().map(fitted).collect::<Result<_, FitError>>()?;
-        for (j, width) in self.sign_widths.iter_mut().enumerate() {
-            let best = tried.iter().min_by(|(a, _), (b, _)| a[j].total_cmp(&b[j]));
-            *width = best.map_or(*width, |(_, widths)| widths[j]);
+        for (j, width) in best.iter_mut().enumerate() {
+            let least = tried.iter().min_by(|(a, _), (b, _)| a[j].total_cmp(&b[j]));
+            *width = least.map_or(*width, |(_, widths)| widths[j]);
         }
-        Ok(())
+        Ok(best)
     }
 
     /// The best of a few fits that begin at values around the declared ones, and where it began.
-    fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, Declared)> {
+    fn fitted_around(&self, friction: &[FittedEffect]) -> Option<(Model, ByMotion)> {
         let fit = |start: Model| Some((self.fitted_from(&start, friction).ok()?, start));
-        let found = around(self).filter_map(fit).take(FITTED_AROUND);
+        let found = around(self)
+            .filter_map(fit)
+            .take(self.settings.fit.fitted_starts);
         let (found, start) = found.min_by(|(a, _), (b, _)| cost(a).total_cmp(&cost(b)))?;
         Some((start, found))
     }
 
     /// The declared model, fitted from these values alone and beside friction.
-    fn fitted_from(&self, start: &Model, friction: &[FittedEffect]) -> Result<Declared, FitError> {
+    fn fitted_from(&self, start: &Model, friction: &[FittedEffect]) -> Result<ByMotion, FitError> {
         let found = self.declared_beside(start, &[]);
         if friction.is_empty() {
             return found;
@@ -118,12 +156,12 @@ impl Study<'_> {
 
     /// The declared model with the friction that most machines have on every joint, fitted from where the declared one began;
     /// `None` where it diverges.
-    pub(super) fn with_usual_friction(&self, library: &[Effect]) -> Option<Fitted> {
-        let friction = usual_friction(self, library);
+    pub(super) fn with_usual_friction(&self) -> Option<Fitted> {
+        let friction = usual_friction(self);
         self.fitted_beside(&self.started_from(), &friction).ok()
     }
 
-    /// The declared model with these effects, fitted from these values: over short windows, then over those of the study.
+    /// The declared model with these effects, fitted from these values: over short windows, then over those of the problem.
     fn fitted_beside(&self, start: &Model, effects: &[FittedEffect]) -> Result<Fitted, FitError> {
         let short = self.windows_of(self.settings.fit.short_window_s);
         let own = &self.declared.effects;
@@ -138,7 +176,7 @@ impl Study<'_> {
         &self,
         start: &Model,
         effects: &[FittedEffect],
-    ) -> Result<Declared, FitError> {
+    ) -> Result<ByMotion, FitError> {
         let fitted = self.fitted_beside(start, effects)?;
         let identifiability = self.identifiability_of(&fitted);
         if effects.is_empty() {
@@ -149,21 +187,23 @@ impl Study<'_> {
         Ok((alone, identifiability))
     }
 
-    /// The declared model, fitted over the study's windows alone from the values that its fit began with.
+    /// The declared model, fitted over short windows alone, in which even a poor start does not diverge, from the values that its
+    /// fit began with.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
-    pub(super) fn fit_started(&mut self) -> Result<Fitted, FitError> {
-        let fitted = self.fitted_over(&self.shooting, &self.started_from())?;
-        self.identifiability = self.identifiability_of(&fitted);
-        Ok(fitted)
+    /// As [`Problem::fit_declared`].
+    pub(super) fn fitted_over_short_windows(&self) -> Result<Declared<'a>, FitError> {
+        let short = self.over(self.windows_of(self.settings.fit.short_window_s));
+        let fitted = short.fitted_over(&short.shooting, &short.started_from())?;
+        let problem = short.knowing(short.identifiability_of(&fitted));
+        Ok(Declared { problem, fitted })
     }
 
     fn fitted_over(&self, shooting: &Shooting<'_>, model: &Model) -> Result<Fitted, FitError> {
         let model = self.smoothed(model);
         let dynamics = self.space.compile(&model);
         let locals = shooting.initial_locals(0);
-        let found = fit(shooting, &dynamics, &self.active(&dynamics), locals, None)?;
+        let found = fit_windows(shooting, &dynamics, &self.active(&dynamics), locals, None)?;
         Ok(Fitted::new(&model, &dynamics, found, self.logs))
     }
 

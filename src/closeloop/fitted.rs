@@ -3,7 +3,7 @@ use crate::identify::{Fit, Values};
 use crate::model::{Dynamics, FittedEffect, Model};
 use crate::sim::metric::{Trace, traces};
 
-/// A model as a fit to a study's logs left it.
+/// A model as a fit to a problem's logs left it.
 #[derive(Debug, Clone)]
 pub struct Fitted {
     /// With the values found.

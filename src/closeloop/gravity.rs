@@ -2,25 +2,19 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::problem::Problem;
+use super::settings::NoteSettings;
 use super::space::Space;
-use super::study::Study;
 use crate::data::{Audit, Finding, Severity, Smooth};
 use crate::decomposition::least_squares;
 use crate::model::Model;
 use crate::sim::metric::balance_of;
 
-/// Gravity is contradicted where the torques hold less than this share of it, or more than its inverse: bodies from a drawing
-/// are off by a third, a torque without gravity by all.
-const LEAST: f64 = 0.5;
-
-/// A joint tells of gravity if it varies by this much of its torque, both as standard deviations.
-const TELLS: f64 = 0.3;
-
 /// Add to the audits of logs which of them hold another gravity than the declared bodies need, by their shares: a torque column
 /// that is only a part of the torque, a moment of another unit, another base.
-pub(super) fn tell_gravity(shares: &[Option<f64>], audits: &mut [Audit]) {
+pub(super) fn tell_gravity(shares: &[Option<f64>], settings: &NoteSettings, audits: &mut [Audit]) {
     for (share, audit) in shares.iter().zip(audits) {
-        if let Some(share) = share.filter(contradicts) {
+        if let Some(share) = share.filter(|share| contradicts(*share, settings)) {
             let text = format!("{}. What is fitted to them imitates that", told(share));
             audit.add(Finding::new(Severity::Serious, text));
         }
@@ -28,17 +22,18 @@ pub(super) fn tell_gravity(shares: &[Option<f64>], audits: &mut [Audit]) {
 }
 
 /// Why nothing can be concluded from torques that hold another gravity, in a sentence: by the median of the logs that tell.
-pub(super) fn against_gravity(shares: &[Option<f64>]) -> Option<String> {
+pub(super) fn against_gravity(shares: &[Option<f64>], settings: &NoteSettings) -> Option<String> {
     let mut shares: Vec<f64> = shares.iter().copied().flatten().collect();
     shares.sort_by(f64::total_cmp);
     let median = shares
         .get(shares.len() / 2)
-        .filter(|share| contradicts(share))?;
+        .filter(|share| contradicts(**share, settings))?;
     Some(format!("{}; effects would imitate that", told(*median)))
 }
 
-fn contradicts(share: &f64) -> bool {
-    !(LEAST..1.0 / LEAST).contains(share)
+fn contradicts(share: f64, settings: &NoteSettings) -> bool {
+    let least = settings.least_gravity;
+    !(least..1.0 / least).contains(&share)
 }
 
 fn told(share: f64) -> String {
@@ -50,19 +45,19 @@ fn told(share: f64) -> String {
     )
 }
 
-/// The share of the declared gravity in each log of a study by torques, where it tells.
-pub(super) fn shares_of_gravity(study: &Study<'_>) -> Vec<Option<f64>> {
-    if study.space != Space::Torque {
+/// The share of the declared gravity in each log of a problem by torques, where it tells.
+pub(super) fn shares_of_gravity(problem: &Problem<'_>) -> Vec<Option<f64>> {
+    if problem.space != Space::Torque {
         return Vec::new();
     }
-    let bodies = study.declared.with_effects(Vec::new());
-    let of_log = |log| share(&bodies, &Smooth::of(log));
-    study.logs.iter().map(of_log).collect()
+    let bodies = problem.declared.with_effects(Vec::new());
+    let of_log = |log| share(&bodies, &Smooth::of(log), &problem.settings.notes);
+    problem.logs.iter().map(of_log).collect()
 }
 
 /// The share of the declared gravity in the torques, by least squares beside acceleration, friction and an offset joint by
 /// joint, each weighing as much as its gravity varies; `None` where gravity hardly loads any.
-fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
+fn share(bodies: &Model, smooth: &Smooth, settings: &NoteSettings) -> Option<f64> {
     let balance = bodies.torque_balance()?;
     let (n, rows) = (bodies.joints, smooth.rows());
     let none = vec![vec![0.0; rows]; n];
@@ -82,7 +77,7 @@ fn share(bodies: &Model, smooth: &Smooth) -> Option<f64> {
         let weight = column(&|row| gravity[j][row]);
         let torque = column(&|row| smooth.tau[j][row]);
         let spread = |of: &DVector<f64>| of.variance().sqrt();
-        if spread(&weight) < TELLS * spread(&torque) {
+        if spread(&weight) < settings.gravity_spread * spread(&torque) {
             return None;
         }
         let varies = weight.variance();

@@ -10,12 +10,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::fitted::Fitted;
+use super::problem::Problem;
 use super::refine::Refined;
 use super::settings::LearnSettings;
 use super::space::Space;
 use super::split::between;
-use super::stage::{Observer, Progress, Stage};
-use super::study::Study;
+use super::stage::{Progress, Stage, Watch};
 use crate::data::{Log, Thinning, Trajectory, trajectories};
 use crate::files::OutputError;
 use crate::model::{Dynamics, Origin};
@@ -109,12 +109,12 @@ impl NetworkCheck {
     fn of(errors: &[[f64; 2]], settings: &LearnSettings) -> Self {
         let ratio = |[without, with]: &[f64; 2]| with / without;
         let total = |k: usize| errors.iter().map(|e| e[k].powi(2)).sum::<f64>().sqrt();
-        let harms = errors.iter().any(|e| ratio(e) > settings.harmful);
+        let harms = errors.iter().any(|e| ratio(e) > settings.harmful_ratio);
         Self {
             without: errors.iter().map(|e| e[0]).collect(),
             with: errors.iter().map(|e| e[1]).collect(),
             // Not a number where a prediction is none: then it is not used.
-            used: !harms && total(1) <= settings.helpful * total(0),
+            used: !harms && total(1) <= settings.helpful_ratio * total(0),
             failure: None,
         }
     }
@@ -130,30 +130,30 @@ impl NetworkCheck {
 
 /// Train the residual network on what the refined model leaves, and keep it if it helps on parts of the logs that it was
 /// not trained on. `None` where no network is asked for or the logs are too few to train one.
-pub(super) fn learn(
+pub fn learn(
     refined: &Refined<'_>,
     learner: Option<&dyn ResidualLearner>,
     rng: &mut impl Rng,
-    progress: &mut Observer<'_>,
+    watch: &dyn Watch,
 ) -> Option<Learned> {
     // A network is trained on motion.
-    let learner = learner.filter(|_| refined.study.space == Space::Motion)?;
-    let (study, fitted) = (&refined.study, &refined.after);
+    let learner = learner.filter(|_| refined.problem.space == Space::Motion)?;
+    let (problem, fitted) = (&refined.problem, &refined.after);
     let mut tell = |text: &str| {
         let text = format!("{}, {text}", Stage::Learn.text());
-        progress(Progress::within(Stage::Learn, &text));
+        watch.see(Progress::within(Stage::Learn, &text));
     };
-    let settings = &study.settings.learn;
+    let settings = &problem.settings.learn;
     let mut train = |logs: &[Log], epochs: usize| {
         let settings = LearnSettings {
             epochs,
             ..settings.clone()
         };
-        learner.learn(&task(study, fitted, logs, settings), rng, &mut tell)
+        learner.learn(&task(problem, fitted, logs, settings), rng, &mut tell)
     };
-    let mut check = checked(study, fitted, &mut |logs| train(logs, settings.epochs))?;
+    let mut check = checked(problem, fitted, &mut |logs| train(logs, settings.epochs))?;
     if check.used {
-        match train(study.logs, settings.epochs) {
+        match train(problem.logs, settings.epochs) {
             Ok(network) => {
                 let network = Some(network?);
                 return Some(Learned { network, check });
@@ -162,7 +162,7 @@ pub(super) fn learn(
         }
     }
     // A network that is not trained adds nothing.
-    let (network, check) = match train(study.logs, 0) {
+    let (network, check) = match train(problem.logs, 0) {
         Ok(network) => (Some(network?), check),
         Err(failure) => (None, check.failed(&failure)),
     };
@@ -173,10 +173,10 @@ pub(super) fn learn(
 type Train<'a> = dyn FnMut(&[Log]) -> Result<Option<Box<dyn LearnedResidual>>, LearnError> + 'a;
 
 /// Whether networks help on parts of the logs that they were not trained on. `None` where the logs are too few to train one.
-fn checked(study: &Study<'_>, fitted: &Fitted, train: &mut Train<'_>) -> Option<NetworkCheck> {
-    let settings = &study.settings.learn;
-    let parts = parts(study.logs, settings.parts);
-    let horizon_s = [study.settings.score.middle_s()];
+fn checked(problem: &Problem<'_>, fitted: &Fitted, train: &mut Train<'_>) -> Option<NetworkCheck> {
+    let settings = &problem.settings.learn;
+    let parts = parts(problem.logs, settings.check_parts);
+    let horizon_s = [problem.settings.score.middle_s()];
     let error = |model: &Dynamics, logs: &[Log]| assess(model, logs, &horizon_s).position_rms();
     let mut errors = Vec::new();
     for (k, left_out) in parts.iter().enumerate() {
@@ -209,7 +209,12 @@ fn parts(logs: &[Log], count: usize) -> Vec<Vec<Log>> {
     (0..count).map(of).collect()
 }
 
-fn task(study: &Study<'_>, fitted: &Fitted, logs: &[Log], settings: LearnSettings) -> ResidualTask {
+fn task(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    logs: &[Log],
+    settings: LearnSettings,
+) -> ResidualTask {
     // The checkpoint's own model file has shifted parameters in their places, and so must what is trained.
     let equations = fitted.model.absorbed().dynamics();
     let thinning = Thinning {
@@ -221,14 +226,14 @@ fn task(study: &Study<'_>, fitted: &Fitted, logs: &[Log], settings: LearnSetting
     let stretches = logs.iter().flat_map(of_log);
     let (mut training, mut validation) = (Vec::new(), Vec::new());
     for (k, stretch) in stretches.enumerate() {
-        match (k + 1).is_multiple_of(settings.every) {
+        match (k + 1).is_multiple_of(settings.validation_every) {
             true => validation.push(stretch),
             false => training.push(stretch),
         }
     }
     ResidualTask {
         equations,
-        hidden: study.declared.hidden.clone(),
+        hidden: problem.declared.hidden.clone(),
         training,
         validation,
         settings,

@@ -1,20 +1,26 @@
+use std::sync::Arc;
+
 use super::by_log::OfLog;
 use super::calibrate::Calibration;
 use super::discriminate::Alternative;
+use super::establish::Chosen;
 use super::fitted::Fitted;
+use super::judge::Found;
 use super::learn::{Learned, LearnedResidual};
-use super::remainder::{Proposal, ResidualForce, Unexplained};
-use super::score::{Contradicted, Errors, Finding};
+use super::prepare::Prepared;
+use super::problem::Problem;
+use super::refine::Refined;
+use super::remainder::{Proposal, ResidualForce, Unexplained, proposal};
+use super::score::{Contradicted, Errors, Finding, Predictions, contradicted};
 use super::select::Round;
 use super::settings::Settings;
 use super::space::Space;
 use super::split::SplitMethod;
 use super::stage::Stage;
-use super::study::Study;
 use super::verdict::Verdict;
 use crate::data::{Audit, Log};
 use crate::identify::{BodiesTold, FitError, Identifiability, Uncertainty};
-use crate::model::{Model, Parameter};
+use crate::model::{Library, Model, Parameter, Status};
 
 /// Everything that closing the loop found out.
 #[non_exhaustive]
@@ -29,23 +35,25 @@ pub struct Outcome {
     pub effects: Effects,
     pub remainder: Remainder,
     pub errors: Errors,
+    /// What the models predict of the test logs.
+    pub predictions: Predictions,
     /// The residual network and whether it helps, where the logs suffice to train one.
     pub learned: Option<Learned>,
     /// The chosen model fitted to each training log alone; empty for a single log and for very many.
     pub by_log: Vec<OfLog>,
     /// What the training logs could show, where that was asked for: see [`Calibrator`](super::Calibrator).
     pub calibration: Option<Calibration>,
-    /// How long each stage took in s.
+    /// How long each stage took in s, for whoever watched the work to fill in (see [`StageTimes`](super::StageTimes)); empty at first.
     pub seconds: Vec<(Stage, f64)>,
 }
 
 /// What was studied.
 #[non_exhaustive]
 pub struct Given {
-    pub train: Vec<Log>,
+    pub train: Arc<[Log]>,
     /// The training logs as they were fitted: with readings that jump masked and dropped rows put in or left out.
-    pub studied: Vec<Log>,
-    pub test: Vec<Log>,
+    pub studied: Arc<[Log]>,
+    pub test: Arc<[Log]>,
     /// Names of the test logs that are training logs once more: they were fitted, and test nothing.
     pub fitted_tests: Vec<String>,
     pub split: SplitMethod,
@@ -114,8 +122,8 @@ impl Outcome {
         self.learned.as_ref()?.network.as_deref()
     }
 
-    /// The training logs as they were studied; `declared` is the model they were studied for.
-    pub fn study<'a>(&'a self, declared: &'a Model) -> Study<'a> {
+    /// What was studied once more, for the model and the library that it was studied with.
+    pub fn problem<'a>(&'a self, declared: &'a Model, library: &'a Library) -> Problem<'a> {
         let Given {
             studied,
             audits,
@@ -123,9 +131,84 @@ impl Outcome {
             ..
         } = &self.given;
         let audits = audits[..studied.len()].to_vec();
-        Study {
-            identifiability: self.models.identifiability.clone(),
-            ..Study::audited(declared, self.space, studied, audits, settings)
+        Problem::audited(
+            declared,
+            library,
+            self.space,
+            (&**studied, audits),
+            settings,
+        )
+        .knowing(self.models.identifiability.clone())
+    }
+}
+
+impl Given {
+    pub(super) fn of(
+        prepared: &Prepared<'_>,
+        (audits, fitted_tests): (Vec<Audit>, Vec<String>),
+    ) -> Self {
+        let model = prepared.model;
+        Self {
+            train: Arc::clone(&prepared.train.logs),
+            studied: Arc::clone(&prepared.train.for_fits),
+            test: Arc::clone(&prepared.test.logs),
+            fitted_tests,
+            split: prepared.split.clone(),
+            audits,
+            settings: prepared.settings.clone(),
+            unscored_s: prepared.unscored_s.clone(),
+            prismatic: model.prismatic.clone(),
+            declared: model.parameters.iter().map(|p| p.value).collect(),
+        }
+    }
+}
+
+impl Models {
+    pub(super) fn of(problem: &Problem<'_>, refined: Refined<'_>) -> Self {
+        let fitted = refined.after.model.absorbed().all_parameters();
+        Self {
+            contradicted: contradicted(&problem.declared.all_parameters(), &fitted),
+            before: refined.before,
+            after: refined.after,
+            bodies: refined.bodies,
+            uncertainty: refined.uncertainty,
+            moved_to: problem.moved_to.clone(),
+            identifiability: refined.identifiability,
+        }
+    }
+}
+
+impl Effects {
+    pub(super) fn of(
+        mut findings: Vec<Finding>,
+        alternatives: Vec<Alternative>,
+        chosen: Chosen,
+    ) -> Self {
+        findings.sort_by_key(|finding| finding.effect.joint.index());
+        let (findings, supported) =
+            (findings.into_iter()).partition(|finding| finding.status == Status::Established);
+        Self {
+            findings,
+            supported,
+            alternatives,
+            rounds: chosen.rounds,
+            stopped: chosen.stopped,
+        }
+    }
+}
+
+impl Remainder {
+    pub(super) fn of(found: &Found<'_>, refined: &Refined<'_>) -> Self {
+        let problem = &found.problem;
+        let (before, after) = rayon::join(
+            || ResidualForce::of(problem, &found.before),
+            || ResidualForce::of(problem, &found.chosen.after),
+        );
+        Self {
+            proposal: proposal(problem, &refined.after, &found.unexplained),
+            unexplained: found.unexplained.clone(),
+            before,
+            after,
         }
     }
 }

@@ -6,21 +6,17 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::establish::Standing;
 use super::fitted::Fitted;
-use super::study::Study;
+use super::problem::Problem;
 use crate::data::Joint;
 use crate::identify::Fit;
 use crate::model::{Effect, Entry, FittedEffect, Status};
-
-/// Masses of loads that fits start from, in those of the last body: a fit from a light one may end where the bodies stand for
-/// the load.
-const MASSES: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 
 /// What a fit costs, with what the declared values do.
 fn whole(fit: &Fit) -> f64 {
     fit.cost + fit.departure
 }
 
-impl Study<'_> {
+impl Problem<'_> {
     /// Whether the fit may change the bodies of a chain.
     pub(super) fn has_free_bodies(&self) -> bool {
         let mut parts = self.declared.inertias().into_iter().flatten();
@@ -28,16 +24,12 @@ impl Study<'_> {
     }
 
     /// The chosen model with a load at its tip, where most of what its bodies depart from the declared ones is one load.
-    pub(super) fn with_payload(
-        &self,
-        chosen: &Fitted,
-        library: &[Effect],
-    ) -> Option<(Fitted, Standing)> {
+    pub(super) fn with_payload(&self, chosen: &Fitted) -> Option<(Fitted, Standing)> {
         if !self.has_free_bodies() {
             return None;
         }
         let is_load = |effect: &&Effect| matches!(effect.entry, Entry::Payload(_));
-        let effect = library.iter().find(is_load)?;
+        let effect = self.effects().iter().find(is_load)?;
         let tip = Joint::at(self.declared.joints - 1);
         let is_there = chosen
             .model
@@ -56,7 +48,7 @@ impl Study<'_> {
         let settings = &self.settings.establish;
         let p_value = p_of(2.0 * saved, effect.parameters.len());
         let is_clear =
-            saved > settings.of_departure * chosen.fit.departure && p_value < settings.false_alarm;
+            saved > settings.payload_share * chosen.fit.departure && p_value < settings.false_alarm;
         let effect = with.model.effects.last()?.clone();
         is_clear.then(|| {
             let standing = Standing {
@@ -72,12 +64,7 @@ impl Study<'_> {
     }
 
     /// Loads of some masses, at the place where they change the last body's first moments as the chosen model did.
-    fn loads(
-        &self,
-        chosen: &Fitted,
-        effect: &Effect,
-        tip: Joint,
-    ) -> Option<[FittedEffect; MASSES.len()]> {
+    fn loads(&self, chosen: &Fitted, effect: &Effect, tip: Joint) -> Option<[FittedEffect; 4]> {
         let last = *self.declared.inertias().last()?;
         let declared = |part: usize| self.declared.parameters[last[part]].value;
         let fitted = |part: usize| chosen.model.parameters[last[part]].value;
@@ -95,7 +82,7 @@ impl Study<'_> {
             }
             load
         };
-        Some(MASSES.map(load))
+        Some(self.settings.establish.payload_masses.map(load))
     }
 
     /// The chosen model with a load, fitted from the declared bodies: those of the chosen model stand for the load already.

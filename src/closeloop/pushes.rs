@@ -1,22 +1,11 @@
 //! Forces that no column holds: a person pushes, a cable pulls, a limb touches. The fitted model follows the log there
 //! only with a further torque that is far beyond what it needs elsewhere.
 
+use super::problem::Problem;
 use super::remainder::ForceSample;
-use super::study::Study;
+use super::settings::NoteSettings;
 use crate::data::statistics::{SIGMA_PER_MAD, median};
 use crate::data::{Audit, Finding, Interval, Joint, Severity};
-
-/// A residual force counts as a push beyond this many standard deviations of the others,
-const PUSH: f64 = 8.0;
-
-/// and from this share of the joint's largest torque on: less is what the smoothing of friction leaves of a clean log.
-const PUSH_SHARE: f64 = 0.1;
-
-/// A push goes on next to its strongest stretch as long as the force stays beyond this many standard deviations,
-const ITS_EDGE: f64 = 4.0;
-
-/// for this many stretches at least: an end stop or a joint that sticks is over in one.
-const ITS_STRETCHES: usize = 2;
 
 /// One push on one joint.
 #[derive(Debug)]
@@ -30,23 +19,30 @@ struct Push {
     times: f64,
 }
 
-/// Add to the audits of the study's logs where something pushed, as far as the residual forces of a fitted model tell.
-pub(super) fn tell_pushes(study: &Study<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
-    let stretch_s = study.settings.remainder.stretch_s;
-    for joint in Joint::all(study.declared.joints) {
-        let least = PUSH_SHARE * study.top_torque[joint];
-        for push in pushes(forces, joint, stretch_s, least) {
-            audits[push.log].add(push.finding(&study.logs[push.log].name()));
+/// Add to the audits of the problem's logs where something pushed, as far as the residual forces of a fitted model tell.
+pub(super) fn tell_pushes(problem: &Problem<'_>, forces: &[ForceSample], audits: &mut [Audit]) {
+    let settings = &problem.settings.notes;
+    let stretch_s = problem.settings.remainder.stretch_s;
+    for joint in Joint::all(problem.declared.joints) {
+        let least = settings.push_torque * problem.top_torque[joint];
+        for push in pushes(forces, joint, (stretch_s, least), settings) {
+            audits[push.log].add(push.finding(&problem.logs[push.log].name()));
         }
     }
 }
 
 /// The pushes on a joint of at least so much force, in stretches of `stretch_s`.
-fn pushes(samples: &[ForceSample], joint: Joint, stretch_s: f64, least: f64) -> Vec<Push> {
+fn pushes(
+    samples: &[ForceSample],
+    joint: Joint,
+    (stretch_s, least): (f64, f64),
+    settings: &NoteSettings,
+) -> Vec<Push> {
     let force = |sample: &ForceSample| sample.force[joint];
     let sizes: Vec<f64> = samples.iter().map(|sample| force(sample).abs()).collect();
     let deviation = SIGMA_PER_MAD * median(&sizes);
-    let is_far = |sample: &ForceSample| force(sample).abs() > ITS_EDGE * deviation;
+    let is_far =
+        |sample: &ForceSample| force(sample).abs() > settings.push_edge_deviations * deviation;
     let goes_on = |a: &ForceSample, b: &ForceSample| {
         let adjacent = a.log == b.log && b.time_s - a.time_s < 1.5 * stretch_s;
         adjacent && is_far(a) && is_far(b)
@@ -56,7 +52,8 @@ fn pushes(samples: &[ForceSample], joint: Joint, stretch_s: f64, least: f64) -> 
             .iter()
             .map(|sample| force(sample).abs())
             .fold(0.0, f64::max);
-        let is_push = run.len() >= ITS_STRETCHES && largest > least.max(PUSH * deviation);
+        let is_push = run.len() >= settings.push_stretches
+            && largest > least.max(settings.push_deviations * deviation);
         is_push.then(|| Push {
             log: run[0].log,
             joint,
@@ -109,7 +106,8 @@ mod tests {
     fn a_force_that_lasts_is_a_push_and_a_single_knock_is_none() {
         let usual = |k: usize| 0.01 * (k as f64).sin();
         let found = |force: &dyn Fn(usize) -> f64, least: f64| {
-            pushes(&samples(force), Joint::at(0), 0.15, least)
+            let settings = NoteSettings::default();
+            pushes(&samples(force), Joint::at(0), (0.15, least), &settings)
         };
         assert!(found(&usual, 0.0).is_empty());
         let pushed = |k: usize| usual(k) + if (40..44).contains(&k) { 2.0 } else { 0.0 };

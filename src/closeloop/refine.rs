@@ -1,9 +1,11 @@
 //! Stage 7: estimate the declared and the chosen model in fine steps.
 
 use super::fitted::Fitted;
+use super::judge::Found;
+use super::problem::Problem;
 use super::settings::RefineSettings;
 use super::space::Space;
-use super::study::Study;
+use super::stage::{Stage, Watch};
 use crate::identify::{
     BodiesTold, FitError, Identifiability, Uncertainty, Values, bodies_told, uncertainty,
 };
@@ -11,9 +13,9 @@ use crate::model::Model;
 
 /// The declared and the chosen model, both estimated in the same steps: in fine ones or, where either estimate failed, in
 /// those that effects were selected with. Their errors differ by the effects alone.
-pub(super) struct Refined<'a> {
+pub struct Refined<'a> {
     /// The training logs in these steps.
-    pub study: Study<'a>,
+    pub problem: Problem<'a>,
     /// The declared model.
     pub before: Fitted,
     /// The chosen model, with 95 % intervals.
@@ -29,13 +31,23 @@ pub(super) struct Refined<'a> {
 }
 
 /// Estimate the declared and the chosen model in fine steps, or with the noise of the torques that the chosen one leaves.
-pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) -> Refined<'a> {
-    let mut fine = match study.space {
-        Space::Motion => study.refined(),
-        Space::Torque => study.weighed_by(chosen),
+pub fn refine<'a>(found: &Found<'a>, watch: &dyn Watch) -> Refined<'a> {
+    watch.see(Stage::Refine.into());
+    refined(&found.problem, &found.before, &found.chosen.after)
+}
+
+/// The same of any two models.
+pub(super) fn refined<'a>(
+    problem: &Problem<'a>,
+    declared: &Fitted,
+    chosen: &Fitted,
+) -> Refined<'a> {
+    let mut fine = match problem.space {
+        Space::Motion => problem.refined(),
+        Space::Torque => problem.weighed_by(chosen),
     };
-    let mut identifiability = study.identifiability.clone();
-    let (study, before, mut after, failure) = loop {
+    let mut identifiability = problem.identifiability.clone();
+    let (problem, before, mut after, failure) = loop {
         match rayon::join(|| fine.estimate(declared), || fine.estimate(chosen)) {
             (Ok(before), Ok(after)) => {
                 // What a single stretch tells is not determined: another one might tell otherwise.
@@ -47,17 +59,17 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
             }
             (Err(error), _) | (_, Err(error)) => {
                 let (before, after) = (declared.clone(), chosen.clone());
-                break (study.again(), before, after, Some(error));
+                break (problem.clone(), before, after, Some(error));
             }
         }
     };
-    let uncertainty = uncertainty(&study.shooting, &after.fit);
-    let bodies = study.told_of_bodies(&after, &uncertainty);
-    after.model = with_intervals(&study, &after, &uncertainty, &chosen.model);
+    let uncertainty = uncertainty(&problem.shooting, &after.fit);
+    let bodies = problem.told_of_bodies(&after, &uncertainty);
+    after.model = with_intervals(&problem, &after, &uncertainty, &chosen.model);
     Refined {
         bodies,
         uncertainty,
-        study,
+        problem,
         before,
         after,
         identifiability,
@@ -65,33 +77,34 @@ pub(super) fn refine<'a>(study: &Study<'a>, declared: &Fitted, chosen: &Fitted) 
     }
 }
 
-impl Study<'_> {
-    /// The same study in finer steps, to estimate a model that has been chosen. A width of friction's reversal that
+impl<'a> Problem<'a> {
+    /// The same problem in finer steps, to estimate a model that has been chosen. A width of friction's reversal that
     /// the model file gives stays, and so do parameters that the logs do not determine: the intervals of the others are
     /// relative to them.
     pub fn refined(&self) -> Self {
-        let RefineSettings { step_s, narrower } = self.settings.refine;
+        let RefineSettings {
+            step_s,
+            sign_width_factor: narrower,
+        } = self.settings.refine;
         let narrower = self.declared.sign_width.as_ref().map_or(narrower, |_| 1.0);
         let of_joint =
-            |(width, top): (&f64, &f64)| match *width > self.settings.fit.sign_width * top {
+            |(width, top): (&f64, &f64)| match *width > self.settings.fit.sign_width_share * top {
                 // Friction of the rig reverses over it.
                 true => *width,
                 false => narrower * width,
             };
         let widths = self.sign_widths.iter().zip(&self.top_speed);
         let sign_widths: Vec<f64> = widths.map(of_joint).collect();
-        let windows = self.shooting.windows.clone();
-        let shooting = self.shooting.over(windows);
         Self {
             sign_widths,
             held: self.identifiability.hold.clone(),
-            shooting: shooting.in_steps_of(step_s),
-            ..self.again()
+            shooting: self.shooting.clone().in_steps_of(step_s),
+            ..self.clone()
         }
     }
 }
 
-impl Study<'_> {
+impl Problem<'_> {
     /// What the logs tell of the bodies of a chain.
     fn told_of_bodies(&self, fitted: &Fitted, uncertainty: &Uncertainty) -> BodiesTold {
         if self.space == Space::Motion {
@@ -102,14 +115,12 @@ impl Study<'_> {
         bodies_told(&dynamics, self.declared, &values, &fitted.fit, uncertainty)
     }
 
-    /// The same study where the noise of each joint is what a model leaves.
+    /// The same problem where the noise of each joint is what a model leaves.
     fn weighed_by(&self, fitted: &Fitted) -> Self {
         let dynamics = self.compiled(&fitted.model);
         let values = Values::of(&dynamics, self.logs);
         let noise = (self.shooting).left_by(&dynamics, &values, &fitted.fit.locals);
-        let mut study = self.again();
-        study.weigh_by(&noise);
-        study
+        self.over(self.shooting.with_noise(&noise))
     }
 }
 
@@ -117,7 +128,7 @@ impl Study<'_> {
 /// as the value was off in `coarse` numbers: smoothing and steps err to first order, so that what halving them changes is
 /// what is left of their error (Richardson 1911).
 pub fn with_intervals(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     fitted: &Fitted,
     uncertainty: &Uncertainty,
     coarse: &Model,
@@ -126,7 +137,7 @@ pub fn with_intervals(
     let mut model = fitted.model.clone();
     for (i, column) in fitted.fit.columns.iter().enumerate() {
         let k = column.parameter;
-        let log = column.log.map(|log| &study.logs[log]);
+        let log = column.log.map(|log| &problem.logs[log]);
         let off = match log {
             Some(_) => 0.0,
             None => (values[k] - coarse[k]).abs(),

@@ -1,13 +1,9 @@
-use std::time::Duration;
-
-use super::error::StudyError;
 use super::learn::ResidualLearner;
 use super::settings::Settings;
 use super::space::Space;
 use super::split::Split;
-use crate::data::{Finding, Log, audit_together};
+use crate::data::Log;
 use crate::model::{Library, Model};
-use crate::sim::metric::window_count;
 
 /// The inputs of closing the loop.
 #[derive(Debug, Clone)]
@@ -23,8 +19,6 @@ pub struct Request<'a> {
     pub settings: Settings,
     /// Which errors to compare; without it, those that say more about these logs.
     pub space: Option<Space>,
-    /// Time after which the search for effects stops where it stands; without one it goes on to its end.
-    pub budget: Option<Duration>,
     /// Trains the residual network; without it there is none.
     pub learner: Option<&'a dyn ResidualLearner>,
 }
@@ -67,7 +61,6 @@ impl<'a> Request<'a> {
             against: Vec::new(),
             settings: Settings::default(),
             space: None,
-            budget: None,
             learner: None,
         }
     }
@@ -78,34 +71,6 @@ impl<'a> Request<'a> {
             Logs::Together(logs) => Split::of(logs, &self.settings.split),
             Logs::Divided(split) => split,
         }
-    }
-
-    /// Keep those of the horizons of which the test logs hold a window, and return the others.
-    ///
-    /// # Errors
-    /// Test logs without a window of any of them.
-    pub(super) fn score_on(&mut self, test: &[Log]) -> Result<Vec<f64>, StudyError> {
-        let horizons_s = self.settings.score.horizons_s.drain(..);
-        let (scored_s, unscored_s): (Vec<_>, Vec<_>) =
-            horizons_s.partition(|horizon_s| window_count(test, *horizon_s) > 0);
-        if scored_s.is_empty() {
-            return Err(StudyError::NoTest {
-                shortest_s: unscored_s.into_iter().fold(f64::INFINITY, f64::min),
-                found: self.serious_in(test),
-            });
-        }
-        self.settings.score.horizons_s = scored_s;
-        Ok(unscored_s)
-    }
-
-    /// The first serious finding about a test log, as the end of a sentence; empty without one.
-    fn serious_in(&self, test: &[Log]) -> String {
-        let audits = audit_together(test, &self.model.columns);
-        let mut found = audits.iter().flat_map(|audit| {
-            let told = |finding: &Finding| format!("; {}: {finding}", audit.log);
-            audit.serious().map(told).next()
-        });
-        found.next().unwrap_or_default()
     }
 }
 

@@ -1,33 +1,24 @@
 //! Whether the logs drive the joints the other way round than the model does.
 
 use super::fitted::Fitted;
-use super::study::Study;
+use super::problem::Problem;
 use crate::data::{Audit, Log, Remedy, reversed_driving};
-use crate::model::Effect;
 
-/// The torques have the opposite sign where the model leaves this share of its loss with all of them reversed: half the error.
-const MUCH_LESS: f64 = 0.25;
-
-impl Study<'_> {
-    /// Add to the audits of the study's logs that their torques, or commands, look reversed on all joints at once. The audit
+impl Problem<'_> {
+    /// Add to the audits of the problem's logs that their torques, or commands, look reversed on all joints at once. The audit
     /// of a log alone tells so of single joints, where the acceleration follows them closely; here the model tells.
-    pub(super) fn tell_reversed(
-        &self,
-        library: &[Effect],
-        usual: Option<&Fitted>,
-        audits: &mut [Audit],
-    ) {
+    pub(super) fn tell_reversed(&self, usual: Option<&Fitted>, audits: &mut [Audit]) {
         let key = self.declared.driven_by().key();
         if !self.moves() || audits.iter().any(|audit| mends(audit, key)) {
             return;
         }
         let reversed: Vec<Log> = self.logs.iter().map(reversed).collect();
-        let other = self.on(&reversed).with_usual_friction(library);
+        let other = self.on(&reversed).with_usual_friction();
         let (Some(usual), Some(other)) = (usual, other) else {
             return;
         };
         let share = other.loss() / usual.loss().max(f64::MIN_POSITIVE);
-        if share < MUCH_LESS {
+        if share < self.settings.notes.reversed_loss {
             let columns = &self.declared.columns;
             let driven_by = self.declared.driven_by();
             for audit in audits {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::settings::SplitSettings;
 use crate::data::{Log, row_after, row_from};
 
-/// Which logs a study learns from and which it is judged by.
+/// Which logs a problem learns from and which it is judged by.
 #[derive(Debug, Clone)]
 pub struct Split {
     pub train: Vec<Log>,
@@ -48,7 +48,7 @@ impl Split {
 
     /// Set whole trajectories apart where there are three or more, else the end of each.
     pub fn of(mut logs: Vec<Log>, settings: &SplitSettings) -> Self {
-        if logs.len() >= settings.whole_logs {
+        if logs.len() >= settings.whole_logs_from {
             let count = settings.count_of(logs.len());
             let test = logs.split_off(logs.len() - count);
             return Self {
@@ -87,8 +87,8 @@ impl Split {
 impl SplitSettings {
     /// How much of the end of a log goes into the gap and the test, in s: more of a short log, so that it can be judged.
     fn rest_s(&self, duration_s: f64) -> f64 {
-        let enough = (self.test_share * duration_s).max(self.gap_s + self.shortest_s);
-        enough.min(self.most * duration_s)
+        let enough = (self.test_share * duration_s).max(self.gap_s + self.shortest_test_s);
+        enough.min(self.largest_share * duration_s)
     }
 
     /// How many of so many logs are set apart.

@@ -70,8 +70,23 @@ pub struct Fits {
     pub of: usize,
 }
 
-/// Receives progress, from any of the threads that fit models.
-pub type Observer<'o> = dyn FnMut(Progress<'_>) + Send + 'o;
+/// Follows the work, from any of the threads that do it, and may end the search.
+///
+/// The library reads no clock: whoever bounds the time of a search, or measures that of its stages, does so here.
+pub trait Watch: Sync {
+    /// Hears what is being done.
+    fn see(&self, now: Progress<'_>);
+
+    /// Whether the search for effects is to end where it stands. Asked before each model that is fitted.
+    fn has_to_end(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody watches, and the search goes on to its end.
+impl Watch for () {
+    fn see(&self, _: Progress<'_>) {}
+}
 
 impl<'t> Progress<'t> {
     /// A step within a stage.
@@ -87,43 +102,63 @@ impl From<Stage> for Progress<'_> {
     }
 }
 
-/// Takes the time of each stage.
-pub(super) struct Clock {
+/// How long each stage took, by the clock of whoever watches.
+#[derive(Debug)]
+pub struct StageTimes {
     now: (Stage, Instant),
     past: Vec<(Stage, f64)>,
 }
 
-impl Clock {
-    /// Starts with the first stage.
-    pub fn start() -> Self {
+impl StageTimes {
+    /// The first stage begins.
+    pub fn since(start: Instant) -> Self {
         Self {
-            now: (Stage::ALL[0], Instant::now()),
+            now: (Stage::ALL[0], start),
             past: Vec::new(),
         }
     }
 
-    /// A stage goes on or begins.
-    pub fn note(&mut self, stage: Stage) {
-        if stage != self.now.0 {
-            self.past.push(self.ended());
-            self.now = (stage, Instant::now());
+    /// A stage goes on or begins; returns the one that ended with it, and when that began.
+    pub fn note(&mut self, stage: Stage, at: Instant) -> Option<(Stage, Instant)> {
+        if stage == self.now.0 {
+            return None;
         }
+        self.past.push(self.until(at));
+        Some(std::mem::replace(&mut self.now, (stage, at)))
     }
 
-    /// Time in s of each stage, in their order.
-    pub fn stop(mut self) -> Vec<(Stage, f64)> {
-        self.past.push(self.ended());
+    /// The stage that goes on, and when it began.
+    pub fn now(&self) -> (Stage, Instant) {
+        self.now
+    }
+
+    /// Time in s of each stage, in their order; the last one ends here.
+    pub fn end(mut self, at: Instant) -> Vec<(Stage, f64)> {
+        self.past.push(self.until(at));
         self.past
     }
 
-    fn ended(&self) -> (Stage, f64) {
-        (self.now.0, self.now.1.elapsed().as_secs_f64())
+    fn until(&self, at: Instant) -> (Stage, f64) {
+        let (stage, since) = self.now;
+        (stage, at.duration_since(since).as_secs_f64())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Stage;
+    use std::time::{Duration, Instant};
+
+    use super::{Stage, StageTimes};
+
+    #[test]
+    fn a_stage_lasts_until_the_next_one_begins() {
+        let start = Instant::now();
+        let at = |seconds: u64| start + Duration::from_secs(seconds);
+        let mut times = StageTimes::since(start);
+        assert!(times.note(Stage::Audit, at(1)).is_none());
+        assert_eq!(times.note(Stage::Fit, at(3)), Some((Stage::Audit, start)));
+        assert_eq!(times.end(at(7)), [(Stage::Audit, 3.0), (Stage::Fit, 4.0)]);
+    }
 
     #[test]
     fn stages_are_numbered_in_their_order() {

@@ -1,24 +1,21 @@
 //! Starting values for a model that diverges with those in its file.
 
-use super::study::{Sample, Study};
+use super::problem::{Problem, Sample};
+use super::settings::FitSettings;
 use crate::identify::Values;
 use crate::model::{Model, Parameter};
 
-/// Models tried before it is said that none works.
-const TRIED: u32 = 512;
-/// The last of them has values off by this factor, up or down.
-const FARTHEST: f64 = 10.0;
 /// In each, free parameters are spread by another base of the van der Corput sequence.
 const BASES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
 
 /// The declared model at values around those in its file with which it does not diverge over short windows, the nearest
 /// first.
-pub(super) fn around(study: &Study<'_>) -> impl Iterator<Item = Model> {
-    let short = study.windows_of(study.settings.fit.short_window_s);
-    let sample = Sample::of(&short, study.settings.fit.sample_windows).shooting;
-    spread(study.declared).filter(move |model| {
-        let dynamics = study.compiled(model);
-        let values = Values::of(&dynamics, study.logs);
+pub(super) fn around(problem: &Problem<'_>) -> impl Iterator<Item = Model> {
+    let short = problem.windows_of(problem.settings.fit.short_window_s);
+    let sample = Sample::of(&short, problem.settings.fit.sample_windows).shooting;
+    spread(problem.declared, &problem.settings.fit).filter(move |model| {
+        let dynamics = problem.compiled(model);
+        let values = Values::of(&dynamics, problem.logs);
         let costs = sample.costs(&dynamics, &values, &sample.initial_locals(0), 1.0);
         costs.iter().all(|cost| cost.is_finite())
     })
@@ -26,12 +23,17 @@ pub(super) fn around(study: &Study<'_>) -> impl Iterator<Item = Model> {
 
 /// A model with its free parameters at other values, ever farther from its own: spread evenly in the logarithm (Halton
 /// 1960), each with the sign that it has.
-fn spread(declared: &Model) -> impl Iterator<Item = Model> {
-    (1..=TRIED).map(|k| {
+fn spread(declared: &Model, settings: &FitSettings) -> impl Iterator<Item = Model> {
+    let FitSettings {
+        most_starts,
+        farthest_start,
+        ..
+    } = *settings;
+    (1..=most_starts).map(move |k| {
         let mut model = declared.clone();
         let free = model.parameters.iter_mut().filter(|p| !p.fixed);
         for (parameter, base) in free.zip(BASES.into_iter().cycle()) {
-            let reach = FARTHEST.ln() * f64::from(k) / f64::from(TRIED);
+            let reach = farthest_start.ln() * f64::from(k) / f64::from(most_starts);
             move_by(parameter, reach * (2.0 * radical_inverse(k, base) - 1.0));
         }
         model
@@ -61,7 +63,7 @@ fn radical_inverse(mut number: u32, base: u32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{radical_inverse, spread};
+    use super::{FitSettings, radical_inverse, spread};
     use crate::closeloop::tests::pendulum;
     use crate::model::Model;
 
@@ -75,7 +77,7 @@ mod tests {
         declared.parameters[0].value = -15.0;
         let factors = |k: usize| -> Vec<f64> {
             let of = |model: Model| model.parameters[k].value;
-            spread(&declared)
+            spread(&declared, &FitSettings::default())
                 .map(|model| of(model) / declared.parameters[k].value)
                 .collect()
         };

@@ -5,19 +5,20 @@ use std::path::Path;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::establish::{Standing, establish, without_each};
-use super::find::{Chosen, Found, find};
+use super::establish::{Chosen, Standing, establish};
+use super::fit::{Declared, NOTHING};
 use super::fitted::Fitted;
-use super::refine::refine;
+use super::judge::Found;
+use super::pipeline::{close_loop, find};
+use super::problem::Problem;
+use super::refine::refined;
 use super::remainder::ResidualForce;
 use super::request::Request;
-use super::run::close_loop;
 use super::score::{Scored, Scorer, findings};
-use super::select::{Search, Trial};
+use super::select::{Selected, Trial, select, select_from};
 use super::settings::Settings;
 use super::split::Split;
-use super::stage::Progress;
-use super::study::Study;
+use super::stage::{Progress, Watch};
 use super::verdict::{Verdict, verdict};
 use crate::data::{Audit, Joint, Log};
 use crate::identify::{FitError, Termination};
@@ -65,18 +66,23 @@ fn diverging(mut fitted: Fitted) -> Fitted {
     fitted
 }
 
-fn search(study: &mut Study<'_>) -> Found {
+fn search<'a>(problem: &Problem<'a>) -> Found<'a> {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    find(study, &[], &Library::built_in(), &mut rng, &mut |_| {}).unwrap()
+    find(problem.fit_declared().unwrap(), &[], &mut rng, &()).unwrap()
+}
+
+/// A problem in which nothing can be found.
+fn closed<'a>(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Problem<'a> {
+    Problem::new(declared, &NOTHING, logs, settings)
 }
 
 #[test]
 fn a_model_that_diverges_has_no_residual_force() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let mut study = Study::new(&declared, &logs, &settings);
-    let model = study.fit_declared(&[]).unwrap();
-    assert!(ResidualForce::of(&study, &model).unwrap().norm() > 0.0);
-    let failed = ResidualForce::of(&study, &diverging(model));
+    let problem = closed(&declared, &logs, &settings);
+    let model = problem.fit_declared().unwrap().fitted;
+    assert!(ResidualForce::of(&problem, &model).unwrap().norm() > 0.0);
+    let failed = ResidualForce::of(&problem, &diverging(model));
     assert!(matches!(failed, Err(FitError::Diverged { .. })));
 }
 
@@ -84,13 +90,18 @@ fn a_model_that_diverges_has_no_residual_force() {
 #[test]
 fn an_effect_that_saves_little_is_not_established() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let study = Study::new(&declared, &logs, &settings);
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
     let start = declared.with_effects(["coulomb_friction", "gravity_tilt"].map(absent).into());
-    let fitted = study
-        .refit(&start, study.shooting.initial_locals(0), None)
+    let fitted = problem
+        .refit(&start, problem.shooting.initial_locals(0), None)
         .unwrap();
-    let trial = Trial::of(&study, fitted);
-    let standings = establish(&study, &trial, &without_each(&study, &trial), 100);
+    let selected = Selected {
+        chosen: Ok(Trial::of(&problem, fitted.clone())),
+        rounds: Vec::new(),
+        stopped: false,
+    };
+    let standings = establish(&problem, &fitted, selected, &()).standings;
     let statuses: Vec<Status> = standings.iter().map(|s| s.status).collect();
     assert_eq!(statuses, [Status::Established, Status::Supported]);
     assert!(standings[0].reason.is_none());
@@ -100,47 +111,47 @@ fn an_effect_that_saves_little_is_not_established() {
 #[test]
 fn a_fit_that_fails_allows_no_verdict() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let split = Split::of(logs, &settings.split);
-    let mut study = Study::new(&declared, &split.train, &settings);
-    let mut found = search(&mut study);
+    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
+    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let mut found = search(&problem);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let refined = refine(&study, &found.before, &found.chosen.after);
+    let finer = refined(&found.problem, &found.before, &found.chosen.after);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let models = Scored {
-        space: study.space,
+        space: problem.space,
         declared: &declared,
-        before: &refined.before,
+        before: &finer.before,
         with_friction: None,
-        after: &refined.after,
+        after: &finer.after,
         hybrid: None,
         against: &[],
     };
     let errors = scorer.errors(models, &mut rng);
-    let of = |found: &Found, refined: &_| verdict(&study, found, refined, &errors);
-    assert_eq!(of(&found, &refined).0, Verdict::Explained);
+    let of = |found: &Found<'_>, refined: &_| verdict(found, refined, &errors);
+    assert_eq!(of(&found, &finer).0, Verdict::Explained);
 
-    let mut failed = refine(
-        &study,
+    let mut failed = refined(
+        &found.problem,
         &found.before,
         &diverging(found.chosen.after.clone()),
     );
     assert!(matches!(failed.failure, Some(FitError::Diverged { .. })));
-    failed.after = refined.after.clone();
+    failed.after = finer.after.clone();
     let (answer, reason) = of(&found, &failed);
     assert_eq!(answer, Verdict::Inconclusive);
     assert!(reason.contains("the final fit in fine steps failed"));
 
-    let mut unfinished = refine(&study, &found.before, &found.chosen.after);
+    let mut unfinished = refined(&found.problem, &found.before, &found.chosen.after);
     unfinished.after.fit.termination = Termination::StepLimit;
     let (answer, reason) = of(&found, &unfinished);
     assert_eq!(answer, Verdict::Inconclusive);
     assert!(reason.contains("not converged"), "{reason}");
 
     found.chosen.failure = failed.failure.clone();
-    assert_eq!(of(&found, &refined).0, Verdict::Inconclusive);
+    assert_eq!(of(&found, &finer).0, Verdict::Inconclusive);
 }
 
 /// Where a rig's torque carries a bias, the model without the effect that takes it away leaves the range in which its
@@ -154,8 +165,8 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     for tau in logs.iter_mut().flat_map(|log| &mut log.tau[0]) {
         *tau += 8.0;
     }
-    let split = Split::of(logs, &settings.split);
-    let study = Study::new(&declared, &split.train, &settings);
+    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
+    let problem = Problem::new(&declared, &library, &split.train, &settings);
     let bias = |size: f64| FittedEffect {
         values: vec![(size, None)],
         ..absent("constant_torque")
@@ -164,9 +175,9 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
     for (parameter, value) in start.parameters.iter_mut().zip([-17.4, 4.6]) {
         parameter.value = value;
     }
-    let locals = study.shooting.initial_locals(0);
-    let chosen = study.refit(&start, locals, None).unwrap();
-    let refined = refine(&study, &chosen, &chosen);
+    let locals = problem.shooting.initial_locals(0);
+    let chosen = problem.refit(&start, locals, None).unwrap();
+    let refined = refined(&problem, &chosen, &chosen);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
@@ -177,7 +188,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
         gain: 1.0,
         p_value: 0.0,
         reason: None,
-        without: study.without_effect(&chosen, 0),
+        without: problem.without_effect(&chosen, 0),
     };
     let chosen = Chosen {
         after: chosen,
@@ -187,7 +198,7 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
         rivals: Vec::new(),
         failure: None,
     };
-    let found = findings(&study, &chosen, &refined, &scorer);
+    let found = findings(&problem, &chosen, &refined, &scorer);
     assert_eq!(found.len(), 1);
     assert!(matches!(
         found[0].error_reduction,
@@ -199,20 +210,20 @@ fn an_effect_stays_where_the_refit_without_it_fails() {
 #[test]
 fn the_error_reduction_compares_two_fits_in_the_same_steps() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let split = Split::of(logs, &settings.split);
-    let mut study = Study::new(&declared, &split.train, &settings);
-    let found = search(&mut study);
-    let refined = refine(&study, &found.before, &found.chosen.after);
+    let (split, library) = (Split::of(logs, &settings.split), Library::built_in());
+    let problem = Problem::new(&declared, &library, &split.train, &settings);
+    let found = search(&problem);
+    let finer = refined(&found.problem, &found.before, &found.chosen.after);
     let scorer = Scorer {
         test: &split.test,
         settings: &settings.score,
     };
-    let reported = findings(&study, &found.chosen, &refined, &scorer);
+    let reported = findings(&problem, &found.chosen, &finer, &scorer);
     let reduction = *reported[0].error_reduction.as_ref().unwrap();
     let after = &found.chosen.after;
     let (locals, scale) = (after.fit.locals.clone(), after.fit.scale);
     let less = after.model.with_effects(Vec::new());
-    let less = study.refit(&less, locals, Some(scale)).unwrap();
+    let less = problem.refit(&less, locals, Some(scale)).unwrap();
     let error = |model: &Fitted| scorer.fitted(model).position_rms();
     assert_eq!(reduction, 1.0 - error(after) / error(&less));
 }
@@ -239,7 +250,7 @@ effect = [
         library.model(Path::new("acrobot")).unwrap(),
         Settings::default(),
     );
-    let found = search(&mut Study::new(&declared, &logs, &settings));
+    let found = search(&Problem::new(&declared, &library, &logs, &settings));
     let established = found
         .chosen
         .standings
@@ -261,14 +272,14 @@ fn effects_that_raise_the_error_on_the_test_logs_are_doubted() {
     let outcome = |significance: f64| {
         let mut request = Request::of(&declared, &library, logs());
         // Every effect counts as worse, and every remainder as noteworthy.
-        request.settings.verdict.worse = 0.0;
-        request.settings.establish.masking = f64::INFINITY;
-        request.settings.establish.outweighed = 0.0;
+        request.settings.verdict.trusted_rise = 0.0;
+        request.settings.establish.masking_share = f64::INFINITY;
+        request.settings.establish.outweighed_share = 0.0;
         let remainder = &mut request.settings.remainder;
-        (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
+        (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
         remainder.significance = significance;
         let mut rng = ChaCha8Rng::seed_from_u64(0);
-        close_loop(request, &mut rng, &mut |_| {}).unwrap()
+        close_loop(request, &mut rng, &()).unwrap()
     };
     let missing = outcome(2.0);
     assert_eq!(missing.verdict, Verdict::PartlyExplained);
@@ -287,15 +298,33 @@ fn an_effect_that_a_remainder_outweighs_is_not_established() {
     let (declared, library) = (pendulum(), Library::built_in());
     let mut request = Request::of(&declared, &library, logs());
     let remainder = &mut request.settings.remainder;
-    (remainder.noteworthy, remainder.unlocated) = (-1.0, -1.0);
+    (remainder.noteworthy_share, remainder.unlocated_share) = (-1.0, -1.0);
     remainder.significance = 2.0;
-    request.settings.establish.outweighed = f64::INFINITY;
+    request.settings.establish.outweighed_share = f64::INFINITY;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let outcome = close_loop(request, &mut rng, &mut |_| {}).unwrap();
+    let outcome = close_loop(request, &mut rng, &()).unwrap();
     assert!(outcome.effects.findings.is_empty());
     let reason = outcome.effects.supported[0].reason.as_ref().unwrap();
     assert!(reason.contains("stays unexplained"), "{reason}");
     assert_eq!(outcome.verdict, Verdict::Unexplained);
+}
+
+/// Whoever watches may end the search before it has tried anything; the report says so.
+#[test]
+fn a_search_that_is_ended_allows_no_verdict() {
+    struct Ended;
+    impl Watch for Ended {
+        fn see(&self, _: Progress<'_>) {}
+
+        fn has_to_end(&self) -> bool {
+            true
+        }
+    }
+    let (declared, library) = (pendulum(), Library::built_in());
+    let request = Request::of(&declared, &library, logs());
+    let outcome = close_loop(request, &mut ChaCha8Rng::seed_from_u64(0), &Ended).unwrap();
+    assert!(outcome.effects.stopped && outcome.effects.rounds.iter().all(|r| r.tried.is_empty()));
+    assert_eq!(outcome.verdict, Verdict::Inconclusive);
 }
 
 /// The model is the same before and after, and so is its error.
@@ -304,18 +333,18 @@ fn without_effects_the_error_reduction_is_zero() {
     let (declared, library) = (pendulum(), Library::built_in());
     let mut request = Request::of(&declared, &library, logs());
     request.settings.select.most_effects = 0;
-    request.settings.select.most_of_joint = 0;
+    request.settings.select.most_effects_per_joint = 0;
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let outcome = close_loop(request, &mut rng, &mut |_| {}).unwrap();
+    let outcome = close_loop(request, &mut rng, &()).unwrap();
     assert!(outcome.effects.findings.is_empty());
     assert_eq!(outcome.errors.reduction_ci95, Some([0.0, 0.0]));
 }
 
 #[test]
 fn a_changed_setting_changes_the_search() {
-    let (declared, logs) = (pendulum(), logs());
+    let (declared, library, logs) = (pendulum(), Library::built_in(), logs());
     let named = |settings: &Settings| {
-        search(&mut Study::new(&declared, &logs, settings))
+        search(&Problem::new(&declared, &library, &logs, settings))
             .chosen
             .after
             .model
@@ -325,25 +354,24 @@ fn a_changed_setting_changes_the_search() {
     let mut settings = Settings::default();
     assert_eq!(named(&settings), 1);
     settings.select.most_effects = 0;
-    settings.select.most_of_joint = 0;
+    settings.select.most_effects_per_joint = 0;
     assert_eq!(named(&settings), 0);
 }
 
 #[test]
 fn a_search_that_begins_over_short_windows_ends_with_the_same_effects() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let mut study = Study::new(&declared, &logs, &settings);
     let library = Library::built_in();
-    let from_long = study.fit_declared(library.effects()).unwrap();
-    let mut short = study.over_short_windows();
-    let from_short = short.fit_started().unwrap();
-    study.identifiability = short.identifiability.clone();
-    assert!(short.shooting.windows.len() > 2 * study.shooting.windows.len());
-    let mut unheard = |_: Progress<'_>| {};
-    let mut search = Search::new(&study, library.effects(), &mut unheard);
-    let long = search.select(from_long).unwrap();
-    let both = search.select_from(&short, from_short).unwrap();
-    assert_eq!(long.key(), ["coulomb_friction on joint 1"]);
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let short = problem.fitted_over_short_windows().unwrap();
+    let problem = problem.knowing(short.problem.identifiability.clone());
+    assert!(short.problem.shooting.windows.len() > 2 * problem.shooting.windows.len());
+    let long = select(&problem, &fitted, &()).chosen.unwrap();
+    let both = select_from(&problem, &short, &()).chosen.unwrap();
+    let effects = &long.fitted.model.effects;
+    assert_eq!(effects.len(), 1);
+    assert!(effects[0].is_same(&absent("coulomb_friction")));
     assert_eq!(both.key(), long.key());
     let loss = |trial: &Trial| trial.loss() * trial.fitted.fit.scale.powi(2);
     assert!((loss(&both) / loss(&long) - 1.0).abs() < 1e-3);
@@ -374,8 +402,12 @@ recording = { logs = 3, duration_s = 8, start = [0, 0] }
         log.for_fits(0.5)
     };
     let (declared, settings) = (pendulum(), Settings::default());
+    let library = Library::built_in();
     let mut logs: Vec<Log> = recorded(ROUGH, 0).into_iter().map(with_dropped).collect();
-    let found = |logs: &[Log]| search(&mut Study::new(&declared, logs, &settings)).unexplained;
+    let found = |logs: &[Log]| {
+        let problem = Problem::new(&declared, &library, logs, &settings);
+        search(&problem).unexplained
+    };
     let left = found(&logs);
     assert!(!left.is_significant(), "{left:?}");
     assert!((1..30).contains(&left.omnibus.windows), "{left:?}");
@@ -404,9 +436,8 @@ recording = { logs = 2, duration_s = 6, start = [0, 0, 0, 0] }
     let (near, far) = (read(text), read(&far));
     let (logs, settings) = (recorded(RIG, 0), Settings::default());
     let fitted = |model: &Model| {
-        let mut study = Study::new(model, &logs, &settings);
-        let fitted = study.fit_declared(&[]).unwrap();
-        (fitted.model.values(), study.moved_to)
+        let found = closed(model, &logs, &settings).fit_declared().unwrap();
+        (found.fitted.model.values(), found.problem.moved_to)
     };
     let (wanted, unmoved) = fitted(&near);
     let (found, moved_to) = fitted(&far);
@@ -442,22 +473,22 @@ qdd1 = "(tau1 - 9.81 * m * l * sin(q1)) / (I + m * l^2)"
 "#;
     let declared = Model::from_text(Path::new("rod.toml"), FILE, &[]).unwrap();
     let (logs, settings) = (recorded(RIG, 0), Settings::default());
-    let study = Study::new(&declared, &logs, &settings);
+    let problem = closed(&declared, &logs, &settings);
     let (inertia, moment) = (1.0 / 4.6, 17.4 / 4.6 / 9.81);
     let mut start = declared.clone();
     let far = [2.0, moment / 2.0, inertia - moment * moment / 2.0];
     for (parameter, value) in start.parameters.iter_mut().zip(far) {
         parameter.value = value;
     }
-    let locals = study.shooting.initial_locals(0);
-    let fitted = study.refit(&start, locals, None).unwrap();
+    let locals = problem.shooting.initial_locals(0);
+    let fitted = problem.refit(&start, locals, None).unwrap();
     let [m, l, i] = fitted.model.values()[..] else {
         panic!()
     };
     assert!((m * l / moment - 1.0).abs() < 0.01, "{m} {l}");
     assert!(((i + m * l * l) / inertia - 1.0).abs() < 0.01, "{i}");
     assert!((0.7..1.3).contains(&m), "{m}");
-    assert_eq!(study.identifiability_of(&fitted).determined, 2);
+    assert_eq!(problem.identifiability_of(&fitted).determined, 2);
 }
 
 /// Without torque nothing tells inertia from friction: what is declared of the inertia is held, so that the friction of the
@@ -476,11 +507,11 @@ effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
     declared.parameters[0].value = -15.0;
     let declared = declared.with_effects(vec![absent("viscous_friction")]);
     let (logs, settings) = (recorded(RIG, 0), Settings::default());
-    let mut study = Study::new(&declared, &logs, &settings);
     // Coulomb friction is fitted beside it at first, and counts for nothing.
-    let fitted = study.fit_declared(library.effects()).unwrap();
-    assert_eq!(study.identifiability.hold, [1]);
-    assert_eq!(study.identifiability.free, 3);
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    assert_eq!(problem.identifiability.hold, [1]);
+    assert_eq!(problem.identifiability.free, 3);
     let [_, c_i, b] = fitted.model.values()[..] else {
         panic!()
     };
@@ -490,10 +521,8 @@ effect = [{ name = "viscous_friction", joint = 1, b = 0.1 }]
 #[test]
 fn a_result_predicts_a_log() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let model = Study::new(&declared, &logs, &settings)
-        .fit_declared(&[])
-        .unwrap();
-    let predicted = model.predict(&logs[0], 0.5);
+    let found = closed(&declared, &logs, &settings).fit_declared().unwrap();
+    let predicted = found.fitted.predict(&logs[0], 0.5);
     assert!(predicted.len() > 10);
 }
 
@@ -510,29 +539,29 @@ effect = [{ name = "coulomb_friction", joint = 1, F_c = 0.5 }]
     let library = Library::built_in();
     let declared = library.model(Path::new("acrobot")).unwrap();
     let settings = Settings::default();
-    let told = |study: &Study<'_>, mut audits: Vec<Audit>| -> Vec<String> {
-        let usual = study.with_usual_friction(library.effects());
-        study.tell_reversed(library.effects(), usual.as_ref(), &mut audits);
+    let told = |problem: &Problem<'_>, mut audits: Vec<Audit>| -> Vec<String> {
+        let usual = problem.with_usual_friction();
+        problem.tell_reversed(usual.as_ref(), &mut audits);
         let texts = audits[0].serious().map(ToString::to_string);
         texts
             .filter(|text| text.contains("with every tau reversed"))
             .collect()
     };
-    let blank = |study: &Study<'_>| {
-        let mut audits = study.audits().to_vec();
+    let blank = |problem: &Problem<'_>| {
+        let mut audits = problem.audits().to_vec();
         audits[0].findings.clear();
         audits
     };
     let mut logs = recorded(rig, 0);
-    let study = Study::new(&declared, &logs, &settings);
-    assert!(told(&study, blank(&study)).is_empty());
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    assert!(told(&problem, blank(&problem)).is_empty());
     for value in logs[0].tau.iter_mut().flatten() {
         *value = -*value;
     }
-    let study = Study::new(&declared, &logs, &settings);
-    let alone = told(&study, blank(&study));
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let alone = told(&problem, blank(&problem));
     assert_eq!(alone.len(), 1);
     assert!(alone[0].contains("[columns] tau = "), "{}", alone[0]);
     // Where the audit of the log says so of each joint, there is nothing to add.
-    assert!(told(&study, study.audits().to_vec()).is_empty());
+    assert!(told(&problem, problem.audits().to_vec()).is_empty());
 }

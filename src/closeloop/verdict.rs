@@ -1,9 +1,10 @@
-use super::find::Found;
 use super::gravity::against_gravity;
+use super::judge::Found;
+use super::problem::Problem;
 use super::refine::Refined;
 use super::remainder::{UNKNOWN, Unexplained};
 use super::score::Errors;
-use super::study::Study;
+use crate::identify::Identifiability;
 use schemars::JsonSchema;
 
 /// The answer in one word.
@@ -24,19 +25,19 @@ pub enum Verdict {
 
 /// The verdict and the reason for it, in a sentence.
 pub(super) fn verdict(
-    study: &Study<'_>,
-    found: &Found,
+    found: &Found<'_>,
     refined: &Refined<'_>,
     errors: &Errors,
 ) -> (Verdict, String) {
-    let added = study.added(&found.chosen.after.model).len();
+    let problem = &found.problem;
+    let added = problem.added(&found.chosen.after.model).len();
     let established = found.chosen.established();
-    let [before, after] = errors.compared(study.space);
-    let are_worse = after > study.settings.verdict.worse * before;
-    match at_rest(study)
+    let [before, after] = errors.compared(problem.space);
+    let are_worse = after > problem.settings.verdict.trusted_rise * before;
+    match at_rest(problem)
         .or_else(|| failure(found, refined))
-        .or_else(|| against_gravity(&found.gravity))
-        .or_else(|| inconclusive(study))
+        .or_else(|| against_gravity(&found.gravity, &problem.settings.notes))
+        .or_else(|| inconclusive(problem, &refined.identifiability))
     {
         Some(reason) => (Verdict::Inconclusive, reason),
         None if added > 0 && are_worse => contradicted(established, &found.unexplained),
@@ -54,15 +55,15 @@ pub(super) fn verdict(
 const STOPPED: &str = "the search was stopped when its time was spent, and more time may find a better set of effects";
 
 /// Whether there is nothing to conclude from.
-fn at_rest(study: &Study<'_>) -> Option<String> {
-    (!study.moves()).then(|| {
+fn at_rest(problem: &Problem<'_>) -> Option<String> {
+    (!problem.moves()).then(|| {
         "no joint moves visibly in any training log: record motion before anything can be said"
             .into()
     })
 }
 
 /// Which fit failed or did not converge, if one did that the verdict rests on.
-fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
+fn failure(found: &Found<'_>, refined: &Refined<'_>) -> Option<String> {
     if let Some(error) = &found.chosen.failure {
         return Some(format!(
             "the effects selected on a part of the training logs could not be fitted to all of them: {error}"
@@ -78,16 +79,15 @@ fn failure(found: &Found, refined: &Refined<'_>) -> Option<String> {
 }
 
 /// Why the logs allow no conclusion, if they do not.
-fn inconclusive(study: &Study<'_>) -> Option<String> {
-    let settings = &study.settings.verdict;
-    let windows = study.shooting.windows.len();
+fn inconclusive(problem: &Problem<'_>, known: &Identifiability) -> Option<String> {
+    let settings = &problem.settings.verdict;
+    let windows = problem.shooting.windows.len();
     if windows < settings.fewest_windows {
         return Some(format!(
             "the training logs hold only {windows} windows of {} s; record more motion",
-            study.settings.fit.window_s
+            problem.settings.fit.window_s
         ));
     }
-    let known = &study.identifiability;
     (known.free > 0 && known.determined == 0).then(|| {
         "the training logs determine no parameter of the declared model; move the joints more"
             .into()

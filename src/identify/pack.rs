@@ -12,6 +12,7 @@ use crate::sim::{Commands, FIT_S, Hold, Point, RK4, Simulator, Window, substeps}
 
 /// Up to [`LANES`] windows integrated side by side. Shorter windows are padded with steps of zero length and rows of
 /// zero weight.
+#[derive(Clone)]
 pub(super) struct Pack {
     pub windows: Vec<usize>,
     /// The log of each lane.

@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -10,13 +10,16 @@ use super::sensitivity::{LANES, Local, Tangent};
 use super::values::{Column, Values};
 use crate::data::{Log, half_width_s};
 use crate::model::{Dynamics, Model};
-use crate::sim::{Commands, Point, Window, initial_state};
+use crate::sim::{Commands, Point, Window, cut, initial_state};
 
 /// Least squares over windows of logs.
 ///
 /// By multiple shooting: in each window the model is integrated from a free start state and compared with the logged
 /// positions at every row; the start state is compared with what the rows around it tell. Or by the torques that the
 /// logged motion needs, beside those logged.
+///
+/// A copy shares the batches of windows and the smoothed rows with its original.
+#[derive(Clone)]
 pub struct Shooting<'l> {
     pub logs: &'l [Log],
     pub windows: Vec<Window>,
@@ -24,16 +27,26 @@ pub struct Shooting<'l> {
     pub noise: Vec<f64>,
     measure: Measure,
     prior: Prior,
+    /// The same logs cut into windows of other lengths, as far as these were asked for: shared by all copies.
+    cuts: Arc<Mutex<Vec<Cut>>>,
 }
 
 /// What the model is compared with, window by window.
+#[derive(Clone)]
 enum Measure {
-    Motion(Vec<Pack>),
+    Motion(Arc<Vec<Pack>>),
     Torques {
         /// One a log.
         rows: Arc<Vec<Rows>>,
-        packs: Vec<Balance>,
+        packs: Arc<Vec<Balance>>,
     },
+}
+
+/// Logs in windows of one length.
+struct Cut {
+    length_s: f64,
+    windows: Vec<Window>,
+    measure: Measure,
 }
 
 impl<'l> Shooting<'l> {
@@ -52,8 +65,9 @@ impl<'l> Shooting<'l> {
             logs,
             windows,
             noise: noise.to_vec(),
-            measure: Measure::Motion(packs),
+            measure: Measure::Motion(Arc::new(packs)),
             prior: Prior::default(),
+            cuts: Arc::default(),
         }
     }
 
@@ -92,21 +106,52 @@ impl<'l> Shooting<'l> {
             logs,
             noise: noise.to_vec(),
             measure: Measure::Torques {
-                packs: packs.collect(),
+                packs: Arc::new(packs.collect()),
                 rows,
             },
             windows,
             prior: Prior::default(),
+            cuts: Arc::default(),
         }
+    }
+
+    /// The logs cut into windows of this length in s; they are cut once, however often they are asked for.
+    #[must_use]
+    pub fn cut_into(&self, length_s: f64) -> Self {
+        let mut cuts = self.cuts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = cuts.iter().find(|cut| cut.length_s == length_s) {
+            return Self {
+                windows: known.windows.clone(),
+                measure: known.measure.clone(),
+                ..self.clone()
+            };
+        }
+        let new = self.over(cut(self.logs, length_s));
+        cuts.push(Cut {
+            length_s,
+            windows: new.windows.clone(),
+            measure: new.measure.clone(),
+        });
+        new
     }
 
     /// Other windows of the same logs, of the same rig.
     #[must_use]
     pub fn over(&self, windows: Vec<Window>) -> Self {
+        self.with(windows, &self.noise)
+    }
+
+    /// The same windows, whose joints have another noise.
+    #[must_use]
+    pub fn with_noise(&self, noise: &[f64]) -> Self {
+        self.with(self.windows.clone(), noise)
+    }
+
+    fn with(&self, windows: Vec<Window>, noise: &[f64]) -> Self {
         let mut other = match &self.measure {
-            Measure::Motion(_) => Self::new(self.logs, windows, &self.noise),
+            Measure::Motion(_) => Self::new(self.logs, windows, noise),
             Measure::Torques { rows, .. } => {
-                Self::of_rows(self.logs, Arc::clone(rows), windows, &self.noise)
+                Self::of_rows(self.logs, Arc::clone(rows), windows, noise)
             }
         };
         other.prior = self.prior.clone();
@@ -129,7 +174,7 @@ impl<'l> Shooting<'l> {
     #[must_use]
     pub fn with_free_starts(mut self) -> Self {
         if let Measure::Motion(packs) = &mut self.measure {
-            packs.iter_mut().for_each(Pack::free_starts);
+            Arc::make_mut(packs).iter_mut().for_each(Pack::free_starts);
         }
         self
     }
@@ -174,7 +219,8 @@ impl<'l> Shooting<'l> {
     #[must_use]
     pub fn in_steps_of(mut self, longest_s: f64) -> Self {
         if let Measure::Motion(packs) = &mut self.measure {
-            packs.iter_mut().for_each(|pack| pack.cut(longest_s));
+            let packs = Arc::make_mut(packs).iter_mut();
+            packs.for_each(|pack| pack.cut(longest_s));
         }
         self
     }
@@ -334,8 +380,9 @@ fn half_widths(logs: &[Log]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::sync::Arc;
 
-    use super::{Shooting, Values};
+    use super::{Measure, Pack, Shooting, Values};
     use crate::data::{Joint, Log, Quantity};
     use crate::identify::cut;
     use crate::identify::sensitivity::{Local, Tangent};
@@ -357,6 +404,26 @@ mod tests {
             notes: Vec::new(),
             time,
         }
+    }
+
+    fn packs(shooting: &Shooting<'_>) -> Arc<Vec<Pack>> {
+        match &shooting.measure {
+            Measure::Motion(packs) => Arc::clone(packs),
+            Measure::Torques { .. } => panic!("of a motion"),
+        }
+    }
+
+    #[test]
+    fn copies_share_their_windows_until_one_is_changed() {
+        let logs = [log()];
+        let shooting = Shooting::new(&logs, cut(&logs, 0.5), &[0.05]);
+        let copy = shooting.clone();
+        assert!(Arc::ptr_eq(&packs(&shooting), &packs(&copy)));
+        let [first, again] = [&shooting, &copy].map(|of| of.cut_into(0.15));
+        assert_eq!(first.windows, cut(&logs, 0.15));
+        assert!(Arc::ptr_eq(&packs(&first), &packs(&again)));
+        let fine = copy.in_steps_of(1e-3);
+        assert!(!Arc::ptr_eq(&packs(&shooting), &packs(&fine)));
     }
 
     #[test]

@@ -30,13 +30,14 @@ pub fn fit_torques<'l>(
     logs: &'l [Log],
 ) -> Result<TorqueFit<'l>, FitError> {
     let mut model = with_physical_bodies(model);
-    let windows = cut(logs, WINDOW_S);
     let mut noise = vec![1.0; model.joints];
+    let windows = cut(logs, WINDOW_S);
+    let smoothed = Shooting::of_torques(logs, windows, &noise, &model.sign_widths());
+    let smoothed = smoothed.near(declared);
     let mut found = None;
     for _ in 0..FITS {
         let balance = model.smoothed_torque_balance().ok_or(FitError::NoWindow)?;
-        let shooting = Shooting::of_torques(logs, windows.clone(), &noise, &model.sign_widths());
-        let shooting = shooting.near(declared);
+        let shooting = smoothed.with_noise(&noise);
         let parameters = balance.parameters.iter().enumerate();
         let free = parameters.filter(|(_, parameter)| !parameter.fixed);
         let active: Vec<usize> = free.map(|(k, _)| k).collect();

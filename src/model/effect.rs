@@ -33,6 +33,9 @@ pub struct Effect {
     pub shown_by: String,
     /// Acts only where gravity's direction enters: on the first joint of a chain.
     pub first_joint_only: bool,
+    /// Most machines have it, on every joint: such effects are tried together before all others, first those of rank 1, then those
+    /// up to rank 2, and so on. Those of rank 1 are also what a model is given before its first fit.
+    pub baseline: Option<usize>,
 }
 
 /// How an effect enters the equations of its joint. Formulas are in `q`, `qd`, `tau`, `load`, `t` of that joint and in

@@ -26,6 +26,7 @@ const EFFECT_KEYS: &[&str] = &[
     "shown_by",
     "joints",
     "valid_if",
+    "baseline",
 ];
 const PARAMETER_KEYS: &[&str] = &[
     "unit",
@@ -100,6 +101,7 @@ impl Effect {
             contains: list("contains")?,
             confused_with: list("confused_with")?,
             shown_by: section.text_or_empty("shown_by")?,
+            baseline: baseline(&section)?,
             first_joint_only: section.choice("joints", r#""all" or "first""#, &ALL_OR_FIRST)?,
         })
     }
@@ -111,6 +113,17 @@ impl FromStr for Effect {
 
     fn from_str(text: &str) -> Result<Self, FileError> {
         Self::from_text("effect".as_ref(), text)
+    }
+}
+
+/// The rank of what most machines have.
+fn baseline(section: &Section<'_>) -> Result<Option<usize>, FileError> {
+    match section.whole("baseline")? {
+        Some(0) => Err(section.error_at(
+            "baseline",
+            "`baseline` is a rank from 1 on; leave it out for an effect that few machines have",
+        )),
+        rank => Ok(rank),
     }
 }
 
@@ -221,4 +234,28 @@ fn parameter(name: String, section: &Section<'_>) -> Result<EffectParameter, Fil
         whole: section.flag("whole")?,
         per_log: section.choice("per", PER_LOG, &[("", false), ("log", true)])?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::model::Effect;
+
+    #[test]
+    fn a_baseline_is_a_rank_from_one_on() {
+        let read = |rank: &str| {
+            let text = format!(
+                "[effect]\nname = \"drag\"\nabout = \"drag\"\nforce = \"-c * qd\"\n{rank}\n\
+                 [parameters]\nc = {{ unit = \"N m s/rad\", typical = 1 }}\n"
+            );
+            Effect::from_text(Path::new("drag.toml"), &text)
+        };
+        assert_eq!(read("").unwrap().baseline, None);
+        assert_eq!(read("baseline = 2").unwrap().baseline, Some(2));
+        for wrong in ["baseline = 0", "baseline = 1.5", "baseline = true"] {
+            let error = read(wrong).unwrap_err().to_string();
+            assert!(error.contains("baseline"), "{error}");
+        }
+    }
 }

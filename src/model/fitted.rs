@@ -85,7 +85,14 @@ impl FittedEffect {
     pub fn excludes(&self, other: &Self) -> bool {
         let filter = matches!(self.effect.entry, Entry::Command(_));
         let same_filter = filter && self.effect.entry == other.effect.entry;
-        self.label() == other.label() || same_filter && self.joint == other.joint
+        self.is_same(other) || same_filter && self.joint == other.joint
+    }
+
+    /// Whether the two are one effect on one joint, whatever their values.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.joint == other.joint
+            && self.effect.name == other.effect.name
+            && self.shifted() == other.shifted()
     }
 
     /// Whether the other effect is a special case of this one, on the same joint.

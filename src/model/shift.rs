@@ -90,6 +90,7 @@ fn shift(k: usize, declared: &Parameter) -> Effect {
             declared.name
         ),
         first_joint_only: false,
+        baseline: None,
     }
 }
 

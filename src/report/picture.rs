@@ -6,11 +6,10 @@ use super::plot::{
     ShapeSample, Track,
 };
 use super::wording::{FITTED, WITH_EFFECTS, WITH_NETWORK};
-use crate::closeloop::{ForceSample, Outcome, ResidualForce, Space};
+use crate::closeloop::{ForceSample, Needed, Outcome, ResidualForce, Space};
 use crate::data::{Joint, Log};
 use crate::identify::FitError;
-use crate::model::Dynamics;
-use crate::sim::metric::{Assessment, NeededTorques, Trace, needed_torques, summarise, traces};
+use crate::sim::metric::{Assessment, NeededTorques, Trace, summarise};
 
 /// A picture shows this much of a log in s: more than that and predictions become a blur.
 const SHOWN_S: f64 = 8.0;
@@ -30,26 +29,24 @@ pub(super) fn predictions(outcome: &Outcome) -> Result<String, PlotError> {
 
 /// Measured motion and open-loop predictions of it.
 fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
-    let horizons = outcome.errors.before.horizons.iter().map(|h| h.horizon_s);
-    // Differences between models grow with the horizon: the longest one shows them best.
-    let horizon = horizons.fold(0.0, f64::max);
-    let fitted = &outcome.models;
-    let mut models: Vec<(Role, &str, Dynamics)> = vec![
-        (Role::Before, FITTED, fitted.before.model.dynamics()),
-        (Role::After, WITH_EFFECTS, fitted.after.model.dynamics()),
-    ];
-    if let Some(network) = outcome.network() {
-        models.push((Role::Hybrid, WITH_NETWORK, network.hybrid().clone()));
+    let predictions = outcome.predictions.longest.first();
+    let horizon = predictions.map_or(0.0, |predicted| predicted.horizon_s);
+    let mut models: Vec<(Role, &str, &[Trace])> = Vec::new();
+    if let Some(predicted) = predictions {
+        models.push((Role::Before, FITTED, &predicted.before));
+        models.push((Role::After, WITH_EFFECTS, &predicted.after));
+        let network = predicted.hybrid.as_deref();
+        models.extend(network.map(|traces| (Role::Hybrid, WITH_NETWORK, traces)));
     }
     let panel = |joint: Joint| Panel {
         label: label(outcome, joint),
         quantity: format!("position q{joint}"),
         unit: kind(outcome, joint).position_unit(),
         tracks: std::iter::once(measured(log, joint))
-            .chain(models.iter().map(|(role, label, dynamics)| Track {
+            .chain(models.iter().map(|(role, label, traces)| Track {
                 label: (*label).to_owned(),
                 role: *role,
-                segments: predicted(dynamics, log, joint, horizon),
+                segments: predicted(traces, log, joint),
             }))
             .collect(),
     };
@@ -65,15 +62,11 @@ fn motion(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
 
 /// Logged torques and those that the motion needs by the models, both low-passed.
 fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
-    let fitted = &outcome.models;
-    let models = [
-        (Role::Before, FITTED, &fitted.before.model),
-        (Role::After, WITH_EFFECTS, &fitted.after.model),
-    ];
-    let needed: Vec<(Role, &str, NeededTorques)> = models
-        .into_iter()
-        .filter_map(|(role, label, model)| Some((role, label, needed_torques(model, log)?)))
-        .collect();
+    let mut needed: Vec<(Role, &str, &NeededTorques)> = Vec::new();
+    if let Some(Needed { before, after }) = outcome.predictions.torques.first() {
+        needed.extend(before.iter().map(|of| (Role::Before, FITTED, of)));
+        needed.extend(after.iter().map(|of| (Role::After, WITH_EFFECTS, of)));
+    }
     let curve =
         |label: &str, role: Role, of: &NeededTorques, values: &[Vec<f64>], joint: Joint| Track {
             label: label.to_owned(),
@@ -94,7 +87,8 @@ fn torques(outcome: &Outcome, log: &Log) -> Result<String, PlotError> {
             tracks: logged.into_iter().chain(models).collect(),
         }
     };
-    let panels: Vec<Panel> = Joint::all(fitted.after.model.joints).map(panel).collect();
+    let joints = outcome.models.after.model.joints;
+    let panels: Vec<Panel> = Joint::all(joints).map(panel).collect();
     let title = format!("{}: torques that its motion needs", log.name());
     super::plot::predictions(&panels, &title)
 }
@@ -122,9 +116,9 @@ fn measured(log: &Log, joint: Joint) -> Track {
     }
 }
 
-fn predicted(dynamics: &Dynamics, log: &Log, joint: Joint, horizon: f64) -> Vec<Vec<(f64, f64)>> {
-    let shown = |trace: Trace| beginning(log, &trace.time, &trace.q[joint]);
-    let pieces = traces(dynamics, log, horizon).into_iter().map(shown);
+fn predicted(traces: &[Trace], log: &Log, joint: Joint) -> Vec<Vec<(f64, f64)>> {
+    let shown = |trace: &Trace| beginning(log, &trace.time, &trace.q[joint]);
+    let pieces = traces.iter().map(shown);
     pieces.filter(|piece| piece.len() > 1).collect()
 }
 

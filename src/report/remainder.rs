@@ -46,7 +46,7 @@ pub(super) fn structure(report: &Report) -> String {
         _ if left.p_value < settings.significance => format!(
             "The remainder has structure ({p}), but too little to matter: {share:.1} % of the residuals' variance \
              exceeds white noise, and no probe lowers the loss by {:.0} %.",
-            100.0 * settings.noteworthy
+            100.0 * settings.noteworthy_share
         ),
         _ => format!("The residuals cannot be told from sensor noise ({p})."),
     };

@@ -9,8 +9,7 @@ use super::headline::label;
 use super::motion::MotionEntry;
 use crate::closeloop::{ForceSample, Outcome, ResidualForce, Space};
 use crate::data::{Joint, Log};
-use crate::model::{Dynamics, Model};
-use crate::sim::metric::{needed_torques, traces};
+use crate::sim::metric::Trace;
 
 /// curves and points for pictures
 #[derive(Debug, Serialize, Deserialize, JsonSchema)]
@@ -98,25 +97,22 @@ pub(super) struct Course<'a> {
 
 /// Open-loop predictions over the longest horizon, one after the other.
 fn motions(outcome: &Outcome) -> Vec<Course<'_>> {
-    let horizons = outcome.errors.before.horizons.iter();
-    let horizon_s = horizons.map(|h| h.horizon_s).fold(0.0, f64::max);
-    let fitted = &outcome.models;
-    let both = [&fitted.before.model, &fitted.after.model];
-    let mut models: Vec<Dynamics> = both.map(Model::dynamics).into();
-    let used = (outcome.learned.iter()).filter(|learned| learned.check.used);
-    models.extend(used.filter_map(|learned| learned.hybrid().cloned()));
-    let tests = outcome.given.test.iter();
-    tests
-        .map(|log| motion(log, &models, horizon_s))
-        .filter(|course| !course.time.is_empty())
-        .collect()
+    let is_used = (outcome.learned.as_ref()).is_some_and(|learned| learned.check.used);
+    let tests = outcome.given.test.iter().zip(&outcome.predictions.longest);
+    let courses = tests.map(|(log, predicted)| {
+        let network = predicted.hybrid.as_deref().filter(|_| is_used);
+        let fitted = [predicted.before.as_slice(), &predicted.after];
+        motion(log, fitted.into_iter().chain(network))
+    });
+    courses.filter(|course| !course.time.is_empty()).collect()
 }
 
-/// Open-loop predictions of a log.
-pub(super) fn motion<'a>(log: &'a Log, models: &[Dynamics], horizon_s: f64) -> Course<'a> {
-    let of_models: Vec<_> = (models.iter())
-        .map(|model| traces(model, log, horizon_s))
-        .collect();
+/// Open-loop predictions of a log, model by model.
+pub(super) fn motion<'a>(
+    log: &'a Log,
+    models: impl IntoIterator<Item = &'a [Trace]>,
+) -> Course<'a> {
+    let of_models: Vec<&[Trace]> = models.into_iter().collect();
     let windows = || of_models[0].iter().enumerate();
     let time: Vec<f64> = windows()
         .flat_map(|(_, trace)| trace.time.clone())
@@ -147,22 +143,21 @@ pub(super) fn motion<'a>(log: &'a Log, models: &[Dynamics], horizon_s: f64) -> C
 
 /// Logged torques and those that the motion needs.
 fn torques(outcome: &Outcome) -> Vec<Course<'_>> {
-    let models = [&outcome.models.before.model, &outcome.models.after.model];
-    let course = |log| {
-        let [before, after] = models.map(|model| needed_torques(model, log));
-        let (before, after) = (before?, after?);
+    let tests = outcome.given.test.iter().zip(&outcome.predictions.torques);
+    let courses = tests.filter_map(|(log, needed)| {
+        let (before, after) = (needed.before.as_ref()?, needed.after.as_ref()?);
         let start_s = before.time.first()?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // time since the start
         let window = |t: &f64| ((t - start_s) / STRETCH_S) as usize;
         Some(Course {
             log,
             window: before.time.iter().map(window).collect(),
-            measured: before.logged,
-            models: vec![before.needed, after.needed],
-            time: before.time,
+            measured: before.logged.clone(),
+            models: vec![before.needed.clone(), after.needed.clone()],
+            time: before.time.clone(),
         })
-    };
-    outcome.given.test.iter().filter_map(course).collect()
+    });
+    courses.collect()
 }
 
 /// Rows of a course.

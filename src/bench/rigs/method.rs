@@ -11,7 +11,8 @@ use super::fold::{Fold, Measured};
 use super::mujoco::Task;
 use crate::bench::answer::answer;
 use crate::closeloop::{
-    Observer, Request, ResidualLearner, Settings, Split, Study, StudyError, Verdict, close_loop,
+    Declared, Problem, Request, ResidualLearner, Settings, Split, StudyError, Verdict, Watch,
+    close_loop,
 };
 use crate::data::Log;
 use crate::model::{Library, Model};
@@ -148,7 +149,7 @@ impl Method {
         rig: &Measured,
         fold: &Fold,
         tools: &Tools<'_>,
-        progress: &mut Observer<'_>,
+        watch: &dyn Watch,
     ) -> anyhow::Result<Found> {
         let (errors, said) = match self {
             Self::AsTheyAre => (as_they_are(rig, fold), None),
@@ -160,7 +161,7 @@ impl Method {
                 let task = Task::new(&rig.declared, &fold.train, &fold.test)?;
                 (vec![(Scored::MujocoSysid, task.run()?)], None)
             }
-            Self::CloseLoop => closed(rig, fold, tools, progress)?,
+            Self::CloseLoop => closed(rig, fold, tools, watch)?,
         };
         Ok(Found { errors, said })
     }
@@ -181,9 +182,9 @@ fn as_they_are(rig: &Measured, fold: &Fold) -> Vec<(Scored, Vec<LogErrors>)> {
 /// A model with its effects fitted from the values that it has, as closing the loop fits the declared model.
 fn fit(model: &Model, library: &Library, logs: &[Log]) -> Result<Model, StudyError> {
     let settings = Settings::default();
-    let mut study = Study::new(model, logs, &settings);
-    let coarse = study.fit_declared(library.effects())?;
-    Ok(study.refined().estimate(&coarse)?.model)
+    let problem = Problem::new(model, library, logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared()?;
+    Ok(problem.refined().estimate(&fitted)?.model)
 }
 
 type Closed = (Vec<(Scored, Vec<LogErrors>)>, Option<Said>);
@@ -192,16 +193,12 @@ fn closed(
     rig: &Measured,
     fold: &Fold,
     tools: &Tools<'_>,
-    progress: &mut Observer<'_>,
+    watch: &dyn Watch,
 ) -> Result<Closed, StudyError> {
     let split = Split::given(fold.train.clone(), fold.test.clone());
     let mut request = Request::new(&rig.declared, tools.library, split);
     request.learner = tools.learner;
-    let outcome = close_loop(
-        request,
-        &mut ChaCha8Rng::seed_from_u64(tools.seed),
-        progress,
-    )?;
+    let outcome = close_loop(request, &mut ChaCha8Rng::seed_from_u64(tools.seed), watch)?;
     let errors = &outcome.errors;
     let hybrid = errors.hybrid.as_ref().unwrap_or(&errors.after);
     let models = [

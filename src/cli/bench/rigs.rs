@@ -16,7 +16,6 @@ use crate::bench::rigs::{
     Fold, Found, Line, Measured, Method, Rig, Tools, markdown, picture, read, summarise,
 };
 use crate::cli::call::{Begun, files};
-use crate::closeloop::Progress;
 use crate::formats::ClientError;
 use crate::model::Library;
 use crate::report::ResultsPage;
@@ -257,7 +256,7 @@ impl Store<'_> {
         let Work { rig, fold, method } = *work;
         let place = format!("{}/{}", rig.rig.name, work.name());
         bar.set_message(place.clone());
-        let mut show = |now: Progress<'_>| bar.set_message(format!("{place}: {}", now.text));
-        unless_panic(|| method.run(rig, fold, &self.tools, &mut show))
+        let watch = progress::Step { bar, what: place };
+        unless_panic(|| method.run(rig, fold, &self.tools, &watch))
     }
 }

@@ -64,8 +64,11 @@ pub fn carry_out(
         results.push(match known.get(&configuration) {
             Some(searched) => searched.clone(),
             None => {
-                let mut progress = |text: &str| bar.set_message(text.to_owned());
-                let searched = calibrator.search(simulation, &mut progress)?;
+                let watch = progress::Step {
+                    bar: &bar,
+                    what: simulation.about(),
+                };
+                let searched = calibrator.search(simulation, &watch)?;
                 let stored = Stored {
                     configuration,
                     searched,

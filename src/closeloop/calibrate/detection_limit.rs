@@ -2,11 +2,11 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Named;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::select::{candidates, left_out_losses, starts};
 use crate::closeloop::settings::Settings;
-use crate::closeloop::study::Study;
 use crate::identify::{Fit, FitError, as_it_stands, fit, squared_distance, uncertainty};
-use crate::model::{Effect, FittedEffect};
+use crate::model::FittedEffect;
 
 /// The smallest size of an effect, and what the search named where that was hidden in simulated logs.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,15 +45,14 @@ pub enum Smallest {
 /// # Errors
 /// A model that diverges on the logs.
 pub(super) fn detection_limits(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     accepted: &Fitted,
-    library: &[Effect],
 ) -> Result<Vec<DetectionLimit>, FitError> {
-    let baseline = Baseline::new(study, accepted)?;
-    let all = candidates(study, library, &accepted.model.effects);
+    let baseline = Baseline::new(problem, accepted)?;
+    let all = candidates(problem, &accepted.model.effects);
     let trials: usize = all.iter().map(|candidate| starts(candidate).len()).sum();
     #[allow(clippy::cast_precision_loss)] // few trials
-    let level = study.settings.establish.false_alarm / trials.max(1) as f64;
+    let level = problem.settings.establish.false_alarm / trials.max(1) as f64;
     Ok(all
         .into_iter()
         .map(|candidate| {
@@ -69,7 +68,7 @@ pub(super) fn detection_limits(
 
 /// An accepted model on the logs that effects are chosen by.
 struct Baseline<'a> {
-    study: &'a Study<'a>,
+    problem: &'a Problem<'a>,
     accepted: &'a Fitted,
     locals: Vec<Vec<f64>>,
     /// The loss on stretches left out of the fit.
@@ -77,17 +76,17 @@ struct Baseline<'a> {
 }
 
 impl<'a> Baseline<'a> {
-    fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
+    fn new(problem: &'a Problem<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
         let dynamics = accepted.model.dynamics();
         let scale = accepted.fit.scale;
-        let states = study.shooting.initial_locals(0);
-        let (_, free) = fit(&study.shooting, &dynamics, &[], states, Some(scale))?;
+        let states = problem.shooting.initial_locals(0);
+        let (_, free) = fit(&problem.shooting, &dynamics, &[], states, Some(scale))?;
         let locals = free.locals;
         let active = &accepted.fit.active;
-        let fit = as_it_stands(&study.shooting, &dynamics, active, locals.clone(), scale)?;
-        let loss = left_out_losses(study, &fit).iter().sum();
+        let fit = as_it_stands(&problem.shooting, &dynamics, active, locals.clone(), scale)?;
+        let loss = left_out_losses(problem, &fit).iter().sum();
         Ok(Self {
-            study,
+            problem,
             accepted,
             locals,
             loss,
@@ -104,7 +103,7 @@ impl<'a> Baseline<'a> {
         }
         // Of a value that each log has of its own, the same in all: there are as many to be tested.
         let tested = if parameters.iter().any(|p| p.per_log) {
-            switches.len() * self.study.logs.len()
+            switches.len() * self.problem.logs.len()
         } else {
             switches.len()
         };
@@ -156,10 +155,10 @@ impl<'a> Baseline<'a> {
             establish: settings,
             calibrate,
             ..
-        } = &self.study.settings;
-        let power = calibrate.power;
+        } = &self.problem.settings;
+        let power = calibrate.power_quantile;
         let information = own_information(fit, calibrate.own_information)?;
-        let known = uncertainty(&self.study.shooting, fit);
+        let known = uncertainty(&self.problem.shooting, fit);
         let last = fit.columns.len() - 1;
         let deviation = known.covariance[(last, last)].sqrt();
         let needed = |p: f64, gain: f64| {
@@ -167,17 +166,17 @@ impl<'a> Baseline<'a> {
             let worthwhile = (2.0 * self.loss * gain / (1.0 - gain) / information).sqrt();
             Some(significant.max(worthwhile) + power * deviation)
         };
-        let plain = needed(settings.significant_alone, settings.plain)?;
-        Some(needed(level, settings.worthwhile)?.min(plain))
+        let plain = needed(settings.uncorrected_false_alarm, settings.plain_gain)?;
+        Some(needed(level, settings.worthwhile_gain)?.min(plain))
     }
 
     /// The accepted model with one more free value, a switch of the effect, at zero.
     fn with(&self, start: &FittedEffect, switch: usize) -> Result<Fit, FitError> {
         let accepted = self.accepted;
-        let dynamics = self.study.extended(accepted, std::slice::from_ref(start));
+        let dynamics = self.problem.extended(accepted, std::slice::from_ref(start));
         let switch = dynamics.parameters.len() - start.values.len() + switch;
         as_it_stands(
-            &self.study.shooting,
+            &self.problem.shooting,
             &dynamics,
             &[accepted.fit.active.as_slice(), &[switch]].concat(),
             self.locals.clone(),

@@ -14,13 +14,14 @@ use serde::{Deserialize, Serialize};
 use self::detection_limit::detection_limits;
 use self::simulated_logs::SimulatedLogs;
 use super::error::StudyError;
-use super::find::find;
 use super::fitted::Fitted;
+use super::pipeline::find;
+use super::problem::Problem;
 use super::space::Space;
-use super::study::Study;
+use super::stage::{Stage, Watch};
 use crate::data::Joint;
 use crate::data::statistics::wilson;
-use crate::model::{FittedEffect, Library, Model, Status};
+use crate::model::{FittedEffect, Model, Status};
 use crate::runs::{Purpose, stream};
 
 /// The results of the search on logs simulated from the accepted model, with the torques and the noise of the user's.
@@ -128,8 +129,7 @@ pub struct Searched {
 
 /// Simulations of a model that [`find`] accepted, each to be searched as the user's own logs, and what is concluded.
 pub struct Calibrator<'a> {
-    study: &'a Study<'a>,
-    library: &'a Library,
+    problem: &'a Problem<'a>,
     /// Whatever is named beyond the accepted model is a false alarm.
     declared: Model,
     simulated: SimulatedLogs<'a>,
@@ -141,27 +141,25 @@ impl<'a> Calibrator<'a> {
     /// Plan `runs` simulations of the accepted model, and one for each common effect that is hidden.
     ///
     /// # Errors
-    /// A study of torques; and as [`Study::fit_declared`].
+    /// A problem of torques; and as [`Problem::fit_declared`].
     pub fn new(
-        study: &'a Study<'a>,
+        problem: &'a Problem<'a>,
         accepted: &'a Fitted,
-        library: &'a Library,
         runs: usize,
         rng: &mut impl Rng,
     ) -> Result<Self, StudyError> {
-        if study.space == Space::Torque {
+        if problem.space == Space::Torque {
             return Err(StudyError::NotOfMotion);
         }
-        let limits = detection_limits(study, accepted, library.effects())?;
-        let multiple = study.settings.calibrate.hidden;
+        let limits = detection_limits(problem, accepted)?;
+        let multiple = problem.settings.calibrate.hidden_multiple;
         let common = limits.iter().filter_map(|limit| hidden(limit, multiple));
         let all = std::iter::repeat_n(None, runs).chain(common.map(Some));
         let seed = rng.random();
         Ok(Self {
-            study,
-            library,
+            problem,
             declared: accepted.model.clone(),
-            simulated: SimulatedLogs::new(study, accepted)?,
+            simulated: SimulatedLogs::new(problem, accepted)?,
             simulations: (all.enumerate())
                 .map(|(number, hidden)| Simulation {
                     number,
@@ -178,15 +176,14 @@ impl<'a> Calibrator<'a> {
         &self.simulations
     }
 
-    /// Simulate, and search what comes out; nothing where the motion diverges with the hidden effect. `progress` is told
-    /// what is done.
+    /// Simulate, and search what comes out; nothing where the motion diverges with the hidden effect.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub fn search(
         &self,
         simulation: &Simulation,
-        progress: &mut (dyn FnMut(&str) + Send),
+        watch: &dyn Watch,
     ) -> Result<Option<Searched>, StudyError> {
         let mut rng = stream(simulation.seed, Purpose::Other(simulation.number));
         let hidden = simulation.hidden.as_slice();
@@ -195,13 +192,12 @@ impl<'a> Calibrator<'a> {
             assert!(!is_accepted, "it was fitted to these windows");
             return Ok(None);
         };
-        let mut study = Study {
+        let problem = Problem {
             declared: &self.declared,
-            ..self.study.on(&logs)
+            ..self.problem.on(&logs)
         };
-        let found = find(&mut study, &[], self.library, &mut rng, &mut |within| {
-            progress(&format!("{}: {}", simulation.about(), within.text));
-        })?;
+        watch.see(Stage::Fit.into());
+        let found = find(problem.fit_declared()?, &[], &mut rng, watch)?;
         let established = found.chosen.standings.iter();
         let established = established.filter(|s| s.status == Status::Established);
         Ok(Some(Searched {
@@ -221,7 +217,7 @@ impl<'a> Calibrator<'a> {
                 }
                 (Some(effect), Some(searched)) => {
                     let mut limits = self.limits.iter_mut();
-                    let limit = limits.find(|limit| limit.effect.label() == effect.label());
+                    let limit = limits.find(|limit| limit.effect.is_same(effect));
                     limit.expect("each comes from a limit").named = Some(searched.named);
                 }
                 (_, None) => {}
@@ -231,8 +227,8 @@ impl<'a> Calibrator<'a> {
             named,
             unexplained,
             limits: self.limits,
-            hidden: self.study.settings.calibrate.hidden,
-            top_torque: self.study.top_torque.clone(),
+            hidden: self.problem.settings.calibrate.hidden_multiple,
+            top_torque: self.problem.top_torque.clone(),
         }
     }
 }

@@ -1,7 +1,7 @@
 use rand::{Rng, RngExt};
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::data::{Log, half_width_s, row_from};
 use crate::identify::{FitError, Values, Window, blocks, fit};
 use crate::model::FittedEffect;
@@ -12,7 +12,7 @@ use crate::model::FittedEffect;
 /// from its fitted start state instead, under the logged torques, and the windows are set apart in time:
 /// cutting such logs into windows finds the same windows again, and no motion jumps within one.
 pub(super) struct SimulatedLogs<'a> {
-    study: &'a Study<'a>,
+    problem: &'a Problem<'a>,
     accepted: &'a Fitted,
     /// The windows of each training log, a pause before each.
     apart: Vec<Log>,
@@ -27,9 +27,9 @@ pub(super) struct SimulatedLogs<'a> {
 impl<'a> SimulatedLogs<'a> {
     /// # Errors
     /// A model that diverges on the logs, or logs without a window.
-    pub fn new(study: &'a Study<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
-        let apart = apart(study);
-        let rig = study.on(&apart);
+    pub fn new(problem: &'a Problem<'a>, accepted: &'a Fitted) -> Result<Self, FitError> {
+        let apart = apart(problem);
+        let rig = problem.on(&apart);
         let dynamics = accepted.model.dynamics();
         let values = Values::of(&dynamics, &apart);
         let states = rig.shooting.initial_locals(0);
@@ -37,7 +37,7 @@ impl<'a> SimulatedLogs<'a> {
         let (_, fit) = fit(&rig.shooting, &dynamics, &[], states, scale)?;
         let locals = fit.locals;
         Ok(Self {
-            study,
+            problem,
             accepted,
             windows: rig.shooting.windows.clone(),
             residuals: rig.shooting.residuals(&dynamics, &values, &locals),
@@ -51,9 +51,9 @@ impl<'a> SimulatedLogs<'a> {
     /// sign of each block drawn at random (the wild cluster bootstrap of Cameron, Gelbach and Miller
     /// 2008): colour, rounding and size stay, whatever is systematic goes. `None` where the motion diverges.
     pub fn draw(&self, more: &[FittedEffect], rng: &mut impl Rng) -> Option<Vec<Log>> {
-        let dynamics = self.study.extended(self.accepted, more);
+        let dynamics = self.problem.extended(self.accepted, more);
         let values = Values::of(&dynamics, &self.apart);
-        let rig = self.study.on(&self.apart);
+        let rig = self.problem.on(&self.apart);
         let motion = rig.shooting.residuals(&dynamics, &values, &self.locals);
         if motion.iter().flatten().any(|x| !x.is_finite()) {
             return None;
@@ -80,9 +80,9 @@ impl<'a> SimulatedLogs<'a> {
 
 /// The rows of the windows alone. Before each stands one row at the edge of what the estimate of its start state
 /// reads, and before that a pause that no estimate and no window spans.
-fn apart(study: &Study<'_>) -> Vec<Log> {
-    let pause = study.settings.calibrate.pause;
-    let windows = &study.shooting.windows;
+fn apart(problem: &Problem<'_>) -> Vec<Log> {
+    let pause = problem.settings.calibrate.pause_half_widths;
+    let windows = &problem.shooting.windows;
     let stretch = |index: usize, log: &Log| {
         let reach = half_width_s(log.median_step());
         let mut out = Log {
@@ -112,7 +112,7 @@ fn apart(study: &Study<'_>) -> Vec<Log> {
         }
         out
     };
-    (study.logs.iter().enumerate())
+    (problem.logs.iter().enumerate())
         .map(|(index, log)| stretch(index, log))
         .collect()
 }

@@ -4,9 +4,11 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::closeloop::fit::{Declared, NOTHING};
 use crate::closeloop::settings::Settings;
 use crate::closeloop::tests::{pendulum, recorded};
 use crate::data::Log;
+use crate::model::Library;
 
 const RIG: &str = r#"
 model = "pendulum"
@@ -44,20 +46,23 @@ fn logs(more: &str, seed: u64) -> Vec<Log> {
 fn simulated_logs_have_the_windows_of_the_original_logs() {
     let (declared, logs) = (pendulum(), logs("", 0));
     let settings = Settings::default();
-    let mut study = Study::new(&declared, &logs, &settings);
-    let accepted = study.fit_declared(&[]).unwrap();
-    let simulated = SimulatedLogs::new(&study, &accepted).unwrap();
+    let problem = Problem::new(&declared, &NOTHING, &logs, &settings);
+    let Declared {
+        problem,
+        fitted: accepted,
+    } = problem.fit_declared().unwrap();
+    let simulated = SimulatedLogs::new(&problem, &accepted).unwrap();
     let drawn = simulated
         .draw(&[], &mut ChaCha8Rng::seed_from_u64(0))
         .unwrap();
-    let again = study.on(&drawn);
-    let (before, after) = (&study.shooting, &again.shooting);
+    let again = problem.on(&drawn);
+    let (before, after) = (&problem.shooting, &again.shooting);
     assert_eq!(before.windows.len(), after.windows.len());
     // The motion is the accepted model's, and each residual has its old size: only signs were drawn.
-    let residuals = |study: &Study<'_>| {
+    let residuals = |problem: &Problem<'_>| {
         // What the rows of a neighbouring window tell of a start has that window's sign.
-        let windows = study.shooting.windows.clone();
-        let shooting = study.shooting.over(windows).with_free_starts();
+        let windows = problem.shooting.windows.clone();
+        let shooting = problem.shooting.over(windows).with_free_starts();
         let states = shooting.initial_locals(0);
         let scale = Some(accepted.fit.scale);
         let dynamics = &accepted.model.dynamics();
@@ -66,7 +71,11 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
         shooting.residuals(dynamics, &values, &found.locals)
     };
     let mut turned = 0;
-    for (window, (old, new)) in residuals(&study).iter().zip(residuals(&again)).enumerate() {
+    for (window, (old, new)) in residuals(&problem)
+        .iter()
+        .zip(residuals(&again))
+        .enumerate()
+    {
         let sign = if old.iter().zip(&new).map(|(a, b)| a * b).sum::<f64>() > 0.0 {
             1.0
         } else {
@@ -85,12 +94,15 @@ fn simulated_logs_have_the_windows_of_the_original_logs() {
 fn complete_models_raise_no_false_alarm_and_hidden_effects_are_named() {
     let (declared, library, logs) = (pendulum(), Library::built_in(), logs("", 0));
     let settings = Settings::default();
-    let mut study = Study::new(&declared, &logs, &settings);
-    let accepted = study.fit_declared(&[]).unwrap();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared {
+        problem,
+        fitted: accepted,
+    } = problem.fit_declared().unwrap();
     let repeat = |runs: usize| {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let calibrator = Calibrator::new(&study, &accepted, &library, runs, &mut rng).unwrap();
-        let search = |simulation| calibrator.search(simulation, &mut |_| {}).unwrap();
+        let calibrator = Calibrator::new(&problem, &accepted, runs, &mut rng).unwrap();
+        let search = |simulation| calibrator.search(simulation, &()).unwrap();
         let searched = calibrator.simulations().iter().map(search).collect();
         calibrator.conclude(searched)
     };
@@ -115,9 +127,12 @@ fn friction_is_named_above_its_detection_limit() {
     let (declared, library) = (pendulum(), Library::built_in());
     let bare = logs("", 0);
     let settings = Settings::default();
-    let mut study = Study::new(&declared, &bare, &settings);
-    let accepted = study.fit_declared(&[]).unwrap();
-    let limits = detection_limits(&study, &accepted, library.effects()).unwrap();
+    let problem = Problem::new(&declared, &library, &bare, &settings);
+    let Declared {
+        problem,
+        fitted: accepted,
+    } = problem.fit_declared().unwrap();
+    let limits = detection_limits(&problem, &accepted).unwrap();
     let friction = |limit: &&DetectionLimit| limit.effect.effect.name == "coulomb_friction";
     let Smallest::Detectable { values, .. } = &limits.iter().find(friction).unwrap().smallest
     else {
@@ -127,9 +142,9 @@ fn friction_is_named_above_its_detection_limit() {
     let named = |level: f64| {
         let named = |seed: &u64| {
             let logs = logs(&coulomb(level), 100 + seed);
-            let mut study = Study::new(&declared, &logs, &settings);
+            let problem = Problem::new(&declared, &library, &logs, &settings);
             let rng = &mut ChaCha8Rng::seed_from_u64(*seed);
-            let found = find(&mut study, &[], &library, rng, &mut |_| {}).unwrap();
+            let found = find(problem.fit_declared().unwrap(), &[], rng, &()).unwrap();
             let standings = found.chosen.standings.iter();
             let established = standings.filter(|s| s.status == Status::Established);
             let labels = established.map(|s| s.effect.label());

@@ -1,11 +1,10 @@
 use thiserror::Error;
 
 use super::separation::{Separation, separation};
-use crate::closeloop::find::Found;
+use crate::closeloop::judge::Found;
 use crate::closeloop::select::Rival;
 use crate::closeloop::space::Space;
-use crate::closeloop::stage::{Observer, Progress, Stage};
-use crate::closeloop::study::Study;
+use crate::closeloop::stage::{Progress, Stage, Watch};
 use crate::model::FittedEffect;
 
 /// Another explanation that the logs do not distinguish from the one reported.
@@ -35,30 +34,26 @@ pub enum NotSimulated {
 
 /// The sets of effects that explain the logs as well as the confirmed one, the best first; sets that replace a
 /// withdrawn effect are left out. For the best of them the experiment that tells the two apart is simulated.
-pub(in crate::closeloop) fn discriminate(
-    study: &Study<'_>,
-    found: &Found,
-    progress: &mut Observer<'_>,
-) -> Vec<Alternative> {
-    let fitted = &found.chosen.after;
+pub fn discriminate(found: &Found<'_>, watch: &dyn Watch) -> Vec<Alternative> {
+    let (problem, fitted) = (&found.problem, &found.chosen.after);
     let stands = |effect: &FittedEffect| {
-        let same = |other: &FittedEffect| other.label() == effect.label();
-        fitted.model.effects.iter().any(same)
+        let mut effects = fitted.model.effects.iter();
+        effects.any(|other| other.is_same(effect))
     };
     let mut rivals: Vec<&Rival> = (found.chosen.rivals.iter())
         .filter(|rival| stands(&rival.instead_of))
         .collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let alternative = |(rank, rival): (usize, &Rival)| {
-        if study.space == Space::Torque {
+        if problem.space == Space::Torque {
             return Alternative::of(rival, Err(NotSimulated::Torques));
         }
-        if rank >= study.settings.discriminate.alternatives {
+        if rank >= problem.settings.discriminate.alternatives {
             return Alternative::of(rival, Err(NotSimulated::Rank));
         }
         let text = format!("simulating experiments against {}", rival.effect.label());
-        progress(Progress::within(Stage::Discriminate, &text));
-        let separation = separation(study, fitted, rival).ok_or(NotSimulated::Diverged);
+        watch.see(Progress::within(Stage::Discriminate, &text));
+        let separation = separation(problem, fitted, rival).ok_or(NotSimulated::Diverged);
         Alternative::of(rival, separation)
     };
     rivals.into_iter().enumerate().map(alternative).collect()

@@ -4,9 +4,9 @@ use super::menu::{Experiment, as_logged, experiments, spread};
 use super::motion::{Motion, Record, is_turn};
 use super::payload::Payload;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
-use crate::closeloop::settings::DiscriminateSettings;
-use crate::closeloop::study::Study;
+use crate::closeloop::settings::{DiscriminateSettings, Settings};
 use crate::data::{Joint, Log};
 use crate::identify::{Fit, Shooting, Values, fit, uncertainty};
 use crate::model::{Dynamics, FittedEffect, Model};
@@ -19,18 +19,18 @@ pub(super) struct Hypothesis {
 }
 
 impl Hypothesis {
-    pub fn new(study: &Study<'_>, model: &Model) -> Self {
+    pub fn new(problem: &Problem<'_>, model: &Model) -> Self {
         Self {
-            dynamics: study.smoothed(model).dynamics(),
-            scale: study.settings.discriminate.scale,
+            dynamics: problem.smoothed(model).dynamics(),
+            scale: problem.settings.discriminate.refit_scale,
         }
     }
 
     /// The rival without effects that were withdrawn from the model since.
-    pub fn of_rival(study: &Study<'_>, fitted: &Fitted, rival: &Rival) -> Self {
+    pub fn of_rival(problem: &Problem<'_>, fitted: &Fitted, rival: &Rival) -> Self {
         let stands = |effect: &&FittedEffect| {
             let mut known = fitted.model.effects.iter().chain([&rival.effect]);
-            known.any(|other| other.label() == effect.label())
+            known.any(|other| other.is_same(effect))
         };
         let effects: Vec<FittedEffect> = rival
             .fitted
@@ -40,7 +40,7 @@ impl Hypothesis {
             .filter(stands)
             .cloned()
             .collect();
-        Self::new(study, &rival.fitted.model.with_effects(effects))
+        Self::new(problem, &rival.fitted.model.with_effects(effects))
     }
 
     fn with(&self, payload: Option<&Payload>) -> Self {
@@ -51,9 +51,12 @@ impl Hypothesis {
     }
 
     /// The motion that it predicts; `None` where it diverges.
-    fn simulate(&self, study: &Study<'_>, motions: &[Motion]) -> Option<Record> {
-        let window_s = study.settings.fit.window_s;
-        Record::of(motions, study.logs, &self.dynamics, window_s)
+    fn simulate(&self, problem: &Problem<'_>, motions: &[Motion]) -> Option<Record> {
+        let Settings {
+            fit, discriminate, ..
+        } = problem.settings;
+        let lengths_s = (fit.window_s, discriminate.pause_s);
+        Record::of(motions, problem.logs, &self.dynamics, lengths_s)
     }
 
     /// Fit to a record, every parameter free that the file does not fix: an experiment may determine what the
@@ -69,7 +72,7 @@ impl Hypothesis {
 
 /// Two explanations, of which one is simulated as the truth and the other is fitted to it.
 pub(super) struct Comparison<'a> {
-    study: &'a Study<'a>,
+    problem: &'a Problem<'a>,
     truth: Hypothesis,
     /// Fitted to the present logs as the truth has them.
     other: Hypothesis,
@@ -101,41 +104,41 @@ pub(super) struct Trial {
 }
 
 impl<'a> Comparison<'a> {
-    /// `model` is fitted to the study's logs: its start states are theirs. `None` where the truth cannot follow them.
+    /// `model` is fitted to the problem's logs: its start states are theirs. `None` where the truth cannot follow them.
     pub fn new(
-        study: &'a Study<'a>,
+        problem: &'a Problem<'a>,
         fitted: &Fitted,
         truth: Hypothesis,
         other: Hypothesis,
     ) -> Option<Self> {
-        let settings = &study.settings.discriminate;
-        let noise = &study.shooting.noise;
+        let settings = &problem.settings.discriminate;
+        let noise = &problem.shooting.noise;
         let noise: Vec<f64> = (noise.iter())
-            .map(|noise| (noise * fitted.fit.scale).max(settings.finest))
+            .map(|noise| (noise * fitted.fit.scale).max(settings.finest_position))
             .collect();
-        let motions: Vec<Motion> = spread(study.shooting.windows.len(), settings.present_windows)
+        let motions: Vec<Motion> = spread(problem.shooting.windows.len(), settings.present_windows)
             .into_iter()
-            .map(|w| window_of(study, fitted, w))
+            .map(|w| window_of(problem, fitted, w))
             .collect();
-        let present = truth.simulate(study, &motions)?;
+        let present = truth.simulate(problem, &motions)?;
         let shooting =
             Shooting::new(&present.logs, present.windows.clone(), &noise).with_free_starts();
         let (values, found) = other.refit(&shooting, present.starts(0..))?;
         let loss = loss_of(&found);
-        let windows = study.shooting.windows.iter();
-        let all_s: f64 = windows.map(|w| w.duration_s(study.logs)).sum();
+        let windows = problem.shooting.windows.iter();
+        let all_s: f64 = windows.map(|w| w.duration_s(problem.logs)).sum();
         // The present logs did not discriminate, whatever the noise suggests: they hold no more than was needed.
         let too_sure = loss / present.duration_s(0..) * all_s / settings.lead;
         let differences = differences(&shooting, &other, &values, &found.locals, 0);
         Some(Self {
-            inflation: inflation(study, fitted).max(too_sure),
+            inflation: inflation(problem, fitted).max(too_sure),
             other: Hypothesis {
                 dynamics: values.put_into(&other.dynamics, &present.logs),
                 ..other
             },
             locals: found.locals,
             differences,
-            study,
+            problem,
             truth,
             noise,
             present,
@@ -145,7 +148,7 @@ impl<'a> Comparison<'a> {
 
     /// Every experiment that the rig can do, simulated, to tell apart effects on these joints.
     pub fn trials(&self, fitted: &Fitted, joints: &[Joint]) -> Vec<Trial> {
-        let changes = experiments(self.study, fitted, joints);
+        let changes = experiments(self.problem, fitted, joints);
         let changes = (changes.par_iter()).filter_map(|change| self.test(change, None));
         let payloads = self.payloads();
         let loaded = (payloads.par_iter())
@@ -154,24 +157,24 @@ impl<'a> Comparison<'a> {
     }
 
     fn settings(&self) -> &DiscriminateSettings {
-        &self.study.settings.discriminate
+        &self.problem.settings.discriminate
     }
 
     fn payloads(&self) -> Vec<Payload> {
         let times = self.present.logs.iter().flat_map(|log| &log.time);
         let latest_s = times.fold(0.0_f64, |latest, time| latest.max(time.abs()));
-        let declared = self.study.declared.parameters.len();
+        let declared = self.problem.declared.parameters.len();
         let truth = &self.truth;
         Payload::all(
             &truth.dynamics,
             declared,
-            self.settings().payload,
+            self.settings().payload_share,
             2.0 * latest_s + 10.0,
         )
     }
 
     fn loaded(&self, fitted: &Fitted, payload: &Payload) -> Experiment {
-        let mut motions = as_logged(self.study, fitted);
+        let mut motions = as_logged(self.problem, fitted);
         for time in motions.iter_mut().flat_map(|motion| &mut motion.time) {
             *time += payload.delay_s;
         }
@@ -186,7 +189,7 @@ impl<'a> Comparison<'a> {
     fn test(&self, experiment: &Experiment, payload: Option<&Payload>) -> Option<Trial> {
         let (truth, other) = (self.truth.with(payload), self.other.with(payload));
         let proposed = truth
-            .simulate(self.study, &experiment.motions)
+            .simulate(self.problem, &experiment.motions)
             .filter(|record| self.is_possible(record, experiment.turns))?;
         let both = self.present.and(&proposed);
         let shooting =
@@ -210,9 +213,9 @@ impl<'a> Comparison<'a> {
     }
 
     fn is_possible(&self, record: &Record, turns: Option<Joint>) -> bool {
-        let fastest = self.settings().fastest;
+        let fastest = self.settings().top_speeds;
         let slow = |log: &Log| {
-            let mut joints = log.qd.iter().zip(&self.study.top_speed);
+            let mut joints = log.qd.iter().zip(&self.problem.top_speed);
             joints.all(|(qd, top)| qd.iter().all(|v| v.abs() <= fastest * top))
         };
         let turned = |joint: Joint| {
@@ -224,9 +227,9 @@ impl<'a> Comparison<'a> {
 }
 
 /// The motion of one window of the logs.
-fn window_of(study: &Study<'_>, fitted: &Fitted, w: usize) -> Motion {
-    let window = study.shooting.windows[w];
-    let log = &study.logs[window.log];
+fn window_of(problem: &Problem<'_>, fitted: &Fitted, w: usize) -> Motion {
+    let window = problem.shooting.windows[w];
+    let log = &problem.logs[window.log];
     let rows = window.first..=window.last;
     Motion {
         log: window.log,
@@ -271,9 +274,9 @@ fn differences(
 
 /// How much more the estimates of a fit scatter than independent normal residuals of its scale would let them, as a
 /// ratio of variances, at least 1: residuals of measured logs are correlated.
-fn inflation(study: &Study<'_>, fitted: &Fitted) -> f64 {
+fn inflation(problem: &Problem<'_>, fitted: &Fitted) -> f64 {
     let size = fitted.fit.columns.len();
-    let covariance = uncertainty(&study.shooting, &fitted.fit).covariance;
+    let covariance = uncertainty(&problem.shooting, &fitted.fit).covariance;
     let all = fitted.fit.equations();
     #[allow(clippy::cast_precision_loss)] // few parameters
     let mean = (covariance * all.hessian).trace() / size.max(1) as f64;

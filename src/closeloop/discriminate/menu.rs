@@ -1,10 +1,7 @@
 use super::motion::Motion;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::data::{Joint, Quantity, row_after};
-
-/// Rows of a motion at most, where those of the log are denser than any motion needs.
-const MOST_ROWS: f64 = 1e5;
 
 /// The torque, or the command, of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,7 +133,11 @@ pub(super) struct Experiment {
 
 /// What the rig of the logs could do to tell apart effects on these joints. `model` is fitted to the logs: its start
 /// states are where motions begin.
-pub(super) fn experiments(study: &Study<'_>, fitted: &Fitted, joints: &[Joint]) -> Vec<Experiment> {
+pub(super) fn experiments(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    joints: &[Joint],
+) -> Vec<Experiment> {
     let of_one_joint = |item: &MenuItem| item.text.contains("{joint}");
     let mut all = Vec::new();
     for item in &MENU {
@@ -147,10 +148,10 @@ pub(super) fn experiments(study: &Study<'_>, fitted: &Fitted, joints: &[Joint]) 
         };
         let able = joints
             .iter()
-            .filter(|joint| item.is_possible(study, **joint));
+            .filter(|joint| item.is_possible(problem, **joint));
         all.extend(able.map(|&joint| Experiment {
-            text: item.words(study, joint),
-            motions: item.motions(study, fitted, joint),
+            text: item.words(problem, joint),
+            motions: item.motions(problem, fitted, joint),
             turns: item.turns.then_some(joint),
         }));
     }
@@ -158,45 +159,45 @@ pub(super) fn experiments(study: &Study<'_>, fitted: &Fitted, joints: &[Joint]) 
 }
 
 /// Motions under the logged torque, for an experiment that changes the rig.
-pub(super) fn as_logged(study: &Study<'_>, fitted: &Fitted) -> Vec<Motion> {
-    AS_LOGGED.motions(study, fitted, Joint::at(0))
+pub(super) fn as_logged(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Motion> {
+    AS_LOGGED.motions(problem, fitted, Joint::at(0))
 }
 
 impl MenuItem {
-    fn is_possible(&self, study: &Study<'_>, joint: Joint) -> bool {
+    fn is_possible(&self, problem: &Problem<'_>, joint: Joint) -> bool {
         // No torque comes of no command only where commands are torques.
-        let coasts = study.declared.driven_by() == Quantity::Torque;
+        let coasts = problem.declared.driven_by() == Quantity::Torque;
         let driven = match self.drive {
             _ if *self == AS_LOGGED => true,
             Drive::Nothing => coasts,
-            Drive::Logged { .. } => study.top_driving.iter().any(|top| *top > 0.0),
-            Drive::Added(_) | Drive::Ramps(_) => study.top_driving[joint] > 0.0,
+            Drive::Logged { .. } => problem.top_driving.iter().any(|top| *top > 0.0),
+            Drive::Added(_) | Drive::Ramps(_) => problem.top_driving[joint] > 0.0,
         };
-        let coarse = study
+        let coarse = problem
             .logs
             .iter()
-            .all(|log| log.median_step() >= study.settings.discriminate.fastest_sampling_s);
+            .all(|log| log.median_step() >= problem.settings.discriminate.fastest_sampling_s);
         driven
             && (self.finer == 1 || coarse)
-            && !(self.turns && (study.declared.prismatic[joint] || goes_round(study, joint)))
+            && !(self.turns && (problem.declared.prismatic[joint] || goes_round(problem, joint)))
     }
 
-    fn words(&self, study: &Study<'_>, joint: Joint) -> String {
-        let (force, length) = if study.declared.prismatic[joint] {
+    fn words(&self, problem: &Problem<'_>, joint: Joint) -> String {
+        let (force, length) = if problem.declared.prismatic[joint] {
             (" N", "m")
         } else {
             (" N m", "rad")
         };
-        let (driving, unit) = match study.declared.driven_by() {
+        let (driving, unit) = match problem.declared.driven_by() {
             Quantity::Torque => ("torque", force),
             _ => ("command", ""),
         };
         let size = match self.drive {
-            Drive::Added(share) | Drive::Ramps(share) => share * study.top_driving[joint],
+            Drive::Added(share) | Drive::Ramps(share) => share * problem.top_driving[joint],
             _ => 0.0,
         };
         let speed = match self.start {
-            Start::TopSpeed(factor) => factor * study.top_speed[joint],
+            Start::TopSpeed(factor) => factor * problem.top_speed[joint],
             _ => 0.0,
         };
         self.text
@@ -206,9 +207,9 @@ impl MenuItem {
             .replace("{speed}", &format!("{speed:.1} {length}/s"))
     }
 
-    fn motions(&self, study: &Study<'_>, fitted: &Fitted, joint: Joint) -> Vec<Motion> {
-        let motions = study.settings.discriminate.motions;
-        let windows = &study.shooting.windows;
+    fn motions(&self, problem: &Problem<'_>, fitted: &Fitted, joint: Joint) -> Vec<Motion> {
+        let motions = problem.settings.discriminate.motions;
+        let windows = &problem.shooting.windows;
         let first_of_log = |w: &usize| *w == 0 || windows[*w].log != windows[*w - 1].log;
         let starts: Vec<usize> = match self.start {
             Start::Rest => (0..windows.len())
@@ -219,26 +220,26 @@ impl MenuItem {
         };
         starts
             .into_iter()
-            .map(|w| self.motion(study, w, &fitted.fit.locals[w], joint))
+            .map(|w| self.motion(problem, w, &fitted.fit.locals[w], joint))
             .collect()
     }
 
     /// One motion that begins like window `w` of the logs.
-    fn motion(&self, study: &Study<'_>, w: usize, state: &[f64], joint: Joint) -> Motion {
-        let settings = &study.settings.discriminate;
-        let window = study.shooting.windows[w];
-        let log = &study.logs[window.log];
+    fn motion(&self, problem: &Problem<'_>, w: usize, state: &[f64], joint: Joint) -> Motion {
+        let settings = &problem.settings.discriminate;
+        let window = problem.shooting.windows[w];
+        let log = &problem.logs[window.log];
         let length_s = match self.drive {
-            Drive::Ramps(_) => settings.ramps_s,
+            Drive::Ramps(_) => settings.ramp_period_s,
             _ => settings.motion_s,
         };
-        let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / MOST_ROWS);
+        let step_s = (log.median_step() / f64::from(self.finer)).max(length_s / settings.most_rows);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand rows
         let rows = (length_s / step_s).round() as usize;
         let (begin, end) = (log.time[window.first], log.time[log.rows() - 1]);
         let mut motion = Motion {
             log: window.log,
-            start: self.state(study, state, joint),
+            start: self.state(problem, state, joint),
             time: Vec::new(),
             tau: Vec::new(),
         };
@@ -258,10 +259,11 @@ impl MenuItem {
             motion.time.push(begin + since);
             motion.tau.push(match self.drive {
                 Drive::Logged { factor, .. } => logged.map(|tau| factor * tau).collect(),
-                Drive::Added(share) => with(logged, joint, share * study.top_driving[joint]),
+                Drive::Added(share) => with(logged, joint, share * problem.top_driving[joint]),
                 Drive::Ramps(share) => {
-                    let ramp =
-                        share * study.top_driving[joint] * triangle(since / settings.ramps_s);
+                    let ramp = share
+                        * problem.top_driving[joint]
+                        * triangle(since / settings.ramp_period_s);
                     with(logged.map(|_| 0.0), joint, ramp)
                 }
                 Drive::Nothing => logged.map(|_| 0.0).collect(),
@@ -270,13 +272,13 @@ impl MenuItem {
         motion
     }
 
-    fn state(&self, study: &Study<'_>, logged: &[f64], joint: Joint) -> Vec<f64> {
+    fn state(&self, problem: &Problem<'_>, logged: &[f64], joint: Joint) -> Vec<f64> {
         let mut state = logged.to_vec();
-        let velocities = &mut state[study.declared.joints..];
+        let velocities = &mut state[problem.declared.joints..];
         match self.start {
             Start::Logged(factor) => velocities.iter_mut().for_each(|v| *v *= factor),
             Start::TopSpeed(factor) => {
-                velocities[joint] = (factor * study.top_speed[joint]).copysign(velocities[joint]);
+                velocities[joint] = (factor * problem.top_speed[joint]).copysign(velocities[joint]);
             }
             Start::Rest => velocities.fill(0.0),
         }
@@ -304,8 +306,8 @@ fn triangle(phase: f64) -> f64 {
 }
 
 /// Whether the logs show full turns of the joint.
-fn goes_round(study: &Study<'_>, joint: Joint) -> bool {
-    study
+fn goes_round(problem: &Problem<'_>, joint: Joint) -> bool {
+    problem
         .logs
         .iter()
         .any(|log| super::motion::is_turn(&log.q[joint]))

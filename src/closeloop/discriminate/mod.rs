@@ -7,6 +7,5 @@ mod motion;
 mod payload;
 mod separation;
 
-pub(super) use self::alternative::discriminate;
-pub use self::alternative::{Alternative, NotSimulated};
+pub use self::alternative::{Alternative, NotSimulated, discriminate};
 pub use self::separation::Separation;

@@ -8,7 +8,7 @@ use crate::sim::{Commands, FIT_S, RK4, Simulator};
 /// A motion of a rig before it is simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
-    /// Number of the study's log that it begins in.
+    /// Number of the problem's log that it begins in.
     pub log: usize,
     /// Angles, then velocities.
     pub start: Vec<f64>,
@@ -18,15 +18,11 @@ pub(super) struct Motion {
     pub tau: Vec<Vec<f64>>,
 }
 
-/// Between motions of one log the rig stands for so long (s) under the torque that the next begins with: longer than
-/// any memory of its drive.
-const PAUSE_S: f64 = 2.0;
-
 /// Simulated logs, each of motions one after the other.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Record {
     pub logs: Vec<Log>,
-    /// For each of them the log of the study that its motions begin in: what differs by log is as it was there.
+    /// For each of them the log of the problem that its motions begin in: what differs by log is as it was there.
     pub origins: Vec<usize>,
     /// The rows of each motion.
     pub motions: Vec<Window>,
@@ -35,13 +31,14 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`. What differs by log is as
+    /// Motions as a model has them that begin in these `logs`, cut into windows of `length_s`; the rig stands for
+    /// `pause_s` between two of one log. What differs by log is as
     /// it is there. `None` where the model diverges.
     pub fn of(
         motions: &[Motion],
         logs: &[Log],
         dynamics: &Dynamics,
-        length_s: f64,
+        (length_s, pause_s): (f64, f64),
     ) -> Option<Self> {
         let mut record = Self {
             logs: Vec::new(),
@@ -51,7 +48,7 @@ impl Record {
         };
         for motion in motions {
             let index = record.log_of(motion.log, &logs[motion.log]);
-            let first = append(&mut record.logs[index], motion);
+            let first = append(&mut record.logs[index], motion, pause_s);
             let model = dynamics.in_log(&logs[motion.log]);
             simulate(&mut record.logs[index], first, &motion.start, &model)?;
             let log = &record.logs[index];
@@ -65,7 +62,7 @@ impl Record {
         Some(record)
     }
 
-    /// Number of the record's log for motions that begin in a log of the study: it is called as that log is.
+    /// Number of the record's log for motions that begin in a log of the problem: it is called as that log is.
     fn log_of(&mut self, origin: usize, log: &Log) -> usize {
         if let Some(known) = self.origins.iter().position(|known| *known == origin) {
             return known;
@@ -114,13 +111,13 @@ impl Record {
 }
 
 /// Add the torques of a motion to a log, after a pause; the row at which it begins.
-fn append(log: &mut Log, motion: &Motion) -> usize {
+fn append(log: &mut Log, motion: &Motion, pause_s: f64) -> usize {
     let earliest = log
         .time
         .last()
-        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * PAUSE_S);
+        .map_or(f64::NEG_INFINITY, |last| last + 2.0 * pause_s);
     let delay = (earliest - motion.time[0]).max(0.0);
-    let pause = (motion.time[0] - PAUSE_S, &motion.tau[0]);
+    let pause = (motion.time[0] - pause_s, &motion.tau[0]);
     let rows = motion.time.iter().copied().zip(&motion.tau);
     for (time, tau) in std::iter::once(pause).chain(rows) {
         log.time.push(time + delay);

@@ -3,9 +3,9 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison::{Comparison, Hypothesis, Trial};
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::select::Rival;
 use crate::closeloop::settings::DiscriminateSettings;
-use crate::closeloop::study::Study;
 use crate::data::Joint;
 
 /// How far two explanations differ in the experiment that tells them apart best.
@@ -36,14 +36,18 @@ pub struct Separation {
 /// together, all its parameters and start states free, and the remaining difference is compared with the noise.
 /// A rival that contains the chosen effect is the one simulated, at the size fitted: it could follow the other anywhere.
 /// `None` where not even the present motion can be simulated.
-pub(super) fn separation(study: &Study<'_>, fitted: &Fitted, rival: &Rival) -> Option<Separation> {
-    let settings = &study.settings.discriminate;
-    let chosen = Hypothesis::new(study, &fitted.model);
-    let other = Hypothesis::of_rival(study, fitted, rival);
+pub(super) fn separation(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    rival: &Rival,
+) -> Option<Separation> {
+    let settings = &problem.settings.discriminate;
+    let chosen = Hypothesis::new(problem, &fitted.model);
+    let other = Hypothesis::of_rival(problem, fitted, rival);
     let comparison = if rival.contains_chosen() {
-        Comparison::new(study, fitted, other, chosen)
+        Comparison::new(problem, fitted, other, chosen)
     } else {
-        Comparison::new(study, fitted, chosen, other)
+        Comparison::new(problem, fitted, chosen, other)
     }?;
     let mut joints = vec![rival.effect.joint, rival.instead_of.joint];
     joints.dedup();
@@ -59,7 +63,7 @@ pub(super) fn separation(study: &Study<'_>, fitted: &Fitted, rival: &Rival) -> O
         present_difference_rad: shown.present,
         noise_rad: shown.noise,
         seconds: best.map(|trial| trial.worth(settings).ceil()),
-        slides: study.declared.prismatic[shown.joint],
+        slides: problem.declared.prismatic[shown.joint],
     })
 }
 
@@ -92,11 +96,11 @@ impl Separation {
 impl Trial {
     /// Length in s by which experiments are ranked: short ones are equal.
     fn worth(&self, settings: &DiscriminateSettings) -> f64 {
-        self.seconds.max(settings.short_s)
+        self.seconds.max(settings.equally_short_s)
     }
 
     fn tells(&self, settings: &DiscriminateSettings) -> bool {
-        self.seconds < settings.long_s && self.deviation() > settings.visible
+        self.seconds < settings.longest_s && self.deviation() > settings.visible_share
     }
 
     fn deviation(&self) -> f64 {

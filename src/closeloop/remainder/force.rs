@@ -1,8 +1,8 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::space::Space;
-use crate::closeloop::study::Study;
 use crate::data::Log;
 use crate::identify::{FitError, Shooting, Values, Window, fit};
 
@@ -27,22 +27,27 @@ pub struct ForceSample {
 /// # Errors
 /// Logs without a stretch, or a model that diverges over one of them.
 pub(in crate::closeloop) fn residual_force(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     fitted: &Fitted,
 ) -> Result<Vec<ForceSample>, FitError> {
-    let shooting = study.windows_of(study.settings.remainder.stretch_s);
-    let forces = match study.space {
+    let shooting = problem.windows_of(problem.settings.remainder.stretch_s);
+    let forces = match problem.space {
         Space::Motion => forces_of_motion(&shooting, fitted)?,
-        Space::Torque => forces_of_torques(study, &shooting, fitted)?,
+        Space::Torque => forces_of_torques(problem, &shooting, fitted)?,
     };
-    let logs = study.logs.iter();
+    let logs = problem.logs.iter();
     let torques: Vec<Vec<Vec<f64>>> = logs.map(|log| fitted.model.drive_torques(log)).collect();
     let sample = |(window, force): (&Window, &Vec<f64>)| {
-        ForceSample::over(window, &study.logs[window.log], &torques[window.log], force)
+        ForceSample::over(
+            window,
+            &problem.logs[window.log],
+            &torques[window.log],
+            force,
+        )
     };
     let stretches = shooting.windows.iter().zip(&forces);
     let mut samples: Vec<ForceSample> = stretches.map(sample).collect();
-    within_turn(&mut samples, &study.declared.prismatic);
+    within_turn(&mut samples, &problem.declared.prismatic);
     Ok(samples)
 }
 
@@ -57,12 +62,12 @@ fn forces_of_motion(shooting: &Shooting<'_>, fitted: &Fitted) -> Result<Vec<Vec<
 
 /// For each window the mean of the torques by which its motion needs more than acts.
 fn forces_of_torques(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     shooting: &Shooting<'_>,
     fitted: &Fitted,
 ) -> Result<Vec<Vec<f64>>, FitError> {
-    let dynamics = study.compiled(&fitted.model);
-    let values = Values::of(&dynamics, study.logs);
+    let dynamics = problem.compiled(&fitted.model);
+    let values = Values::of(&dynamics, problem.logs);
     let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
     if residuals.is_empty() {
         return Err(FitError::NoWindow);

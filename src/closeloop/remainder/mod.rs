@@ -14,4 +14,4 @@ pub(super) use self::force::residual_force;
 pub use self::omnibus::Omnibus;
 pub use self::proposal::{Proposal, proposal};
 pub use self::residual::ResidualForce;
-pub use self::unexplained::{Probed, UNKNOWN, Unexplained, unexplained};
+pub use self::unexplained::{Probed, UNKNOWN, Unexplained, diagnose, unexplained};

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::torque_noise::TorqueNoise;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::space::Space;
-use crate::closeloop::study::Study;
 use crate::data::statistics::{deviation, mean};
 use crate::data::{Audit, Joint};
 use crate::identify::Values;
@@ -50,25 +50,30 @@ impl Omnibus {
 /// Compare, window by window, the share of the residuals' energy that is smooth in time with that of noise of the
 /// sensors, passed through all that the residuals have passed through. The share of a window does not depend on how large the
 /// noise is, and one bad reading raises it no more than any noise does.
-pub fn omnibus(study: &Study<'_>, before: &Fitted, after: &Fitted, rng: &mut impl Rng) -> Omnibus {
-    let chosen = chosen(study);
-    let settings = &study.settings.remainder;
-    match study.space {
+pub fn omnibus(
+    problem: &Problem<'_>,
+    before: &Fitted,
+    after: &Fitted,
+    rng: &mut impl Rng,
+) -> Omnibus {
+    let chosen = chosen(problem);
+    let settings = &problem.settings.remainder;
+    match problem.space {
         Space::Motion => {
-            let [declared, found] = [before, after].map(|fitted| windows(study, fitted, &chosen));
+            let [declared, found] = [before, after].map(|fitted| windows(problem, fitted, &chosen));
             let residuals = |windows: &[Window]| -> Vec<DVector<f64>> {
                 windows.iter().map(|w| w.left(&w.residual)).collect()
             };
-            let test = Test::new(study, &residuals(&declared), &residuals(&found));
+            let test = Test::new(problem, &residuals(&declared), &residuals(&found));
             test.against(settings.noise_draws, rng, |rng| {
                 found.iter().map(|w| w.left(&w.noise(rng))).collect()
             })
         }
         Space::Torque => {
             let [declared, found] =
-                [before, after].map(|fitted| TorqueNoise::new(study, &fitted.model, &chosen));
-            let test = Test::new(study, declared.residuals(), found.residuals());
-            test.against(settings.torque_draws, rng, |rng| found.draw(rng))
+                [before, after].map(|fitted| TorqueNoise::new(problem, &fitted.model, &chosen));
+            let test = Test::new(problem, declared.residuals(), found.residuals());
+            test.against(settings.torque_noise_draws, rng, |rng| found.draw(rng))
         }
     }
 }
@@ -85,13 +90,13 @@ struct Test {
 
 impl Test {
     /// Of the declared model and of one with effects, over the same windows, `[row * joints + joint]`.
-    fn new(study: &Study<'_>, declared: &[DVector<f64>], found: &[DVector<f64>]) -> Self {
-        let slow = study.settings.remainder.slow_waves;
-        let joints = study.declared.joints;
+    fn new(problem: &Problem<'_>, declared: &[DVector<f64>], found: &[DVector<f64>]) -> Self {
+        let slow = problem.settings.remainder.slow_waves;
+        let joints = problem.declared.joints;
         let of_window = |residual: &DVector<f64>| waves(residual.len() / joints, slow);
         let waves: Vec<DMatrix<f64>> = found.iter().map(of_window).collect();
         Self {
-            noise: study.shooting.noise.clone(),
+            noise: problem.shooting.noise.clone(),
             declared: Energies::of(joints, declared, &waves),
             found: Energies::of(joints, found, &waves),
             waves,
@@ -162,11 +167,11 @@ struct Window {
 }
 
 /// The windows in which no row is missing or, where there is none, all.
-fn chosen(study: &Study<'_>) -> Vec<usize> {
-    let windows = &study.shooting.windows;
+fn chosen(problem: &Problem<'_>) -> Vec<usize> {
+    let windows = &problem.shooting.windows;
     let is_whole = |w: &usize| {
         let window = windows[*w];
-        study.logs[window.log].is_whole(window.first..=window.last)
+        problem.logs[window.log].is_whole(window.first..=window.last)
     };
     let all = 0..windows.len();
     let whole: Vec<usize> = all.clone().filter(is_whole).collect();
@@ -177,15 +182,15 @@ fn chosen(study: &Study<'_>) -> Vec<usize> {
     }
 }
 
-fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> {
-    let start_step = study.settings.remainder.start_step;
-    let joints = study.declared.joints;
-    let shooting = &study.shooting;
+fn windows(problem: &Problem<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> {
+    let start_step = problem.settings.remainder.start_step;
+    let joints = problem.declared.joints;
+    let shooting = &problem.shooting;
     let dynamics = fitted.model.dynamics();
-    let values = Values::of(&dynamics, study.logs);
+    let values = Values::of(&dynamics, problem.logs);
     let residuals = |locals: &[Vec<f64>]| shooting.residuals(&dynamics, &values, locals);
-    let sensors = sensors(study);
-    let order = study.joints_by_motion();
+    let sensors = sensors(problem);
+    let order = problem.joints_by_motion();
     let at = residuals(&fitted.fit.locals);
     let varied: Vec<Vec<Vec<f64>>> = (0..2 * joints)
         .map(|k| {
@@ -205,7 +210,7 @@ fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> 
             let slopes = DMatrix::from_fn(size, varied.len(), |i, k| {
                 (varied[k][w][i] - at[w][i]) * unit(i)
             });
-            let log = &study.logs[window.log];
+            let log = &problem.logs[window.log];
             let read = |i: usize| log.q[i % joints][window.first + i / joints];
             Window {
                 joints: order.clone(),
@@ -219,7 +224,7 @@ fn windows(study: &Study<'_>, fitted: &Fitted, chosen: &[usize]) -> Vec<Window> 
 }
 
 /// Noise before rounding, and step of the rounding, of each joint in each log.
-fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
+fn sensors(problem: &Problem<'_>) -> Vec<Vec<[f64; 2]>> {
     let of_log = |audit: &Audit| {
         let joints = &audit.joints;
         let sensor = |j: usize| {
@@ -230,14 +235,14 @@ fn sensors(study: &Study<'_>) -> Vec<Vec<[f64; 2]>> {
                 if step > 0.0 {
                     noise
                 } else {
-                    study.shooting.noise[j]
+                    problem.shooting.noise[j]
                 },
                 step,
             ]
         };
         (0..joints.len()).map(sensor).collect()
     };
-    study.audits().iter().map(of_log).collect()
+    problem.audits().iter().map(of_log).collect()
 }
 
 /// The slowest waves of the discrete cosine transform of so many rows, at most half of all.

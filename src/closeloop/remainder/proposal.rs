@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::unexplained::Unexplained;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::select::{Losses, best_start, gain, promise};
-use crate::closeloop::study::Study;
 use crate::data::{Joint, Quantity};
 use crate::model::{Effect, FittedEffect};
 
@@ -66,19 +66,19 @@ const TERMS: [Term; 31] = [
 /// A short sum of terms for the force that `model` lacks on the joint with the largest remainder: terms are added while
 /// they lower the loss on stretches left out of the fit. `None` where the remainder is not significant, or no term fits
 /// it.
-pub fn proposal(study: &Study<'_>, fitted: &Fitted, left: &Unexplained) -> Option<Proposal> {
+pub fn proposal(problem: &Problem<'_>, fitted: &Fitted, left: &Unexplained) -> Option<Proposal> {
     if !left.is_significant() {
         return None;
     }
-    let noteworthy = study.settings.remainder.noteworthy;
-    let without = Losses::of(study, fitted).of_joint(left.joint);
+    let noteworthy = problem.settings.remainder.noteworthy_share;
+    let without = Losses::of(problem, fitted).of_joint(left.joint);
     let mut found: Option<Sum> = None;
-    for _ in 0..study.settings.proposal.most_terms {
+    for _ in 0..problem.settings.proposal.most_terms {
         let (terms, losses) = match &found {
             Some(sum) => (sum.terms.as_slice(), &sum.losses),
             None => (&[][..], &without),
         };
-        let longer = longer(study, fitted, left.joint, terms)?;
+        let longer = longer(problem, fitted, left.joint, terms)?;
         if gain(losses, &longer.losses) < noteworthy {
             break;
         }
@@ -102,32 +102,32 @@ struct Sum {
 }
 
 /// The sum with one more term, the one that lowers the loss most.
-fn longer(study: &Study<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Option<Sum> {
+fn longer(problem: &Problem<'_>, model: &Fitted, joint: Joint, terms: &[Term]) -> Option<Sum> {
     let mut screened: Vec<(Vec<Term>, FittedEffect, f64)> = TERMS
         .par_iter()
         .filter(|term| !terms.contains(term))
         .filter_map(|term| {
             let terms = [terms, &[*term]].concat();
             let effect = effect(&terms);
-            if !study.space.shows(&effect) {
+            if !problem.space.shows(&effect) {
                 return None;
             }
             let effect = FittedEffect::absent(&effect, joint);
-            let start = best_start(study, model, &effect)?;
-            let cost = promise(study, model, &start)?;
+            let start = best_start(problem, model, &effect)?;
+            let cost = promise(problem, model, &start)?;
             Some((terms, start, cost))
         })
         .collect();
     screened.sort_by(|a, b| a.2.total_cmp(&b.2));
-    screened.truncate(study.settings.proposal.fitted);
+    screened.truncate(problem.settings.proposal.fitted_terms);
     let fitted: Vec<Sum> = screened
         .into_par_iter()
         .filter_map(|(terms, start, _)| {
             let longer = model.effects_and(&[start]);
-            let fitted = study.with_effects(model, longer).ok()?;
+            let fitted = problem.with_effects(model, longer).ok()?;
             Some(Sum {
                 terms,
-                losses: Losses::of(study, &fitted).of_joint(joint),
+                losses: Losses::of(problem, &fitted).of_joint(joint),
                 effect: fitted.model.effects.last()?.clone(),
             })
         })

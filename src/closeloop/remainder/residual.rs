@@ -1,7 +1,7 @@
 use super::curve::{Curve, curves};
 use super::force::{ForceSample, residual_force};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::data::statistics::upper_median;
 use crate::identify::FitError;
 
@@ -16,10 +16,17 @@ pub struct ResidualForce {
 impl ResidualForce {
     /// # Errors
     /// Logs without a stretch, or a model that diverges over one of them.
-    pub(in crate::closeloop) fn of(study: &Study<'_>, fitted: &Fitted) -> Result<Self, FitError> {
-        let samples = residual_force(study, fitted)?;
+    pub(in crate::closeloop) fn of(
+        problem: &Problem<'_>,
+        fitted: &Fitted,
+    ) -> Result<Self, FitError> {
+        let samples = residual_force(problem, fitted)?;
         Ok(Self {
-            curves: curves(&samples, &study.declared.prismatic, &study.settings.curves),
+            curves: curves(
+                &samples,
+                &problem.declared.prismatic,
+                &problem.settings.curves,
+            ),
             samples,
         })
     }

@@ -4,24 +4,24 @@ use nalgebra::DVector;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::data::{Channel, JointAudit, Log};
 use crate::identify::Values;
 use crate::model::Model;
 
-/// The residuals of a model in some windows of a study of torques, and what noise adds to them.
+/// The residuals of a model in some windows of a problem of torques, and what noise adds to them.
 pub(super) struct TorqueNoise<'a> {
-    study: &'a Study<'a>,
+    problem: &'a Problem<'a>,
     model: &'a Model,
     windows: &'a [usize],
     residuals: Vec<DVector<f64>>,
 }
 
 impl<'a> TorqueNoise<'a> {
-    pub fn new(study: &'a Study<'a>, model: &'a Model, windows: &'a [usize]) -> Self {
+    pub fn new(problem: &'a Problem<'a>, model: &'a Model, windows: &'a [usize]) -> Self {
         Self {
-            residuals: residuals(study, model, windows, study.logs),
-            study,
+            residuals: residuals(problem, model, windows, problem.logs),
+            problem,
             model,
             windows,
         }
@@ -34,27 +34,30 @@ impl<'a> TorqueNoise<'a> {
 
     /// What a draw of the noise of all sensors changes of them.
     pub fn draw(&self, rng: &mut impl Rng) -> Vec<DVector<f64>> {
-        let audits = self.study.audits().iter();
-        let order = self.study.joints_by_motion();
-        let logs: Vec<Log> = (self.study.logs.iter().zip(audits))
+        let audits = self.problem.audits().iter();
+        let order = self.problem.joints_by_motion();
+        let logs: Vec<Log> = (self.problem.logs.iter().zip(audits))
             .map(|(log, audit)| noisier(log, &audit.joints, &order, rng))
             .collect();
-        let noisy = residuals(self.study, self.model, self.windows, &logs);
+        let noisy = residuals(self.problem, self.model, self.windows, &logs);
         let both = noisy.into_iter().zip(&self.residuals);
         both.map(|(noisy, residuals)| noisy - residuals).collect()
     }
 }
 
 fn residuals(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     model: &Model,
     windows: &[usize],
     logs: &[Log],
 ) -> Vec<DVector<f64>> {
-    let chosen = windows.iter().map(|&w| study.shooting.windows[w]).collect();
-    let noise = &study.shooting.noise;
-    let shooting = (study.space).shooting(logs, chosen, noise, &study.sign_widths);
-    let dynamics = study.compiled(model);
+    let chosen = windows
+        .iter()
+        .map(|&w| problem.shooting.windows[w])
+        .collect();
+    let noise = &problem.shooting.noise;
+    let shooting = (problem.space).shooting(logs, chosen, noise, &problem.sign_widths);
+    let dynamics = problem.compiled(model);
     let values = Values::of(&dynamics, logs);
     let all = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
     let in_units = |residuals: Vec<f64>| {

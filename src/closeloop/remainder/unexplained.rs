@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::omnibus::{Omnibus, omnibus};
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::select::{Folds, Losses, acting, gain, p_value};
 use crate::closeloop::settings::RemainderSettings;
 use crate::closeloop::space::Space;
-use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::model::{Effect, FittedEffect};
 
@@ -58,42 +58,52 @@ impl Unexplained {
     }
 
     /// Share of the declared model's residual variance above noise that remains of what a joint is judged by.
-    pub fn fraction_on(&self, study: &Study<'_>, joint: Joint) -> f64 {
-        match study.space {
+    pub fn fraction_on(&self, problem: &Problem<'_>, joint: Joint) -> f64 {
+        match problem.space {
             Space::Motion => self.fraction,
             Space::Torque => self.omnibus.fractions[joint],
         }
     }
 
     /// Whether a significant remainder is one of what a joint is judged by.
-    pub fn matters_on(&self, study: &Study<'_>, joint: Joint) -> bool {
-        let least = study.settings.remainder.noteworthy;
-        study.space == Space::Motion || self.omnibus.shares[joint] > least
+    pub fn matters_on(&self, problem: &Problem<'_>, joint: Joint) -> bool {
+        let least = problem.settings.remainder.noteworthy_share;
+        problem.space == Space::Motion || self.omnibus.shares[joint] > least
     }
+}
+
+/// Test what the model with effects leaves, beside what the declared one does, with the probes of the library.
+pub fn diagnose(
+    problem: &Problem<'_>,
+    before: &Fitted,
+    after: &Fitted,
+    rng: &mut impl Rng,
+) -> Unexplained {
+    unexplained(problem, problem.library.probes(), before, after, rng)
 }
 
 /// Test whether the residuals are more than noise, whatever their shape, and probe them with flexible shapes over each
 /// variable. Probes name no effect; they lower the loss on left-out stretches as an unknown effect would.
 pub fn unexplained(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     probes: &[Effect],
     before: &Fitted,
     after: &Fitted,
     rng: &mut impl Rng,
 ) -> Unexplained {
-    let omnibus = omnibus(study, before, after, rng);
-    let losses = Losses::by(study, &Folds::of(study).alone(), after);
-    let probed: Vec<Probed> = acting(study, probes)
+    let omnibus = omnibus(problem, before, after, rng);
+    let losses = Losses::by(problem, &Folds::of(problem).alone(), after);
+    let probed: Vec<Probed> = acting(problem, probes)
         .into_par_iter()
-        .filter_map(|probe| ask(study, after, probe, &losses))
+        .filter_map(|probe| ask(problem, after, probe, &losses))
         .collect();
     #[allow(clippy::cast_precision_loss)] // few probes
     let asked = probed.len().max(1) as f64;
     let seen = probed
         .iter()
-        .filter(|p| p.gain > study.settings.remainder.noteworthy);
+        .filter(|p| p.gain > problem.settings.remainder.noteworthy_share);
     let least = seen.map(|p| p.p_value).fold(1.0, f64::min);
-    let (place, joint) = place(study, &omnibus, &probed);
+    let (place, joint) = place(problem, &omnibus, &probed);
     Unexplained {
         fraction: omnibus.fraction,
         p_value: (2.0 * omnibus.p_value.min(least * asked)).min(1.0),
@@ -104,39 +114,46 @@ pub fn unexplained(
     }
 }
 
-fn ask(study: &Study<'_>, model: &Fitted, probe: FittedEffect, losses: &Losses) -> Option<Probed> {
+fn ask(
+    problem: &Problem<'_>,
+    model: &Fitted,
+    probe: FittedEffect,
+    losses: &Losses,
+) -> Option<Probed> {
     let (place, joint) = (variables(&probe), probe.joint);
     let effects = model.effects_and(&[probe]);
-    let fitted = study.with_effects(model, effects).ok()?;
-    let with = Losses::by(study, &Folds::of(study).alone(), &fitted);
+    let fitted = problem.with_effects(model, effects).ok()?;
+    let with = Losses::by(problem, &Folds::of(problem).alone(), &fitted);
     Some(Probed {
         place,
         joint,
-        p_value: p_value(study, &fitted, fitted.model.effects.len() - 1)?,
+        p_value: p_value(problem, &fitted, fitted.model.effects.len() - 1)?,
         gain: gain(&losses.of_joint(joint), &with.of_joint(joint)),
     })
 }
 
 /// The variable and the joint of the probe that lowers the loss most; one test among all probes and the omnibus test.
-fn place(study: &Study<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
+fn place(problem: &Problem<'_>, omnibus: &Omnibus, probed: &[Probed]) -> (String, Joint) {
     let RemainderSettings {
         significance,
-        noteworthy,
-        located,
-        unlocated,
+        noteworthy_share,
+        located_share,
+        unlocated_share,
         ..
-    } = study.settings.remainder;
+    } = problem.settings.remainder;
     #[allow(clippy::cast_precision_loss)] // few probes
     let level = 0.5 * significance / probed.len().max(1) as f64;
     let (joint, share) = omnibus.most();
-    let matters = noteworthy.max(located * share);
+    let matters = noteworthy_share.max(located_share * share);
     // What friction leaves of low-passed torques near its reversals is located by the velocity.
-    let is_smoothing =
-        |joint: Joint| study.space == Space::Torque && omnibus.fractions[joint] <= unlocated;
+    let is_smoothing = |joint: Joint| {
+        problem.space == Space::Torque && omnibus.fractions[joint] <= unlocated_share
+    };
     let stands_out = |p: &&Probed| p.p_value < level && p.gain > matters && !is_smoothing(p.joint);
     let most = probed.iter().filter(stands_out);
-    let structured =
-        omnibus.p_value < 0.5 * significance && share > noteworthy && omnibus.fraction > unlocated;
+    let structured = omnibus.p_value < 0.5 * significance
+        && share > noteworthy_share
+        && omnibus.fraction > unlocated_share;
     match most.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
         Some(most) => (most.place.clone(), most.joint),
         None if structured => (UNKNOWN.to_owned(), joint),

@@ -14,7 +14,11 @@ pub fn reduction_interval(
     settings: &ScoreSettings,
     rng: &mut impl Rng,
 ) -> Option<[f64; 2]> {
-    interval(&blocks(before, after, settings.whole_logs), settings, rng)
+    interval(
+        &blocks(before, after, settings.whole_logs_from),
+        settings,
+        rng,
+    )
 }
 
 /// The same from the squared errors before and after of each block.
@@ -23,7 +27,7 @@ pub fn interval(
     settings: &ScoreSettings,
     rng: &mut impl Rng,
 ) -> Option<[f64; 2]> {
-    if blocks.len() < settings.fewest {
+    if blocks.len() < settings.fewest_blocks {
         return None;
     }
     let reduction = |drawn: &[usize]| {

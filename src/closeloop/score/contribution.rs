@@ -1,12 +1,11 @@
 use rayon::prelude::*;
 
 use super::errors::Scorer;
-use crate::closeloop::establish::Standing;
-use crate::closeloop::find::Chosen;
+use crate::closeloop::establish::{Chosen, Standing};
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::refine::Refined;
 use crate::closeloop::select::{Losses, p_of_gains, p_value};
-use crate::closeloop::study::Study;
 use crate::identify::FitError;
 use crate::model::{FittedEffect, Model, OwnValue, Parameter, Status};
 
@@ -54,28 +53,28 @@ impl Finding {
 /// The effects that were added to the declared model, each with what it contributes. `chosen` is the model before it was
 /// refined, `with` the error of the refined one on the test logs.
 pub(in crate::closeloop) fn findings(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     chosen: &Chosen,
     refined: &Refined<'_>,
     scorer: &Scorer<'_>,
 ) -> Vec<Finding> {
     let (chosen, standings) = (&chosen.after, &chosen.standings);
-    let with = scorer.compared(study.space, chosen);
-    let added = study.added(&refined.after.model);
+    let with = scorer.compared(problem.space, chosen);
+    let added = problem.added(&refined.after.model);
     let finding = |(k, standing): (usize, &Standing)| {
         // Both as effects were selected, in coarse steps.
         let less = &standing.without;
-        let error = |less: &Fitted| scorer.compared(study.space, less);
+        let error = |less: &Fitted| scorer.compared(problem.space, less);
         let reduction = |less: &Fitted| 1.0 - with / error(less).max(f64::MIN_POSITIVE);
-        let (expression, parameters) = described(study.declared, &refined.after.model, k);
+        let (expression, parameters) = described(problem.declared, &refined.after.model, k);
         Finding {
             effect: refined.after.model.effects[k].clone(),
             expression,
             parameters,
-            p_value: p_value(&refined.study, &refined.after, k)
+            p_value: p_value(&refined.problem, &refined.after, k)
                 .or_else(|| {
                     let effect = &standing.effect;
-                    Some(p_of_refit(study, chosen, less.as_ref().ok()?, effect))
+                    Some(p_of_refit(problem, chosen, less.as_ref().ok()?, effect))
                 })
                 .unwrap_or(1.0),
             error_reduction: less.as_ref().map(reduction).map_err(Clone::clone),
@@ -87,8 +86,13 @@ pub(in crate::closeloop) fn findings(
 }
 
 /// The signed-rank p-value of a model beside the refit without one of its effects.
-fn p_of_refit(study: &Study<'_>, chosen: &Fitted, without: &Fitted, effect: &FittedEffect) -> f64 {
-    let losses = |model: &Fitted| Losses::of(study, model).of_effect(effect);
+fn p_of_refit(
+    problem: &Problem<'_>,
+    chosen: &Fitted,
+    without: &Fitted,
+    effect: &FittedEffect,
+) -> f64 {
+    let losses = |model: &Fitted| Losses::of(problem, model).of_effect(effect);
     p_of_gains(&losses(without), &losses(chosen))
 }
 

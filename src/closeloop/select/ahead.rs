@@ -4,9 +4,9 @@ use rayon::prelude::*;
 use super::folds::{Folds, steps_without};
 use super::losses::of_torques;
 use super::trial::{Trial, differences};
+use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
 use crate::closeloop::space::Space;
-use crate::closeloop::study::Study;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::{Values, Window};
 use crate::sim::FIT_S;
@@ -20,11 +20,11 @@ pub struct Ahead {
 }
 
 impl Ahead {
-    pub fn of(study: &Study<'_>, trial: &Trial) -> Self {
-        let folds = Folds::of(study);
-        let squares = match study.space {
-            Space::Motion => of_motion(study, &folds, trial),
-            Space::Torque => of_torques(study, &folds, &trial.fitted, |r| r * r),
+    pub fn of(problem: &Problem<'_>, trial: &Trial) -> Self {
+        let folds = Folds::of(problem);
+        let squares = match problem.space {
+            Space::Motion => of_motion(problem, &folds, trial),
+            Space::Torque => of_torques(problem, &folds, &trial.fitted, |r| r * r),
         };
         Self { squares }
     }
@@ -33,29 +33,30 @@ impl Ahead {
     pub fn is_worse_than(&self, other: &Self, settings: &SelectSettings) -> bool {
         let rises = differences(&self.squares, &other.squares);
         let rise = rises.iter().sum::<f64>() / other.squares.iter().sum::<f64>();
-        mean(&rises) > settings.worse_by * standard_error(&rises) && rise > settings.worse
+        mean(&rises) > settings.worse_standard_errors * standard_error(&rises)
+            && rise > settings.worse_share
     }
 }
 
 /// Squares of the open-loop error in each stretch, with the values that a fit without the stretch's group gives.
-fn of_motion(study: &Study<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
+fn of_motion(problem: &Problem<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
     let fit = &trial.fitted.fit;
-    let dynamics = study.compiled(&trial.fitted.model);
-    let values = Values::of(&dynamics, study.logs);
+    let dynamics = problem.compiled(&trial.fitted.model);
+    let values = Values::of(&dynamics, problem.logs);
     let steps = steps_without(folds, fit);
-    let logs: Vec<Vec<(Window, usize)>> = (0..study.logs.len())
-        .map(|log| stretches_of(study, folds, log))
+    let logs: Vec<Vec<(Window, usize)>> = (0..problem.logs.len())
+        .map(|log| stretches_of(problem, folds, log))
         .collect();
     let of_group = |(group, step): (usize, &DVector<f64>)| {
         let there = values.moved(&dynamics, &fit.columns, step);
-        let model = there.put_into(&dynamics, study.logs);
+        let model = there.put_into(&dynamics, problem.logs);
         let of_log = |(log, all): (usize, &Vec<(Window, usize)>)| {
             let own = all.iter().filter(|(_, s)| folds.groups[*s] == group);
             let (own, stretches): (Vec<Window>, Vec<usize>) = own.copied().unzip();
             if own.is_empty() {
                 return Vec::new();
             }
-            let errors = errors_in(&model, &study.logs[log..=log], &own, FIT_S);
+            let errors = errors_in(&model, &problem.logs[log..=log], &own, FIT_S);
             let squares = errors.iter().map(|error| error.position.iter().sum());
             stretches.into_iter().zip(squares).collect()
         };
@@ -72,11 +73,11 @@ fn of_motion(study: &Study<'_>, folds: &Folds, trial: &Trial) -> Vec<f64> {
 
 /// The windows of a log over which its open-loop error is taken, as if it were the only log, and the stretch in which
 /// each starts.
-fn stretches_of(study: &Study<'_>, folds: &Folds, log: usize) -> Vec<(Window, usize)> {
-    let fitted = &study.shooting.windows;
+fn stretches_of(problem: &Problem<'_>, folds: &Folds, log: usize) -> Vec<(Window, usize)> {
+    let fitted = &problem.shooting.windows;
     let begin = fitted.partition_point(|window| window.log < log);
     let end = fitted.partition_point(|window| window.log <= log);
-    let all = windows(0, &study.logs[log], study.settings.score.middle_s());
+    let all = windows(0, &problem.logs[log], problem.settings.score.middle_s());
     let stretch = |window: Window| {
         let after = fitted[begin..end].partition_point(|of| of.first <= window.first);
         let before = after.checked_sub(1)?;

@@ -3,7 +3,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::data::Joint;
 use crate::identify::{
     Column, Fit, Shooting, WindowTerms, as_it_stands, predicted_cost, with_unit_diagonal,
@@ -12,28 +12,24 @@ use crate::model::{Dynamics, Effect, EffectParameter, Entry, FittedEffect};
 
 /// Every effect of the library on every joint where it can act and where it is not in the model yet, and every
 /// shift of a parameter that the file declares fixed.
-pub fn candidates(
-    study: &Study<'_>,
-    library: &[Effect],
-    present: &[FittedEffect],
-) -> Vec<FittedEffect> {
-    let mut all: Vec<FittedEffect> = study.declared.shifts();
-    all.extend(acting(study, library));
+pub fn candidates(problem: &Problem<'_>, present: &[FittedEffect]) -> Vec<FittedEffect> {
+    let mut all: Vec<FittedEffect> = problem.declared.shifts();
+    all.extend(acting(problem, problem.effects()));
     all.retain(|new| !present.iter().any(|old| old.excludes(new)));
     all
 }
 
 /// These effects on every joint where each can act and be observed.
-pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
+pub fn acting(problem: &Problem<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
     let mut all = Vec::new();
-    for effect in effects.iter().filter(|effect| study.space.shows(effect)) {
-        for joint in Joint::all(study.declared.joints) {
-            if is_driven_enough(study, effect, joint)
-                && !is_told_by_bodies(study, effect)
-                && !is_of_too_many(study, effect)
-                && study.declared.can_carry(effect, joint).is_ok()
+    for effect in effects.iter().filter(|effect| problem.space.shows(effect)) {
+        for joint in Joint::all(problem.declared.joints) {
+            if is_driven_enough(problem, effect, joint)
+                && !is_told_by_bodies(problem, effect)
+                && !is_of_too_many(problem, effect)
+                && problem.declared.can_carry(effect, joint).is_ok()
             {
-                let (speed, torque) = (study.top_speed[joint], study.top_torque[joint]);
+                let (speed, torque) = (problem.top_speed[joint], problem.top_torque[joint]);
                 all.push(FittedEffect::absent(
                     &effect.measured_by(speed, torque),
                     joint,
@@ -45,19 +41,19 @@ pub fn acting(study: &Study<'_>, effects: &[Effect]) -> Vec<FittedEffect> {
 }
 
 /// A load at the tip is no other torque where the bodies are free: what is declared of them tells it, in a stage of its own.
-fn is_told_by_bodies(study: &Study<'_>, effect: &Effect) -> bool {
-    matches!(effect.entry, Entry::Payload(_)) && study.has_free_bodies()
+fn is_told_by_bodies(problem: &Problem<'_>, effect: &Effect) -> bool {
+    matches!(effect.entry, Entry::Payload(_)) && problem.has_free_bodies()
 }
 
 /// An effect with a value for each log, of more logs than those are looked for in.
-pub fn is_of_too_many(study: &Study<'_>, effect: &Effect) -> bool {
-    study.logs.len() > study.settings.select.most_by_log
+pub fn is_of_too_many(problem: &Problem<'_>, effect: &Effect) -> bool {
+    problem.logs.len() > problem.settings.select.most_logs_of_own_values
         && effect.parameters.iter().any(|parameter| parameter.per_log)
 }
 
 /// Effects of the torque cannot be observed where there is none.
-fn is_driven_enough(study: &Study<'_>, effect: &Effect, joint: Joint) -> bool {
-    !effect.entry.needs_torque() || study.top_torque[joint] > 0.0
+fn is_driven_enough(problem: &Problem<'_>, effect: &Effect, joint: Joint) -> bool {
+    !effect.entry.needs_torque() || problem.top_torque[joint] > 0.0
 }
 
 /// The candidate at each of its starting points, every combination of searched values.
@@ -79,7 +75,7 @@ pub fn starts(candidate: &FittedEffect) -> Vec<FittedEffect> {
 
 /// The starting point of a candidate with the largest predicted decrease beside a model, on a sample of the windows.
 pub fn best_start(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     fitted: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<FittedEffect> {
@@ -87,18 +83,18 @@ pub fn best_start(
     if starts.len() < 2 {
         return starts.pop();
     }
-    let locals = study.sample.locals(&fitted.fit.locals);
+    let locals = problem.sample.locals(&fitted.fit.locals);
     match has_switch(candidate) {
-        true => best_by_switches(study, fitted, &starts, &locals),
-        false => best_by_cost(study, fitted, starts, &locals),
+        true => best_by_switches(problem, fitted, &starts, &locals),
+        false => best_by_cost(problem, fitted, starts, &locals),
     }
 }
 
 /// The predicted cost of all windows of a candidate at its values beside a model.
-pub fn promise(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<f64> {
+pub fn promise(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<f64> {
     promised(
-        study,
-        &study.shooting,
+        problem,
+        &problem.shooting,
         fitted,
         candidate,
         &fitted.fit.locals,
@@ -107,37 +103,40 @@ pub fn promise(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> 
 
 /// The same of a sample of the windows.
 pub fn promise_on_sample(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     fitted: &Fitted,
     candidate: &FittedEffect,
 ) -> Option<f64> {
-    let locals = study.sample.locals(&fitted.fit.locals);
-    let shooting = &study.sample.shooting;
-    promised(study, shooting, fitted, candidate, &locals)
+    let locals = problem.sample.locals(&fitted.fit.locals);
+    let shooting = &problem.sample.shooting;
+    promised(problem, shooting, fitted, candidate, &locals)
 }
 
 /// The cost of some windows that one Gauss-Newton step predicts for a candidate.
 fn promised(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     shooting: &Shooting<'_>,
     fitted: &Fitted,
     start: &FittedEffect,
     locals: &[Vec<f64>],
 ) -> Option<f64> {
-    let dynamics = study.extended(fitted, std::slice::from_ref(start));
-    let (active, scale) = (study.active(&dynamics), fitted.fit.scale);
+    let dynamics = problem.extended(fitted, std::slice::from_ref(start));
+    let (active, scale) = (problem.active(&dynamics), fitted.fit.scale);
     predicted_cost(shooting, &dynamics, &active, locals, scale)
 }
 
 /// The model that a candidate joins: without the simpler effects that it contains, unless the file declares
 /// them. `None` if the model has an effect that contains the candidate.
-pub fn beside(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
+pub fn beside(problem: &Problem<'_>, fitted: &Fitted, candidate: &FittedEffect) -> Option<Fitted> {
     let mut present = fitted.model.effects.iter();
     if present.any(|present| present.contains(candidate)) {
         return None;
     }
     let mut beside = fitted.clone();
-    let mut added = beside.model.effects.split_off(study.declared.effects.len());
+    let mut added = beside
+        .model
+        .effects
+        .split_off(problem.declared.effects.len());
     added.retain(|present| !candidate.contains(present));
     beside.model.effects.extend(added);
     Some(beside)
@@ -145,13 +144,13 @@ pub fn beside(study: &Study<'_>, fitted: &Fitted, candidate: &FittedEffect) -> O
 
 /// The starting point that promises the lowest cost on the sample of windows, each compared by a linearisation of its own.
 fn best_by_cost(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     fitted: &Fitted,
     starts: Vec<FittedEffect>,
     locals: &[Vec<f64>],
 ) -> Option<FittedEffect> {
     let promised = |start: FittedEffect| {
-        let cost = promised(study, &study.sample.shooting, fitted, &start, locals)?;
+        let cost = promised(problem, &problem.sample.shooting, fitted, &start, locals)?;
         Some((start, cost))
     };
     let promised: Vec<(FittedEffect, f64)> = starts.into_par_iter().filter_map(promised).collect();
@@ -162,7 +161,7 @@ fn best_by_cost(
 /// The same for a candidate that is absent at every starting point, compared by one linearisation of all of them: only
 /// the parameters that switch the effect on change anything there.
 fn best_by_switches(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     fitted: &Fitted,
     starts: &[FittedEffect],
     locals: &[Vec<f64>],
@@ -174,16 +173,16 @@ fn best_by_switches(
     });
     let numbered: Vec<FittedEffect> = numbered.collect();
     let model = fitted.model.with_effects(fitted.effects_and(&numbered));
-    let dynamics = study.compiled(&model);
+    let dynamics = problem.compiled(&model);
     let first = fitted.model.effects.len();
     let places: Vec<Range<usize>> = (first..model.effects.len())
         .map(|k| model.place_of(k))
         .collect();
     let parameters = &starts[0].effect.parameters;
     let is_switch = |k: &usize| parameters[(k - places[0].start) % parameters.len()].is_switch();
-    let mut active = study.active(&dynamics);
+    let mut active = problem.active(&dynamics);
     active.retain(|k| *k < places[0].start || is_switch(k));
-    let shooting = &study.sample.shooting;
+    let shooting = &problem.sample.shooting;
     let scale = fitted.fit.scale;
     let fit = as_it_stands(shooting, &dynamics, &active, locals.to_vec(), scale).ok()?;
     let all = fit.equations_and_prior();

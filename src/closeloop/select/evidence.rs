@@ -3,7 +3,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, Normal};
 
 use super::trial::differences;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::identify::{squared_distance, uncertainty};
 
 /// Fall of the loss as a share of what it was.
@@ -13,7 +13,7 @@ pub fn gain(before: &[f64], after: &[f64]) -> f64 {
 
 /// Probability, by the cluster-robust Wald test, of the fitted values of the k-th effect if it were absent.
 /// `None` for an effect that no value of a parameter switches off.
-pub fn p_value(study: &Study<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
+pub fn p_value(problem: &Problem<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
     let effect = &fitted.model.effects[k].effect;
     let range = fitted.model.place_of(k);
     let is_switch = |parameter: usize| {
@@ -26,7 +26,7 @@ pub fn p_value(study: &Study<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
     if switches.is_empty() {
         return None;
     }
-    let uncertainty = uncertainty(&study.shooting, &fitted.fit);
+    let uncertainty = uncertainty(&problem.shooting, &fitted.fit);
     let covariance = uncertainty
         .covariance
         .select_rows(&switches)
@@ -34,7 +34,7 @@ pub fn p_value(study: &Study<'_>, fitted: &Fitted, k: usize) -> Option<f64> {
     let values = DVector::from_iterator(
         switches.len(),
         switches.iter().map(|&i| {
-            let log = columns[i].log.map(|log| &study.logs[log]);
+            let log = columns[i].log.map(|log| &problem.logs[log]);
             fitted.model.value_of(columns[i].parameter, log)
         }),
     );

@@ -1,24 +1,24 @@
 use super::candidate::{acting, best_start, promise};
-use super::trial::identity;
+use super::identity::EffectId;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::model::{Effect, FittedEffect};
 
 /// A set of effects in which one of a model's is replaced by another.
 pub(super) struct Exchange {
     pub set: Vec<FittedEffect>,
     /// Of the effect that is replaced, and of the one in its place.
-    pub labels: [String; 2],
+    pub pair: [EffectId; 2],
 }
 
 /// Sets of effects in which one of a model's is replaced by another that it is easily confused with, on the same joint.
 /// Seen from the model itself, such a pair promises little: each does most of what the other does. An effect with a whole
 /// number, found where the rest of the set was another, is also exchanged for itself with another number: the one that
 /// promises most, and those next to its own.
-pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) -> Vec<Exchange> {
-    let declared = study.declared.effects.len();
+pub(super) fn exchanges(problem: &Problem<'_>, fitted: &Fitted) -> Vec<Exchange> {
+    let declared = problem.declared.effects.len();
     let mut sets = Vec::new();
-    for k in study.added(&fitted.model) {
+    for k in problem.added(&fitted.model) {
         let mut rest = fitted.clone();
         let old = rest.model.effects.remove(k);
         let is_like = |new: &&Effect| {
@@ -28,21 +28,21 @@ pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) 
                 || names(new, &old.effect)
                 || is_counted && new.name == old.effect.name
         };
-        let like: Vec<Effect> = library.iter().filter(is_like).cloned().collect();
-        for new in acting(study, &like) {
+        let like: Vec<Effect> = problem.effects().iter().filter(is_like).cloned().collect();
+        for new in acting(problem, &like) {
             let present = &rest.model.effects;
             let is_free = !present.iter().any(|p| p.excludes(&new) || p.contains(&new));
             if new.joint != old.joint || !is_free {
                 continue;
             }
-            let mut starts = Vec::from_iter(in_place_of(study, &rest, &old, &new));
+            let mut starts = Vec::from_iter(in_place_of(problem, &rest, &old, &new));
             if new.effect.name == old.effect.name {
-                starts.extend(with_numbers_beside(study, &rest, &old));
+                starts.extend(with_numbers_beside(problem, &rest, &old));
             }
             sets.extend(starts.into_iter().map(|start| {
-                let labels = [identity(&old), identity(&start)];
+                let pair = [problem.id(&old), problem.id(&start)];
                 let set = [&present[declared..], &[start]].concat();
-                Exchange { set, labels }
+                Exchange { set, pair }
             }));
         }
     }
@@ -52,14 +52,14 @@ pub(super) fn exchanges(study: &Study<'_>, library: &[Effect], fitted: &Fitted) 
 /// The effect that takes the place of another: at the start that promises most or, where that promises more, at the value
 /// of the old one. What replaces a strong effect is far from absent.
 fn in_place_of(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     rest: &Fitted,
     old: &FittedEffect,
     new: &FittedEffect,
 ) -> Option<FittedEffect> {
-    let absent = best_start(study, rest, new)?;
+    let absent = best_start(problem, rest, new)?;
     let promises_more = |carried: &FittedEffect| {
-        let [carried, absent] = [carried, &absent].map(|start| promise(study, rest, start));
+        let [carried, absent] = [carried, &absent].map(|start| promise(problem, rest, start));
         carried.is_some_and(|carried| absent.is_none_or(|absent| carried < absent))
     };
     let carried = carried_over(old, &absent).filter(promises_more);
@@ -67,7 +67,11 @@ fn in_place_of(
 }
 
 /// An effect with the whole numbers next to its own among those that are searched.
-fn with_numbers_beside(study: &Study<'_>, rest: &Fitted, old: &FittedEffect) -> Vec<FittedEffect> {
+fn with_numbers_beside(
+    problem: &Problem<'_>,
+    rest: &Fitted,
+    old: &FittedEffect,
+) -> Vec<FittedEffect> {
     let mut starts = Vec::new();
     for (k, parameter) in old.effect.parameters.iter().enumerate() {
         if !parameter.whole {
@@ -80,10 +84,12 @@ fn with_numbers_beside(study: &Study<'_>, rest: &Fitted, old: &FittedEffect) -> 
         for number in below.into_iter().chain(above) {
             let mut single = old.clone();
             single.effect.parameters[k].starts = vec![number];
-            starts.extend(best_start(study, rest, &single).map(|start| FittedEffect {
-                effect: old.effect.clone(),
-                ..start
-            }));
+            starts.extend(
+                best_start(problem, rest, &single).map(|start| FittedEffect {
+                    effect: old.effect.clone(),
+                    ..start
+                }),
+            );
         }
     }
     starts

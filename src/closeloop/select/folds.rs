@@ -1,19 +1,21 @@
 use nalgebra::{DMatrix, DVector};
 
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::identify::{Fit, WindowTerms, blocks, with_unit_diagonal};
 
-/// The windows of a study in stretches that losses are given for, and in groups that are left out of a fit together.
+/// The windows of a problem in stretches that losses are given for, and in groups that are left out of a fit together.
 pub struct Folds {
     /// The stretch of each window.
     pub stretches: Vec<usize>,
     /// The group of each stretch: its log or, where there are few logs, a part of it.
     pub groups: Vec<usize>,
+    /// What is known of each value without its group, as a share of the information of all.
+    kept_information: f64,
 }
 
 impl Folds {
-    pub fn of(study: &Study<'_>) -> Self {
-        let shooting = &study.shooting;
+    pub fn of(problem: &Problem<'_>) -> Self {
+        let shooting = &problem.shooting;
         let stretches = blocks(shooting);
         let count = stretches.last().map_or(0, |last| last + 1);
         let mut log_of = vec![0; count];
@@ -21,7 +23,7 @@ impl Folds {
             log_of[stretch] = window.log;
         }
         let logs = shooting.logs.len();
-        let parts = study.settings.select.fewest_groups.div_ceil(logs);
+        let parts = problem.settings.select.fewest_groups.div_ceil(logs);
         // What is left out together is connected: a model is to hold for motion that it was not fitted to.
         let group = |(stretch, &log): (usize, &usize)| {
             let first = log_of.partition_point(|of| *of < log);
@@ -29,7 +31,11 @@ impl Folds {
             log * parts + (stretch - first) * parts / own
         };
         let groups = log_of.iter().enumerate().map(group).collect();
-        Self { stretches, groups }
+        Self {
+            stretches,
+            groups,
+            kept_information: problem.settings.select.kept_information,
+        }
     }
 
     /// The same stretches, each left out alone.
@@ -63,12 +69,12 @@ impl Folds {
     }
 }
 
-/// The loss on each stretch of a study's windows, with the parameters that a fit without the stretch's group would give.
+/// The loss on each stretch of a problem's windows, with the parameters that a fit without the stretch's group would give.
 /// The fit is not repeated: each window's loss is taken as quadratic around the joint optimum, where leaving out a group
 /// moves the parameters by (H - `H_k`)^-1 `g_k`. A log that is left out whole keeps the values that it has of its own, since
 /// no other log determines them.
-pub fn left_out_losses(study: &Study<'_>, fit: &Fit) -> Vec<f64> {
-    losses_by(&Folds::of(study), fit)
+pub fn left_out_losses(problem: &Problem<'_>, fit: &Fit) -> Vec<f64> {
+    losses_by(&Folds::of(problem), fit)
 }
 
 /// The same with given folds.
@@ -104,7 +110,7 @@ pub fn steps_without(folds: &Folds, fit: &Fit) -> Vec<DVector<f64>> {
     let step = |part: &WindowTerms| {
         // At a bound the gradients do not sum to zero; what the bound carries must not move the rest.
         let own = &part.gradient - &all.gradient * share(&part.hessian, &all.hessian);
-        step_without(&all.hessian, &part.hessian, &own)
+        step_without(&all.hessian, &part.hessian, &own, folds.kept_information)
     };
     groups.iter().map(step).collect()
 }
@@ -115,17 +121,22 @@ fn share(part: &DMatrix<f64>, all: &DMatrix<f64>) -> f64 {
 }
 
 /// The step of the free values when a part of the windows, with this gradient where they stand, is left out of a fit.
-/// Directions that little else determines hardly move.
+/// Directions of which little more than `kept_information` is known otherwise, as a share of all, hardly move.
 pub fn step_without(
     all: &DMatrix<f64>,
     part: &DMatrix<f64>,
     gradient: &DVector<f64>,
+    kept_information: f64,
 ) -> DVector<f64> {
     // Relative units, so that a parameter in N m s/rad weighs as much as one in 1/s^2.
     let (_, unit) = with_unit_diagonal(all);
     let rest = DMatrix::from_fn(unit.len(), unit.len(), |i, j| {
         let known = (all[(i, j)] - part[(i, j)]) * unit[i] * unit[j];
-        if i == j { known + KNOWN } else { known }
+        if i == j {
+            known + kept_information
+        } else {
+            known
+        }
     });
     match rest.cholesky() {
         Some(factor) => factor
@@ -134,7 +145,3 @@ pub fn step_without(
         None => DVector::zeros(unit.len()),
     }
 }
-
-/// What is known of each value without the windows that are left out, as a share of the information of all: what they
-/// alone determine stays where it is.
-const KNOWN: f64 = 1e-2;

@@ -3,8 +3,8 @@ use rayon::prelude::*;
 
 use super::folds::{Folds, losses_by, steps_without};
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::space::Space;
-use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::identify::{Values, Window, huber};
 use crate::model::FittedEffect;
@@ -19,17 +19,17 @@ pub struct Losses {
 }
 
 impl Losses {
-    /// On stretches that are left out in the study's folds.
-    pub fn of(study: &Study<'_>, fitted: &Fitted) -> Self {
-        Self::by(study, &Folds::of(study), fitted)
+    /// On stretches that are left out in the problem's folds.
+    pub fn of(problem: &Problem<'_>, fitted: &Fitted) -> Self {
+        Self::by(problem, &Folds::of(problem), fitted)
     }
 
     /// The same with given folds.
-    pub fn by(study: &Study<'_>, folds: &Folds, fitted: &Fitted) -> Self {
-        let parts = study.parts();
-        let values = match study.space {
+    pub fn by(problem: &Problem<'_>, folds: &Folds, fitted: &Fitted) -> Self {
+        let parts = problem.parts();
+        let values = match problem.space {
             Space::Motion => losses_by(folds, &fitted.fit),
-            Space::Torque => of_torques(study, folds, fitted, |r| huber(r / fitted.fit.scale)),
+            Space::Torque => of_torques(problem, folds, fitted, |r| huber(r / fitted.fit.scale)),
         };
         Self { parts, values }
     }
@@ -62,20 +62,20 @@ impl Losses {
 /// A loss of the residuals of torques, summed over each stretch and joint, `[stretch * joints + joint]`, with the values that
 /// the linearised fit without the stretch's group gives.
 pub fn of_torques(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     folds: &Folds,
     fitted: &Fitted,
     loss: impl Fn(f64) -> f64 + Sync,
 ) -> Vec<f64> {
-    let (fit, joints) = (&fitted.fit, study.declared.joints);
-    let dynamics = study.compiled(&fitted.model);
-    let values = Values::of(&dynamics, study.logs);
+    let (fit, joints) = (&fitted.fit, problem.declared.joints);
+    let dynamics = problem.compiled(&fitted.model);
+    let values = Values::of(&dynamics, problem.logs);
     let of_group = |(group, step): (usize, &DVector<f64>)| {
         let values = values.moved(&dynamics, &fit.columns, step);
-        let all = study.shooting.windows.iter().zip(&folds.stretches);
+        let all = problem.shooting.windows.iter().zip(&folds.stretches);
         let own = all.filter(|(_, stretch)| folds.groups[**stretch] == group);
         let (windows, stretches): (Vec<Window>, Vec<usize>) = own.unzip();
-        let shooting = study.shooting.over(windows);
+        let shooting = problem.shooting.over(windows);
         let residuals = shooting.residuals(&dynamics, &values, &shooting.initial_locals(0));
         let of_window = |(residuals, stretch): (Vec<f64>, usize)| {
             let sum = |j: usize| {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::candidate::{beside, best_start, has_switch, promise_on_sample};
 use super::folds::{Folds, predicted, step_without};
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 use crate::identify::{Column, Fit, WindowTerms, as_it_stands, with_unit_diagonal};
 use crate::model::{Dynamics, EffectParameter, FittedEffect};
 
@@ -32,6 +32,9 @@ pub struct Outlook {
     all: WindowTerms,
     /// What the logs alone tell.
     information: DMatrix<f64>,
+    /// Of the settings.
+    own_information: f64,
+    kept_information: f64,
 }
 
 /// A set of items, in rising order.
@@ -47,12 +50,12 @@ struct Minimum {
 
 impl Outlook {
     /// The loss of `fitted` and of all candidates beside it; `None` where the model diverges.
-    pub fn of(study: &Study<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
+    pub fn of(problem: &Problem<'_>, fitted: &Fitted, candidates: &[FittedEffect]) -> Option<Self> {
         let options: Vec<FittedEffect> = candidates
             .par_iter()
             .filter(|candidate| has_switch(candidate))
             .filter_map(|candidate| {
-                let beside = beside(study, fitted, candidate)?;
+                let beside = beside(problem, fitted, candidate)?;
                 if candidate
                     .effect
                     .parameters
@@ -61,15 +64,15 @@ impl Outlook {
                 {
                     return Some(candidate.clone());
                 }
-                best_start(study, &beside, candidate)
+                best_start(problem, &beside, candidate)
             })
             .collect();
-        let options = together(study, fitted, options);
+        let options = together(problem, fitted, options);
         let model = fitted.model.with_effects(fitted.effects_and(&options));
-        let dynamics = study.compiled(&model);
-        let added = study.declared.effects.len()..model.effects.len();
+        let dynamics = problem.compiled(&model);
+        let added = problem.declared.effects.len()..model.effects.len();
         let places: Vec<Range<usize>> = added.clone().map(|k| model.place_of(k)).collect();
-        let present = study.added(&fitted.model).len();
+        let present = problem.added(&fitted.model).len();
         // Beside an absent effect the values that give it its shape change nothing.
         let shapes = |k: &usize| {
             let item = places.iter().position(|place| place.contains(k));
@@ -78,25 +81,25 @@ impl Outlook {
                 item >= present && !parameters[k - places[item].start].is_switch()
             })
         };
-        let mut active = study.active(&dynamics);
+        let mut active = problem.active(&dynamics);
         active.retain(|k| !shapes(k));
         let (locals, scale) = (fitted.fit.locals.clone(), fitted.fit.scale);
-        let fit = as_it_stands(&study.shooting, &dynamics, &active, locals, scale).ok()?;
+        let fit = as_it_stands(&problem.shooting, &dynamics, &active, locals, scale).ok()?;
         let items = model.effects[added].to_vec();
         Some(Self::from_fit(
-            study, &dynamics, &fit, items, &places, present,
+            problem, &dynamics, &fit, items, &places, present,
         ))
     }
 
     fn from_fit(
-        study: &Study<'_>,
+        problem: &Problem<'_>,
         dynamics: &Dynamics,
         fit: &Fit,
         items: Vec<FittedEffect>,
         places: &[Range<usize>],
         present: usize,
     ) -> Self {
-        let values = crate::identify::Values::of(dynamics, study.logs);
+        let values = crate::identify::Values::of(dynamics, problem.logs);
         let of_item = |place: &Range<usize>| -> Vec<usize> {
             let columns = fit.columns.iter().enumerate();
             let own = columns.filter(|(_, column)| place.contains(&column.parameter));
@@ -117,10 +120,10 @@ impl Outlook {
             });
             if is_switch { -values.get(*column) } else { 0.0 }
         };
-        let folds = Folds::of(study);
+        let folds = Folds::of(problem);
         let (stretches, groups) = folds.equations(fit);
         let base: Vec<usize> = (0..fit.columns.len()).filter(is_base).collect();
-        let told = |i: &&usize| study.is_told(fit.columns[**i].parameter);
+        let told = |i: &&usize| problem.is_told(fit.columns[**i].parameter);
         Self {
             told: base.iter().filter(told).copied().collect(),
             base,
@@ -129,6 +132,8 @@ impl Outlook {
             groups_of: folds.groups,
             all: fit.equations_and_prior(),
             information: fit.equations().hessian,
+            own_information: problem.settings.select.own_information,
+            kept_information: problem.settings.select.kept_information,
             items,
             present,
             columns_of,
@@ -157,7 +162,12 @@ impl Outlook {
         let without = |group: &WindowTerms| {
             let gradient =
                 group.gradient.select_rows(free) + sub(&group.hessian, free, &rows) * &at;
-            let step = step_without(&all, &sub(&group.hessian, free, free), &gradient);
+            let step = step_without(
+                &all,
+                &sub(&group.hessian, free, free),
+                &gradient,
+                self.kept_information,
+            );
             let mut there = at.clone();
             there.rows_mut(0, free.len()).add_assign(&step);
             there
@@ -195,7 +205,8 @@ impl Outlook {
         }
         let mut minimum = Minimum { free, held, moved };
         let told = [&self.told, &minimum.free[self.base.len()..]].concat();
-        if !tells_apart(&sub(&self.information, &told, &told), self.told.len()) {
+        let information = sub(&self.information, &told, &told);
+        if !tells_apart(&information, self.told.len(), self.own_information) {
             return None;
         }
         loop {
@@ -235,15 +246,19 @@ impl Outlook {
 }
 
 /// The candidates that are compared at once: all or, of more than there is memory for, those that promise most alone.
-fn together(study: &Study<'_>, fitted: &Fitted, options: Vec<FittedEffect>) -> Vec<FittedEffect> {
+fn together(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    options: Vec<FittedEffect>,
+) -> Vec<FittedEffect> {
     // Each window's as they come and without its own values, and those of stretches.
-    let equations = 3 * study.shooting.windows.len().max(1);
+    let equations = 3 * problem.shooting.windows.len().max(1);
     #[allow(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss
     )] // at most the root of 2^28
-    let values = (NUMBERS as f64 / equations as f64).sqrt() as usize;
+    let values = (problem.settings.select.most_numbers as f64 / equations as f64).sqrt() as usize;
     let room = values.saturating_sub(fitted.fit.columns.len());
     let switches = |option: &FittedEffect| {
         let parameters = option.effect.parameters.iter();
@@ -254,7 +269,7 @@ fn together(study: &Study<'_>, fitted: &Fitted, options: Vec<FittedEffect>) -> V
     }
     let promises = options.par_iter().enumerate();
     let promises =
-        promises.filter_map(|(k, option)| Some((promise_on_sample(study, fitted, option)?, k)));
+        promises.filter_map(|(k, option)| Some((promise_on_sample(problem, fitted, option)?, k)));
     let mut promises: Vec<(f64, usize)> = promises.collect();
     promises.sort_by(|a, b| a.0.total_cmp(&b.0));
     let fits = promises.iter().scan(0, |sum, (_, k)| {
@@ -267,8 +282,8 @@ fn together(study: &Study<'_>, fitted: &Fitted, options: Vec<FittedEffect>) -> V
 }
 
 /// Whether the logs tell the values after the first `base` ones from each other and from those: the information of each
-/// that is left when those before it are free.
-pub fn tells_apart(matrix: &DMatrix<f64>, base: usize) -> bool {
+/// that is left when those before it are free, as a share of its own, is at least so much.
+pub fn tells_apart(matrix: &DMatrix<f64>, base: usize, least: f64) -> bool {
     let (mut scaled, _) = with_unit_diagonal(matrix);
     for i in 0..scaled.nrows() {
         scaled[(i, i)] += RIDGE;
@@ -277,9 +292,7 @@ pub fn tells_apart(matrix: &DMatrix<f64>, base: usize) -> bool {
         return false;
     };
     let own = factor.l_dirty().diagonal();
-    own.iter()
-        .skip(base)
-        .all(|own| own.powi(2) > OWN_INFORMATION)
+    own.iter().skip(base).all(|own| own.powi(2) > least)
 }
 
 fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
@@ -288,12 +301,8 @@ fn sub(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64>
     })
 }
 
-/// Numbers in the normal equations of all windows and candidates at most: 2 GB.
-const NUMBERS: usize = 1 << 28;
 /// Smallest information of a direction, in units in which each value alone has 1: items that say the same share it.
 const RIDGE: f64 = 1e-9;
-/// An effect of which less than this share of the information is its own is not told from the rest of the model.
-const OWN_INFORMATION: f64 = 1e-4;
 
 fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let (mut scaled, unit) = with_unit_diagonal(matrix);

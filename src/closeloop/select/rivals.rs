@@ -3,11 +3,10 @@ use rayon::prelude::*;
 use super::candidate::candidates;
 use super::evidence::gain;
 use super::outlook::Outlook;
-use super::search::Search;
 use super::trial::{Trial, differences};
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
-use crate::closeloop::study::Study;
 use crate::data::statistics::{mean, standard_error};
 use crate::identify::FitError;
 use crate::model::FittedEffect;
@@ -30,44 +29,38 @@ impl Rival {
     }
 }
 
-impl Search<'_, '_> {
-    /// Effects that explain the logs as well as one of the chosen ones does, beside the others; `without` gives the model
-    /// refitted without each of them, `of` which of them are asked for.
-    pub fn rivals(
-        &self,
-        chosen: &Trial,
-        without: &[Result<Trial, FitError>],
-        of: &[bool],
-    ) -> Vec<Rival> {
-        let study = self.study;
-        if !study.has_time() {
-            return Vec::new();
-        }
-        let added = study.added(&chosen.fitted.model);
-        let all = candidates(study, self.library, &chosen.fitted.model.effects);
-        let Some(outlook) = Outlook::of(study, &chosen.fitted, &all) else {
-            return Vec::new();
-        };
-        let of_effect = |(k, less): (usize, &Result<Trial, FitError>)| {
-            let less = less.as_ref().ok().filter(|_| of[k])?;
-            Some(instead_of(study, chosen, less, &outlook, k))
-        };
-        let places = (0..added.len()).into_par_iter();
-        let rivals: Vec<Vec<Rival>> = places.zip(without).filter_map(of_effect).collect();
-        rivals.concat()
-    }
+/// Effects that explain the logs as well as one of the chosen ones does, beside the others; `without` gives the model
+/// refitted without each of them, `of` which of them are asked for.
+pub fn rivals(
+    problem: &Problem<'_>,
+    chosen: &Trial,
+    without: &[Result<Trial, FitError>],
+    of: &[bool],
+) -> Vec<Rival> {
+    let added = problem.added(&chosen.fitted.model);
+    let all = candidates(problem, &chosen.fitted.model.effects);
+    let Some(outlook) = Outlook::of(problem, &chosen.fitted, &all) else {
+        return Vec::new();
+    };
+    let of_effect = |(k, less): (usize, &Result<Trial, FitError>)| {
+        let less = less.as_ref().ok().filter(|_| of[k])?;
+        Some(instead_of(problem, chosen, less, &outlook, k))
+    };
+    let places = (0..added.len()).into_par_iter();
+    let rivals: Vec<Vec<Rival>> = places.zip(without).filter_map(of_effect).collect();
+    rivals.concat()
 }
 
 /// Effects that do as well as the k-th of those that were added, which `less` is without.
 fn instead_of(
-    study: &Study<'_>,
+    problem: &Problem<'_>,
     chosen: &Trial,
     less: &Trial,
     outlook: &Outlook,
     k: usize,
 ) -> Vec<Rival> {
-    let settings = &study.settings.select;
-    let declared = study.declared.effects.len();
+    let settings = &problem.settings.select;
+    let declared = problem.declared.effects.len();
     let present = &chosen.fitted.model.effects[declared + k];
     let others: Vec<usize> = outlook.present().into_iter().filter(|i| *i != k).collect();
     let mut options: Vec<(f64, &FittedEffect)> = (outlook.present().len()..outlook.items.len())
@@ -77,18 +70,20 @@ fn instead_of(
         })
         .collect();
     options.sort_by(|a, b| a.0.total_cmp(&b.0));
-    options.retain(|(loss, _)| *loss <= settings.slack * settings.as_little * chosen.loss());
-    options.truncate(settings.rivals);
+    options.retain(|(loss, _)| {
+        *loss <= settings.prediction_slack * settings.rival_loss * chosen.loss()
+    });
+    options.truncate(settings.rivals_per_effect);
     let own = |trial: &Trial| trial.losses.of_effect(present);
     let gain = |trial: &Trial| gain(&own(less), &own(trial));
     let rival = |(_, effect): &(f64, &FittedEffect)| {
         let mut effects = chosen.fitted.model.effects.clone();
         effects[declared + k] = (*effect).clone();
-        let below = settings.as_little * chosen.loss();
-        let fitted = study.with_better_effects(&chosen.fitted, effects, below)?;
-        let trial = Trial::of(study, fitted);
+        let below = settings.rival_loss * chosen.loss();
+        let fitted = problem.with_better_effects(&chosen.fitted, effects, below)?;
+        let trial = Trial::of(problem, fitted);
         let is_as_good = is_as_good([&trial, chosen, less], present, settings);
-        let as_good = trial.is_valid(study) && is_as_good;
+        let as_good = trial.is_valid(problem) && is_as_good;
         as_good.then(|| Rival {
             effect: trial.fitted.model.effects[declared + k].clone(),
             instead_of: present.clone(),
@@ -111,7 +106,7 @@ fn is_as_good(
     let sum = |losses: &[f64]| losses.iter().sum::<f64>();
     let differences = differences(&trial, &chosen);
     let saved = |losses: &[f64]| sum(&less) - sum(losses);
-    mean(&differences) <= settings.as_good * standard_error(&differences)
-        && saved(&trial) > settings.as_much * saved(&chosen)
-        && sum(&trial) <= settings.as_little * sum(&chosen)
+    mean(&differences) <= settings.rival_standard_errors * standard_error(&differences)
+        && saved(&trial) > settings.rival_saving * saved(&chosen)
+        && sum(&trial) <= settings.rival_loss * sum(&chosen)
 }

@@ -1,22 +1,24 @@
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use super::ahead::Ahead;
 use super::blocks::blocks;
-use super::candidate::{beside, best_start, candidates, has_switch};
+use super::candidate::candidates;
 use super::exchange::{Exchange, exchanges};
+use super::identity::EffectId;
 use super::outlook::Outlook;
-use super::sets::{descent, promising};
+use super::screen::screen;
+use super::sets::descent;
 use super::simpler::{mended, simpler};
-use super::trial::{Trial, key};
+use super::trial::Trial;
+use crate::closeloop::fit::Declared;
 use crate::closeloop::fitted::Fitted;
-use crate::closeloop::stage::{Fits, Observer, Progress, Stage};
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
+use crate::closeloop::stage::{Fits, Progress, Stage, Watch};
 use crate::identify::FitError;
-use crate::model::{Effect, FittedEffect};
+use crate::model::FittedEffect;
 
 /// One round of the search: the sets of effects that were fitted, best first.
 #[derive(Debug, Clone)]
@@ -37,15 +39,14 @@ pub struct Tried {
 }
 
 /// A search for the set of effects that a model lacks, with the rounds so far.
-pub struct Search<'a, 'p> {
-    pub study: &'a Study<'a>,
-    pub library: &'a [Effect],
-    pub rounds: Vec<Round>,
-    /// Exchanges that made the set worse since a round changed it, by the labels of the old and the new effect.
-    vain: HashSet<[String; 2]>,
+struct Search<'a> {
+    problem: &'a Problem<'a>,
+    watch: &'a dyn Watch,
+    rounds: Vec<Round>,
+    /// Exchanges that made the set worse since a round changed it: the old and the new effect.
+    vain: HashSet<[EffectId; 2]>,
     /// What is being done, as it was told last.
     doing: String,
-    progress: Mutex<&'p mut Observer<'p>>,
 }
 
 /// A set that is better than what its round began with, and its rank among the sets of the round.
@@ -55,63 +56,80 @@ struct Better {
     trial: Trial,
 }
 
-impl<'a, 'p> Search<'a, 'p> {
-    /// `progress` receives what is being tried.
-    pub fn new(
-        study: &'a Study<'a>,
-        library: &'a [Effect],
-        progress: &'p mut Observer<'p>,
-    ) -> Self {
+/// The set of effects that a search ended with.
+pub struct Selected {
+    /// The model with them, or why it could not be fitted.
+    pub(in crate::closeloop) chosen: Result<Trial, FitError>,
+    pub rounds: Vec<Round>,
+    /// Whether the search was stopped where it stood.
+    pub stopped: bool,
+}
+
+/// The simplest of the sets of effects that lower the loss on left-out stretches most, beside the declared model as it was fitted.
+pub fn select(problem: &Problem<'_>, declared: &Fitted, watch: &dyn Watch) -> Selected {
+    let mut search = Search::new(problem, watch);
+    let chosen = search.select(declared.clone());
+    search.end(chosen)
+}
+
+/// The same, where the search begins over short windows, from a fit of the declared model there.
+pub fn select_from(problem: &Problem<'_>, short: &Declared<'_>, watch: &dyn Watch) -> Selected {
+    let mut search = Search::new(problem, watch);
+    let chosen = search.select_from(short);
+    search.end(chosen)
+}
+
+impl<'a> Search<'a> {
+    fn new(problem: &'a Problem<'a>, watch: &'a dyn Watch) -> Self {
         Self {
-            study,
-            library,
+            problem,
+            watch,
             rounds: Vec::new(),
             vain: HashSet::new(),
             doing: Stage::Select.text().into(),
-            progress: Mutex::new(progress),
         }
     }
 
-    /// The simplest of the sets of effects that lower the loss on left-out stretches most.
-    ///
+    fn end(self, chosen: Result<Trial, FitError>) -> Selected {
+        Selected {
+            chosen,
+            rounds: self.rounds,
+            stopped: self.watch.has_to_end(),
+        }
+    }
+
     /// # Errors
     /// A selected model that cannot be fitted again.
-    pub fn select(&mut self, declared: Fitted) -> Result<Trial, FitError> {
-        let study = self.study;
-        let declared = Trial::of(study, declared);
+    fn select(&mut self, declared: Fitted) -> Result<Trial, FitError> {
+        let problem = self.problem;
+        let declared = Trial::of(problem, declared);
         let first = self.first(declared.clone());
         let best = self.rounds_from(first)?;
         let simplest = self.simplest(&best)?;
-        let is_declared = study.added(&simplest.fitted.model).is_empty();
+        let is_declared = problem.added(&simplest.fitted.model).is_empty();
         Ok(if is_declared { declared } else { simplest })
     }
 
-    /// As [`Search::select`], where the search begins over short windows, with a fit of the declared model there.
-    ///
     /// # Errors
-    /// A model found there that cannot be fitted over longer windows, or a selected one that cannot be fitted again.
-    pub fn select_from(&mut self, short: &Study<'_>, declared: Fitted) -> Result<Trial, FitError> {
-        let study = self.study;
-        let progress = self
-            .progress
-            .get_mut()
-            .unwrap_or_else(PoisonError::into_inner);
-        let mut search = Search::new(short, self.library, progress);
-        let first = search.first(Trial::of(short, declared));
+    /// A model found over short windows that cannot be fitted over longer ones, or a selected one that cannot be fitted again.
+    fn select_from(&mut self, short: &Declared<'_>) -> Result<Trial, FitError> {
+        let problem = self.problem;
+        let mut search = Search::new(&short.problem, self.watch);
+        let first = search.first(Trial::of(&short.problem, short.fitted.clone()));
         let best = search.rounds_from(first)?;
         self.rounds = search.rounds;
-        let locals = study.shooting.initial_locals(0);
-        let fitted = study.refit(&best.fitted.model, locals, None)?;
-        let best = self.rounds_from(Trial::of(study, fitted))?;
+        let locals = problem.shooting.initial_locals(0);
+        let fitted = problem.refit(&best.fitted.model, locals, None)?;
+        let best = self.rounds_from(Trial::of(problem, fitted))?;
         self.simplest(&best)
     }
 
     /// Add effects and exchange them, round by round, as long as each is better than the last.
     fn rounds_from(&mut self, mut best: Trial) -> Result<Trial, FitError> {
-        let study = self.study;
+        let problem = self.problem;
         let mut passed = vec![best.key()];
-        for _ in 0..study.settings.select.rounds {
-            if !study.has_time() {
+        for _ in 0..problem.settings.select.most_rounds {
+            if self.watch.has_to_end() {
                 break;
             }
             let Some(next) = self.next(&best) else {
@@ -129,15 +147,16 @@ impl<'a, 'p> Search<'a, 'p> {
     /// The best set with effects added or, where that is not a large gain, with one exchanged: what is missing beside a
     /// wrong effect may be little more than that effect's error.
     fn next(&mut self, best: &Trial) -> Option<Trial> {
-        let settings = &self.study.settings.select;
-        let added = self.better(best, settings.step, Self::round);
-        let is_large = |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large);
+        let settings = &self.problem.settings.select;
+        let added = self.better(best, settings.round_gain, Self::round);
+        let is_large =
+            |better: &Better| better.trial.loss() < best.loss() * (1.0 - settings.large_gain);
         if added.as_ref().is_some_and(is_large) {
             self.vain.clear();
             return added.map(|added| self.choose(added));
         }
         // An exchange adds nothing, so it goes first, and a smaller gain will do.
-        if let Some(exchanged) = self.better(best, settings.exchange, Self::exchanged) {
+        if let Some(exchanged) = self.better(best, settings.exchange_gain, Self::exchanged) {
             return Some(self.choose(exchanged));
         }
         self.vain.clear();
@@ -148,9 +167,9 @@ impl<'a, 'p> Search<'a, 'p> {
     /// loss is known at the new one. An effect whose values have moved to a bound gives way to what it contains: no set with
     /// it would be valid from then on.
     fn estimated(&self, trial: Trial) -> Result<Trial, FitError> {
-        let anew = Trial::of(self.study, self.study.estimate(&trial.fitted)?);
+        let anew = Trial::of(self.problem, self.problem.estimate(&trial.fitted)?);
         let anew = if anew.loss().is_finite() { anew } else { trial };
-        match mended_from(self.study, self.library, &anew, f64::INFINITY) {
+        match self.mended_from(&anew, f64::INFINITY) {
             Some(simpler) => self.estimated(simpler),
             None => Ok(anew),
         }
@@ -164,15 +183,15 @@ impl<'a, 'p> Search<'a, 'p> {
         share: f64,
         round: impl FnOnce(&mut Self, &Trial) -> Vec<Trial>,
     ) -> Option<Better> {
-        let enough = from.loss() * (1.0 - self.study.of_whole(share));
+        let enough = from.loss() * (1.0 - self.problem.of_whole(share));
         let trials = round(self, from);
         let better = (trials.into_iter().enumerate()).take_while(|(_, t)| t.loss() < enough);
         let mut better = better.peekable();
         better.peek()?;
-        let ahead = Ahead::of(self.study, from);
+        let ahead = Ahead::of(self.problem, from);
         let (rank, trial) = better.find(|(_, trial)| {
-            let settings = &self.study.settings.select;
-            !Ahead::of(self.study, trial).is_worse_than(&ahead, settings)
+            let settings = &self.problem.settings.select;
+            !Ahead::of(self.problem, trial).is_worse_than(&ahead, settings)
         })?;
         let round = self.rounds.len() - 1;
         Some(Better { round, rank, trial })
@@ -184,31 +203,25 @@ impl<'a, 'p> Search<'a, 'p> {
         trial
     }
 
-    /// Report progress.
-    pub fn tell(&self, progress: Progress<'_>) {
-        let mut observer = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
-        observer(progress);
-    }
-
     fn say(&mut self, text: &str) {
         text.clone_into(&mut self.doing);
-        self.tell(Progress::within(Stage::Select, text));
+        self.watch.see(Progress::within(Stage::Select, text));
     }
 
     /// Report that so many of the sets of effects are fitted.
     fn tell_fitted(&self, done: usize, of: usize) {
         let fits = Some(Fits { done, of });
         let doing = Progress::within(Stage::Select, &self.doing);
-        self.tell(Progress { fits, ..doing });
+        self.watch.see(Progress { fits, ..doing });
     }
 
     /// The declared model or, where it helps, the model with what most machines have.
     fn first(&mut self, declared: Trial) -> Trial {
-        let study = self.study;
-        let step = study.settings.select.step;
+        let problem = self.problem;
+        let step = problem.settings.select.round_gain;
         let best = self.better(&declared, step, |search, declared| {
             search.say("fitting what most machines have");
-            let blocks = blocks(study, search.library);
+            let blocks = blocks(problem);
             let fitted = search.fitted_for_the_best(declared, blocks);
             search.noted(declared, fitted, 0)
         });
@@ -221,36 +234,23 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// Fit the sets that promise most beside a model, the best first.
     fn round(&mut self, from: &Trial) -> Vec<Trial> {
-        let study = self.study;
-        let all = candidates(study, self.library, &from.fitted.model.effects);
-        self.say(&format!("screening {} effects", all.len()));
-        let mut sets = Vec::new();
-        let declared = study.declared.effects.len();
-        if let Some(outlook) = Outlook::of(study, &from.fitted, &all) {
-            let promising = promising(&outlook, study);
-            sets = promising.iter().map(|set| outlook.effects(set)).collect();
-        }
-        // What no value switches off cannot be compared without a fit.
-        sets.extend(
-            all.iter()
-                .filter(|c| !has_switch(c))
-                .filter_map(|candidate| {
-                    let beside = beside(study, &from.fitted, candidate)?;
-                    let start = best_start(study, &beside, candidate)?;
-                    let mut set = beside.model.effects[declared..].to_vec();
-                    set.push(start);
-                    Some(set)
-                }),
-        );
+        let candidates = candidates(self.problem, &from.fitted.model.effects);
+        self.say(&format!("screening {} effects", candidates.len()));
+        let sets = screen(self.problem, &from.fitted, &candidates);
         self.say(&format!("fitting {} sets of effects", sets.len()));
         let fitted = self.fitted_for_the_best(from, sets);
-        self.noted(from, fitted, all.len())
+        self.noted(from, fitted, candidates.len())
     }
 
     /// The declared model with each set of effects in place of those of a trial, the most promising first, fitted at its
     /// scale, to find the best one: those that cannot be better than the trial or the first few are left out.
     fn fitted_for_the_best(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
-        let first = self.study.settings.select.first.min(sets.len());
+        let first = self
+            .problem
+            .settings
+            .select
+            .fitted_to_the_end
+            .min(sets.len());
         let rest = sets.split_off(first);
         let mut trials = self.fitted(from, sets, from.loss());
         let below = trials.iter().map(Trial::loss).fold(from.loss(), f64::min);
@@ -262,17 +262,19 @@ impl<'a, 'p> Search<'a, 'p> {
     /// be fitted, or leave more than a loss of `below`, are left out. No loss on stretches left out is smaller than that
     /// of the fit itself. An effect whose values stand at a bound gives way to what it contains.
     fn fitted(&self, from: &Trial, mut sets: Vec<Vec<FittedEffect>>, below: f64) -> Vec<Trial> {
-        let (study, library) = (self.study, self.library);
+        let problem = self.problem;
         sets.iter_mut().for_each(without_contained);
-        let most = (study.settings.select).most_effects_of(study.declared.joints);
+        let most = (problem.settings.select).most_effects_of(problem.declared.joints);
         sets.retain(|set| set.len() <= most);
-        first_of_each(&mut sets, vec![from.added_key(study)], |set| key(set));
+        first_of_each(&mut sets, vec![from.added_key(problem)], |set| {
+            problem.key(set)
+        });
         let trial = |set: Vec<FittedEffect>| {
-            let found = fitted_from(study, from, &set, below)?;
-            if found.is_valid(study) {
+            let found = self.fitted_from(from, &set, below)?;
+            if found.is_valid(problem) {
                 return Some(found);
             }
-            mended_from(study, library, &found, below)
+            self.mended_from(&found, below)
         };
         let (of, done) = (sets.len(), AtomicUsize::new(0));
         self.tell_fitted(0, of);
@@ -288,20 +290,19 @@ impl<'a, 'p> Search<'a, 'p> {
     /// tried again.
     fn exchanged(&mut self, from: &Trial) -> Vec<Trial> {
         self.say("exchanging effects");
-        let study = self.study;
-        let mut exchanges = exchanges(study, self.library, &from.fitted);
-        exchanges.retain(|exchange| !self.vain.contains(&exchange.labels));
+        let problem = self.problem;
+        let mut exchanges = exchanges(problem, &from.fitted);
+        exchanges.retain(|exchange| !self.vain.contains(&exchange.pair));
         if exchanges.is_empty() {
             return Vec::new();
         }
         let sets = exchanges.iter().map(|exchange| exchange.set.clone());
         let fitted = self.fitted(from, sets.collect(), from.loss());
         let better = fitted.iter().filter(|trial| trial.loss() < from.loss());
-        let better: Vec<Vec<String>> = better.map(|trial| trial.added_key(study)).collect();
-        let is_vain = |exchange: &Exchange| !better.contains(&key(&exchange.set));
+        let better: Vec<Vec<EffectId>> = better.map(|trial| trial.added_key(problem)).collect();
+        let is_vain = |exchange: &Exchange| !better.contains(&problem.key(&exchange.set));
         let vain = exchanges.iter().filter(|exchange| is_vain(exchange));
-        self.vain
-            .extend(vain.map(|exchange| exchange.labels.clone()));
+        self.vain.extend(vain.map(|exchange| exchange.pair.clone()));
         self.noted(from, fitted, exchanges.len())
     }
 
@@ -310,7 +311,7 @@ impl<'a, 'p> Search<'a, 'p> {
         trials.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
         let gain = |trial: &Trial| 1.0 - trial.loss() / from.loss().max(f64::MIN_POSITIVE);
         let tried = |trial: &Trial| Tried {
-            effects: trial.added(self.study).to_vec(),
+            effects: trial.added(self.problem).to_vec(),
             gain: gain(trial),
             chosen: false,
         };
@@ -322,17 +323,21 @@ impl<'a, 'p> Search<'a, 'p> {
     /// Drop effects, or put simpler ones in their place, as long as the set explains the logs as well as the best one.
     fn simplest(&mut self, best: &Trial) -> Result<Trial, FitError> {
         self.say("simplifying");
-        let study = self.study;
-        let declared = study.declared.effects.len();
+        let problem = self.problem;
+        let declared = problem.declared.effects.len();
         let mut current = self.least(best, best);
         loop {
-            let added = study.added(&current.fitted.model);
-            let sets = simpler(self.library, &current.fitted.model.effects, added.clone());
+            let added = problem.added(&current.fitted.model);
+            let sets = simpler(
+                problem.effects(),
+                &current.fitted.model.effects,
+                added.clone(),
+            );
             let mut sets: Vec<_> = sets
                 .into_iter()
                 .map(|set| set[declared..].to_vec())
                 .collect();
-            let exchanges = exchanges(study, self.library, &current.fitted);
+            let exchanges = exchanges(problem, &current.fitted);
             sets.extend(exchanges.into_iter().map(|exchange| exchange.set));
             sets.extend(added.clone().map(|k| {
                 let mut less = current.fitted.model.effects[declared..].to_vec();
@@ -345,7 +350,9 @@ impl<'a, 'p> Search<'a, 'p> {
             if good.is_empty() {
                 // An exchange may make others needless.
                 other.sort_by(|a, b| a.loss().total_cmp(&b.loss()));
-                let few = other.iter().take(study.settings.select.exchanged);
+                let few = other
+                    .iter()
+                    .take(problem.settings.select.simplified_exchanges);
                 good = few.map(|trial| self.least(trial, best)).collect();
                 good.retain(is_simpler);
             }
@@ -363,15 +370,15 @@ impl<'a, 'p> Search<'a, 'p> {
     /// The smallest set of a trial's effects that explains the logs as well as the best one, among those that predicted
     /// losses lead to.
     fn least(&self, trial: &Trial, best: &Trial) -> Trial {
-        let study = self.study;
-        let Some(outlook) = Outlook::of(study, &trial.fitted, &[]) else {
+        let problem = self.problem;
+        let Some(outlook) = Outlook::of(problem, &trial.fitted, &[]) else {
             return trial.clone();
         };
-        let settings = &study.settings.select;
+        let settings = &problem.settings.select;
         let within = |set: &Vec<usize>| {
             let losses = outlook.losses(set);
             let sum = losses.map_or(f64::INFINITY, |losses| losses.iter().sum());
-            sum <= best.loss() * (1.0 + settings.slack * settings.simpler)
+            sum <= best.loss() * (1.0 + settings.prediction_slack * settings.simpler_rise)
         };
         let all = outlook.present();
         let mut unshifted = all.clone();
@@ -389,39 +396,43 @@ impl<'a, 'p> Search<'a, 'p> {
 
     /// The sets that explain the logs as well as the best one, fitted from a trial.
     fn as_good_as(&self, best: &Trial, from: &Trial, sets: Vec<Vec<FittedEffect>>) -> Vec<Trial> {
-        let settings = &self.study.settings.select;
-        let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler));
+        let settings = &self.problem.settings.select;
+        let mut trials = self.fitted(from, sets, best.loss() * (1.0 + settings.simpler_rise));
         trials.retain(|trial| trial.is_as_good_as(best, settings));
         trials
     }
-}
 
-/// The declared model with a set of effects in place of those of a trial, fitted at its scale to a loss of `below`, if time is
-/// left.
-fn fitted_from(study: &Study<'_>, from: &Trial, set: &[FittedEffect], below: f64) -> Option<Trial> {
-    if !study.has_time() {
-        return None;
+    /// The declared model with a set of effects in place of those of a trial, fitted at its scale to a loss of `below`, if time is
+    /// left.
+    fn fitted_from(&self, from: &Trial, set: &[FittedEffect], below: f64) -> Option<Trial> {
+        if self.watch.has_to_end() {
+            return None;
+        }
+        let problem = self.problem;
+        let effects = [problem.declared.effects.as_slice(), set].concat();
+        let fitted = problem.with_better_effects(&from.fitted, effects, below)?;
+        Some(Trial::of(problem, fitted))
     }
-    let effects = [study.declared.effects.as_slice(), set].concat();
-    let fitted = study.with_better_effects(&from.fitted, effects, below)?;
-    Some(Trial::of(study, fitted))
-}
 
-/// A trial with what each effect contains in place of those whose values are not consistent, fitted from there to a loss of
-/// `below`; `None` where all are, or where that leaves no valid set.
-fn mended_from(study: &Study<'_>, library: &[Effect], trial: &Trial, below: f64) -> Option<Trial> {
-    if trial.is_consistent(study) {
-        return None;
+    /// A trial with what each effect contains in place of those whose values are not consistent, fitted from there to a loss of
+    /// `below`; `None` where all are, or where that leaves no valid set.
+    fn mended_from(&self, trial: &Trial, below: f64) -> Option<Trial> {
+        let problem = self.problem;
+        if trial.is_consistent(problem) {
+            return None;
+        }
+        let declared = &problem.declared.effects;
+        let set = mended(problem.effects(), declared, trial.added(problem));
+        let found = self.fitted_from(trial, &set, below);
+        found.filter(|found| found.is_valid(problem))
     }
-    let set = mended(library, &study.declared.effects, trial.added(study));
-    fitted_from(study, trial, &set, below).filter(|found| found.is_valid(study))
 }
 
 /// Drop those whose key has been met: among `met`, or among those before them.
 fn first_of_each<T>(
     items: &mut Vec<T>,
-    mut met: Vec<Vec<String>>,
-    key: impl Fn(&T) -> Vec<String>,
+    mut met: Vec<Vec<EffectId>>,
+    key: impl Fn(&T) -> Vec<EffectId>,
 ) {
     items.retain(|item| {
         let key = key(item);

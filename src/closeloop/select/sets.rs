@@ -3,14 +3,14 @@ use std::collections::HashSet;
 use rayon::prelude::*;
 
 use super::outlook::{Outlook, Set};
-use crate::closeloop::study::Study;
+use crate::closeloop::problem::Problem;
 
 /// Sets of an outlook's items that promise to lower the loss on left-out stretches, found by a beam search: from the
 /// items of the model, one is added or dropped at a time, and the best few sets of a step lead to the next.
-pub fn promising(outlook: &Outlook, study: &Study<'_>) -> Vec<Set> {
-    let settings = &study.settings.select;
-    let most = settings.most_effects_of(study.declared.joints);
-    let step = study.of_whole(settings.step);
+pub fn promising(outlook: &Outlook, problem: &Problem<'_>) -> Vec<Set> {
+    let settings = &problem.settings.select;
+    let most = settings.most_effects_of(problem.declared.joints);
+    let step = problem.of_whole(settings.round_gain);
     let start = outlook.present();
     let total = |set: &Set| Some(outlook.losses(set)?.iter().sum::<f64>());
     let Some(first) = total(&start) else {
@@ -20,7 +20,7 @@ pub fn promising(outlook: &Outlook, study: &Study<'_>) -> Vec<Set> {
     let mut ranked: Vec<(f64, Set)> = vec![(first, start.clone())];
     let mut beam = vec![start];
     let mut best = first;
-    for _ in 0..settings.depth {
+    for _ in 0..settings.beam_steps {
         let mut next: Vec<Set> = beam
             .iter()
             .flat_map(|set| neighbours(outlook, set, most))
@@ -31,7 +31,7 @@ pub fn promising(outlook: &Outlook, study: &Study<'_>) -> Vec<Set> {
             .filter_map(|set| Some((total(&set)?, set)))
             .collect();
         scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-        scored.truncate(settings.beam);
+        scored.truncate(settings.beam_width);
         beam = scored.iter().map(|(_, set)| set.clone()).collect();
         let lowest = scored.first().map_or(f64::INFINITY, |(loss, _)| *loss);
         ranked.extend(scored);
@@ -40,7 +40,7 @@ pub fn promising(outlook: &Outlook, study: &Study<'_>) -> Vec<Set> {
         }
         best = best.min(lowest);
     }
-    shortlist(ranked, settings.fitted)
+    shortlist(ranked, settings.fitted_sets)
 }
 
 /// Sets with one item more or less; an item takes the place of those that it contains.

@@ -2,25 +2,27 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::blocks::{blocks, usual_friction};
 use super::candidate::candidates;
-use super::exchange::exchanges;
+use super::exchange::{Exchange, exchanges};
 use super::folds::{Folds, left_out_losses, predicted};
 use super::outlook::Outlook;
 use super::simpler::{mended, simpler};
-use super::trial::{Trial, key};
+use super::trial::Trial;
+use crate::closeloop::fit::{Declared, NOTHING};
+use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::Settings;
-use crate::closeloop::study::Study;
 use crate::closeloop::tests::{absent, logs, pendulum, recorded};
 use crate::model::{FittedEffect, Library};
 
 #[test]
 fn what_is_left_out_together_is_a_connected_part_of_one_log() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let study = Study::new(&declared, &logs, &settings);
-    let folds = Folds::of(&study);
+    let problem = Problem::new(&declared, &NOTHING, &logs, &settings);
+    let folds = Folds::of(&problem);
     assert!(folds.groups.is_sorted(), "{:?}", folds.groups);
     let mut logs_of = std::collections::HashMap::new();
-    for (window, &stretch) in study.shooting.windows.iter().zip(&folds.stretches) {
+    for (window, &stretch) in problem.shooting.windows.iter().zip(&folds.stretches) {
         let log = logs_of.entry(folds.groups[stretch]).or_insert(window.log);
         assert_eq!(*log, window.log);
     }
@@ -42,12 +44,12 @@ fn a_loss_far_below_zero_is_rounding_and_no_loss() {
 fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
     let library = Library::built_in();
-    let mut study = Study::new(&declared, &logs, &settings);
-    let fitted = study.fit_declared(library.effects()).unwrap();
-    let all = candidates(&study, library.effects(), &[]);
-    let outlook = Outlook::of(&study, &fitted, &all).unwrap();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
+    let all = candidates(&problem, &[]);
+    let outlook = Outlook::of(&problem, &fitted, &all).unwrap();
     let loss = |set: &[usize]| outlook.losses(set).unwrap().iter().sum::<f64>();
-    let known: f64 = left_out_losses(&study, &fitted.fit).iter().sum();
+    let known: f64 = left_out_losses(&problem, &fitted.fit).iter().sum();
     assert!((loss(&[]) / known - 1.0).abs() < 0.01);
 
     let items = outlook.items.iter().map(FittedEffect::label);
@@ -56,8 +58,8 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
         .position(|label| label.starts_with("coulomb"))
         .unwrap();
     let effects = outlook.effects(&[coulomb]);
-    let with = study.with_effects(&fitted, effects).unwrap();
-    let found: f64 = left_out_losses(&study, &with.fit).iter().sum();
+    let with = problem.with_effects(&fitted, effects).unwrap();
+    let found: f64 = left_out_losses(&problem, &with.fit).iter().sum();
     assert!(found < 0.2 * known);
     assert!(
         loss(&[coulomb]) < 0.3 * known,
@@ -70,15 +72,43 @@ fn the_outlook_knows_the_loss_of_the_model_and_promises_the_hidden_effect() {
 #[test]
 fn a_set_with_a_value_at_its_bound_is_not_valid() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let mut study = Study::new(&declared, &logs, &settings);
-    let fitted = study.fit_declared(&[]).unwrap();
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
     let effects = vec![absent("coulomb_friction"), absent("encoder_eccentricity")];
-    let fitted = study.with_effects(&fitted, effects).unwrap();
-    let mut trial = Trial::of(&study, fitted);
-    assert!(trial.is_valid(&study));
+    let fitted = problem.with_effects(&fitted, effects).unwrap();
+    let mut trial = Trial::of(&problem, fitted);
+    assert!(trial.is_valid(&problem));
     let disc = &mut trial.fitted.model.effects[1];
     disc.values[0].0 = disc.effect.parameters[0].bounds[1];
-    assert!(!trial.is_valid(&study));
+    assert!(!trial.is_valid(&problem));
+}
+
+/// A library of one's own, whatever its effects are called, says what most machines have.
+#[test]
+fn what_most_machines_have_is_said_by_effect_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let drag = |name: &str, rank: &str| {
+        let text = format!(
+            "[effect]\nname = \"{name}\"\nabout = \"drag\"\nforce = \"-c * qd\"\n{rank}\n\
+             [parameters]\nc = {{ unit = \"N m s/rad\", typical = 1 }}\n"
+        );
+        std::fs::write(folder.path().join(format!("{name}.toml")), text).unwrap();
+    };
+    drag("bearing", "baseline = 3");
+    drag("grease", "baseline = 1");
+    drag("magnet", "");
+    let library = Library::empty().with_folder(folder.path()).unwrap();
+    let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let names = |set: &Vec<FittedEffect>| -> Vec<String> {
+        set.iter()
+            .map(|effect| effect.effect.name.clone())
+            .collect()
+    };
+    let sets: Vec<_> = blocks(&problem).iter().map(names).collect();
+    assert_eq!(sets, [vec!["grease"], vec!["bearing", "grease"]]);
+    assert_eq!(names(&usual_friction(&problem)), ["grease"]);
 }
 
 /// Its fastest possible velocity says that friction does not fall: it is Coulomb friction at the level found.
@@ -102,12 +132,13 @@ fn an_effect_at_a_bound_gives_way_to_what_it_contains() {
 #[test]
 fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
     let (declared, logs, settings) = (pendulum(), logs(), Settings::default());
-    let mut study = Study::new(&declared, &logs, &settings);
-    let fitted = study.fit_declared(&[]).unwrap();
+    let library = Library::built_in();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
     let is_valid = |names: &[&str]| {
         let effects = names.iter().map(|name| absent(name)).collect();
-        let fitted = study.with_effects(&fitted, effects).unwrap();
-        Trial::of(&study, fitted).is_valid(&study)
+        let fitted = problem.with_effects(&fitted, effects).unwrap();
+        Trial::of(&problem, fitted).is_valid(&problem)
     };
     assert!(is_valid(&["coulomb_friction"]));
     assert!(!is_valid(&["coulomb_friction", "actuator_gain"]));
@@ -117,9 +148,12 @@ fn a_set_whose_values_the_logs_do_not_tell_apart_is_not_valid() {
 fn simpler_sets_have_fewer_parameters() {
     let library = Library::built_in();
     let sets = simpler(library.effects(), &[absent("asymmetric_friction")], 0..1);
-    let most = key(sets.last().unwrap());
+    let mut most: Vec<&str> = (sets.last().unwrap().iter())
+        .map(|effect| &*effect.effect.name)
+        .collect();
+    most.sort_unstable();
     let parts = ["constant_torque", "coulomb_friction", "viscous_friction"];
-    assert_eq!(most, parts.map(|name| format!("{name} on joint 1")));
+    assert_eq!(most, parts);
 }
 
 /// The friction that a file declares is not added to it once more: no file may hold it twice.
@@ -129,7 +163,7 @@ fn simpler_sets_hold_no_effect_twice() {
     let effects = ["viscous_friction", "asymmetric_friction"].map(absent);
     let sets = simpler(library.effects(), &effects, 1..2);
     let is_twice = |set: &Vec<FittedEffect>| {
-        let again = |effect: &FittedEffect| effect.label() == effects[0].label();
+        let again = |effect: &FittedEffect| effect.is_same(&effects[0]);
         set.iter().filter(|effect| again(effect)).count() > 1
     };
     assert!(!sets.is_empty() && !sets.iter().any(is_twice));
@@ -158,19 +192,20 @@ effect = [
 "#;
     let (declared, logs, settings) = (pendulum(), recorded(RIG, 0), Settings::default());
     let library = Library::built_in();
-    let mut study = Study::new(&declared, &logs, &settings);
-    let fitted = study.fit_declared(&[]).unwrap();
+    let problem = Problem::new(&declared, &library, &logs, &settings);
+    let Declared { problem, fitted } = problem.fit_declared().unwrap();
     let mut ripple = absent("cogging_torque");
     ripple.values = vec![(0.1, None), (6.0, None), (0.4, None)];
     let set = vec![absent("actuator_delay"), ripple];
-    let wrong = study.with_effects(&fitted, set).unwrap();
+    let wrong = problem.with_effects(&fitted, set).unwrap();
     let delay = wrong.model.effects[0].values[0].0;
     assert!(delay > 0.01);
-    let all = exchanges(&study, library.effects(), &wrong);
-    let labels: Vec<&str> = all.iter().map(|exchange| &*exchange.labels[1]).collect();
-    for number in [5, 7] {
-        let label = format!("cogging_torque on joint 1, N = {number}");
-        assert!(labels.contains(&label.as_str()), "{labels:?}");
+    let all = exchanges(&problem, &wrong);
+    for number in [5.0, 7.0] {
+        let mut ripple = wrong.model.effects[1].clone();
+        ripple.values[1].0 = number;
+        let is_tried = |exchange: &Exchange| exchange.pair[1] == problem.id(&ripple);
+        assert!(all.iter().any(is_tried), "{number}");
     }
     let lag = all.iter().flat_map(|exchange| &exchange.set);
     let lag = lag.filter(|effect| effect.effect.name == "actuator_lag");

@@ -1,9 +1,10 @@
 use super::evidence::gain;
+use super::identity::EffectId;
 use super::losses::Losses;
 use super::outlook::tells_apart;
 use crate::closeloop::fitted::Fitted;
+use crate::closeloop::problem::Problem;
 use crate::closeloop::settings::SelectSettings;
-use crate::closeloop::study::Study;
 use crate::data::Joint;
 use crate::data::statistics::{mean, standard_error};
 use crate::model::{EffectParameter, FittedEffect};
@@ -15,12 +16,18 @@ pub struct Trial {
     /// On each stretch, with the parameters that a fit without it would give. Comparable among trials that were fitted at
     /// the same scale.
     pub losses: Losses,
+    /// Identifies its effects, in the order of the model.
+    ids: Vec<EffectId>,
 }
 
 impl Trial {
-    pub fn of(study: &Study<'_>, fitted: Fitted) -> Self {
-        let losses = Losses::of(study, &fitted);
-        Self { fitted, losses }
+    pub fn of(problem: &Problem<'_>, fitted: Fitted) -> Self {
+        let effects = fitted.model.effects.iter();
+        Self {
+            losses: Losses::of(problem, &fitted),
+            ids: effects.map(|effect| problem.id(effect)).collect(),
+            fitted,
+        }
     }
 
     /// Loss over all stretches.
@@ -44,44 +51,50 @@ impl Trial {
 
     /// Whether every added effect has values that are consistent with each other and that the logs tell from all others:
     /// a value that stands at a bound was not found there, unless it is zero and the effect absent.
-    pub fn is_valid(&self, study: &Study<'_>) -> bool {
-        self.is_consistent(study) && self.is_determined(study)
+    pub fn is_valid(&self, problem: &Problem<'_>) -> bool {
+        self.is_consistent(problem) && self.is_determined(problem)
     }
 
-    fn is_determined(&self, study: &Study<'_>) -> bool {
+    fn is_determined(&self, problem: &Problem<'_>) -> bool {
         let (model, fit) = (&self.fitted.model, &self.fitted.fit);
-        let added = study.added(model);
+        let added = problem.added(model);
         if added.is_empty() {
             return true;
         }
         let first = model.place_of(added.start).start;
         let columns = &fit.columns;
-        let told = |&i: &usize| study.is_told(columns[i].parameter);
+        let told = |&i: &usize| problem.is_told(columns[i].parameter);
         let told: Vec<usize> = (0..columns.len()).filter(told).collect();
         let base = told.iter().filter(|&&i| columns[i].parameter < first);
         let information = fit.equations().hessian;
         let information = information.select_rows(&told).select_columns(&told);
-        tells_apart(&information, base.count())
+        tells_apart(
+            &information,
+            base.count(),
+            problem.settings.select.own_information,
+        )
     }
 
     /// Whether the values of each added effect are consistent with each other and none stands at a bound.
-    pub fn is_consistent(&self, study: &Study<'_>) -> bool {
-        self.added(study).iter().all(is_consistent)
+    pub fn is_consistent(&self, problem: &Problem<'_>) -> bool {
+        self.added(problem).iter().all(is_consistent)
     }
 
     /// The effects beyond the declared ones.
-    pub fn added(&self, study: &Study<'_>) -> &[FittedEffect] {
-        &self.fitted.model.effects[study.added(&self.fitted.model)]
+    pub fn added(&self, problem: &Problem<'_>) -> &[FittedEffect] {
+        &self.fitted.model.effects[problem.added(&self.fitted.model)]
     }
 
     /// Identifies the set of effects, in no particular order.
-    pub fn key(&self) -> Vec<String> {
-        key(&self.fitted.model.effects)
+    pub fn key(&self) -> Vec<EffectId> {
+        let mut key = self.ids.clone();
+        key.sort();
+        key
     }
 
     /// The same of the effects beyond the declared ones.
-    pub fn added_key(&self, study: &Study<'_>) -> Vec<String> {
-        key(self.added(study))
+    pub fn added_key(&self, problem: &Problem<'_>) -> Vec<EffectId> {
+        problem.key(self.added(problem))
     }
 
     /// Whether this simpler set explains the logs as well as the best one: its loss is no more than a little larger, and not
@@ -90,8 +103,9 @@ impl Trial {
         let is_as_good = |own: &[f64], best: &[f64]| {
             let rise = -gain(best, own);
             let differences = differences(own, best);
-            let within = mean(&differences) <= settings.simplest * standard_error(&differences);
-            rise < settings.negligible || within && rise < settings.simpler
+            let within = mean(&differences)
+                <= settings.simpler_standard_errors * standard_error(&differences);
+            rise < settings.negligible_rise || within && rise < settings.simpler_rise
         };
         let on_joint =
             |joint: Joint| is_as_good(&self.losses.of_joint(joint), &best.losses.of_joint(joint));
@@ -102,10 +116,9 @@ impl Trial {
     /// The joints of effects that one of two trials has and the other has not.
     fn differs_on(&self, other: &Self) -> Vec<Joint> {
         let not_in = |a: &Self, b: &Self| -> Vec<Joint> {
-            let known = b.key();
-            let effects = a.fitted.model.effects.iter();
-            let other = effects.filter(|effect| !known.contains(&identity(effect)));
-            other.flat_map(FittedEffect::joints).collect()
+            let effects = a.fitted.model.effects.iter().zip(&a.ids);
+            let other = effects.filter(|(_, id)| !b.ids.contains(id));
+            other.flat_map(|(effect, _)| effect.joints()).collect()
         };
         [not_in(self, other), not_in(other, self)].concat()
     }
@@ -121,22 +134,6 @@ pub fn is_consistent(effect: &FittedEffect) -> bool {
         is_absent || parameter.whole || (low < *value && *value < high)
     };
     effect.effect.is_valid(&values) && shapes.all(is_inside)
-}
-
-/// The effects of a model, in no particular order.
-pub fn key(effects: &[FittedEffect]) -> Vec<String> {
-    let mut key: Vec<String> = effects.iter().map(identity).collect();
-    key.sort();
-    key
-}
-
-/// The name of an effect, its joint and its whole numbers: a ripple of another number of periods is another effect.
-pub fn identity(effect: &FittedEffect) -> String {
-    let values = effect.effect.parameters.iter().zip(&effect.values);
-    let whole = values.filter(|(parameter, _)| parameter.whole);
-    whole.fold(effect.label(), |label, (parameter, (value, _))| {
-        format!("{label}, {} = {value}", parameter.name)
-    })
 }
 
 pub fn differences(a: &[f64], b: &[f64]) -> Vec<f64> {

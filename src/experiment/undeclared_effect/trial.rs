@@ -192,7 +192,7 @@ impl Session {
         let split = Split::of(logs.to_vec(), &Settings::default().split);
         let request = Request::new(&self.declared, &self.library, split);
         let mut rng = stream(seed, Purpose::Other(logs.len()));
-        close_loop(request, &mut rng, &mut |_| {})
+        close_loop(request, &mut rng, &())
     }
 
     fn hybrid(&self, learner: &Learner, logs: &[Log], seed: u64) -> Result<Predictor, RunError> {

@@ -185,8 +185,7 @@ fn not_carried(model: &Model, declared: &Model, held: &[&str]) -> Vec<String> {
     let is_in_file = |effect: &FittedEffect| {
         let same_values = |other: &FittedEffect| {
             let pairs = effect.values.iter().zip(&other.values);
-            effect.label() == other.label()
-                && pairs.into_iter().all(|((a, _), (b, _))| same(*a, *b))
+            effect.is_same(other) && pairs.into_iter().all(|((a, _), (b, _))| same(*a, *b))
         };
         declared.effects.iter().any(same_values)
     };

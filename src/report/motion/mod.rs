@@ -41,11 +41,9 @@ type Tracks = [Frames; 3];
 impl MotionEntry {
     /// None where no stretch of the first test log is as long as the middle horizon.
     pub fn of(outcome: &Outcome) -> Option<Self> {
-        let horizons = &outcome.errors.before.horizons;
-        let horizon_s = horizons.get(horizons.len() / 2)?.horizon_s;
-        let fitted = &outcome.models;
-        let models = [&fitted.before.model, &fitted.after.model].map(|model| model.dynamics());
-        let course = motion(outcome.given.test.first()?, &models, horizon_s);
+        let predicted = outcome.predictions.middle.as_ref()?;
+        let models = [predicted.before.as_slice(), &predicted.after];
+        let course = motion(outcome.given.test.first()?, models);
         let rows = frames(&course.time);
         let [before, after] = [&course.models[0], &course.models[1]];
         let tracks: Tracks = [&course.measured, before, after].map(|q| {
@@ -57,7 +55,7 @@ impl MotionEntry {
         let (drawn, pictures) = mechanism.unwrap_or_else(|| dials::drawn(outcome, &tracks));
         Some(Self {
             log: course.log.name(),
-            horizon_s,
+            horizon_s: predicted.horizon_s,
             time: (rows.iter())
                 .map(|row| (1e3 * course.time[*row]).round() / 1e3)
                 .collect(),

@@ -259,7 +259,7 @@ impl Written {
         let mut train = model.read_logs(order.map(|k| &paths[k])).unwrap();
         let test = train.split_off(3);
         let request = Request::new(&model, &library, Split::given(train, test));
-        Findings::of(&close_loop(request, &mut rng(0), &mut |_| ()).unwrap())
+        Findings::of(&close_loop(request, &mut rng(0), &()).unwrap())
     }
 }
 

@@ -40,7 +40,7 @@ impl Additive {
         let first = Sums::by_block(&design, forces, &even, blocks);
         let penalties = smoothness(&first, bases.len(), rows, settings)?;
         let rough = solve(&Sums::total(&first), &penalties)?.solve(&Sums::total(&first).right);
-        let weights = weights(&(forces - &design * rough), settings.huber);
+        let weights = weights(&(forces - &design * rough), settings.huber_scales);
         let parts = Sums::by_block(&design, forces, &weights, blocks);
         let penalties = smoothness(&parts, bases.len(), rows, settings)?;
         let total = Sums::total(&parts);
@@ -132,7 +132,7 @@ fn smoothness(
 ) -> Option<DMatrix<f64>> {
     let CurveSettings {
         folds,
-        penalties,
+        penalty_exponents: penalties,
         rounds,
         ..
     } = settings;

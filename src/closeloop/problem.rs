@@ -1,6 +1,5 @@
 use std::ops::Range;
-use std::sync::OnceLock;
-use std::time::Instant;
+use std::sync::{Arc, OnceLock};
 
 use super::fitted::Fitted;
 use super::settings::{FitSettings, Settings};
@@ -8,17 +7,23 @@ use super::space::Space;
 use super::split::by_numbers;
 use crate::data::{Audit, JointAudit, Log, audit};
 use crate::identify::{FitError, Identifiability, Shooting, cut, fit, fit_below};
-use crate::model::{Dynamics, FittedEffect, Model, Parameter};
+use crate::model::{Dynamics, Effect, FittedEffect, Library, Model, Parameter};
 
-/// A declared model and the logs to learn from, with what follows from both.
-pub struct Study<'a> {
+/// A declared model, the effects that it may lack, and the logs to learn from, with what follows from them.
+///
+/// Nothing changes it: what a stage finds out is in the copy that it returns. Copies share what is large, the audits, the smoothed
+/// logs and the batches of windows.
+#[derive(Clone)]
+pub struct Problem<'a> {
     /// With the values in its file.
     pub declared: &'a Model,
+    /// The effects that it may lack.
+    pub library: &'a Library,
     pub space: Space,
     pub settings: &'a Settings,
     pub logs: &'a [Log],
     /// One a log, made when it is first asked for.
-    pub(super) audits: OnceLock<Vec<Audit>>,
+    pub(super) audits: Arc<OnceLock<Vec<Audit>>>,
     /// Speed of each joint over which dry friction reverses, in rad/s (or m/s).
     pub sign_widths: Vec<f64>,
     /// Top speed, top torque and largest torque or command in the logs of each joint.
@@ -28,8 +33,6 @@ pub struct Study<'a> {
     pub shooting: Shooting<'a>,
     /// A few of its windows, spread evenly, for comparing starting points.
     pub sample: Sample<'a>,
-    /// When the search has to stop.
-    pub deadline: Option<Instant>,
     /// The free declared parameters at the values that their fit began with, where the model diverges with those in its file;
     /// else empty.
     pub moved_to: Vec<Parameter>,
@@ -39,10 +42,11 @@ pub struct Study<'a> {
     pub held: Vec<usize>,
 }
 
-/// Some of a study's windows.
+/// Some of a problem's windows.
+#[derive(Clone)]
 pub struct Sample<'a> {
     pub shooting: Shooting<'a>,
-    /// Which of the study's windows they are.
+    /// Which of the problem's windows they are.
     members: Vec<usize>,
 }
 
@@ -63,26 +67,31 @@ impl<'a> Sample<'a> {
     }
 }
 
-impl<'a> Study<'a> {
-    /// A study of the motion.
-    pub fn new(declared: &'a Model, logs: &'a [Log], settings: &'a Settings) -> Self {
+impl<'a> Problem<'a> {
+    /// A problem of the motion.
+    pub fn new(
+        declared: &'a Model,
+        library: &'a Library,
+        logs: &'a [Log],
+        settings: &'a Settings,
+    ) -> Self {
         let audits = logs.iter().map(|log| audit(log, &declared.columns));
         let audits = audits.collect();
-        Self::audited(declared, Space::Motion, logs, audits, settings)
+        Self::audited(declared, library, Space::Motion, (logs, audits), settings)
     }
 
-    /// A study of logs with their audits.
+    /// A problem of logs with their audits.
     pub(super) fn audited(
         declared: &'a Model,
+        library: &'a Library,
         space: Space,
-        logs: &'a [Log],
-        audits: Vec<Audit>,
+        (logs, audits): (&'a [Log], Vec<Audit>),
         settings: &'a Settings,
     ) -> Self {
         let FitSettings {
             window_s,
             sample_windows,
-            sign_width,
+            sign_width_share,
             ..
         } = settings.fit;
         let top = |f: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
@@ -107,7 +116,7 @@ impl<'a> Study<'a> {
         let by_speed = || {
             top_speed
                 .iter()
-                .map(|speed| sign_width * speed.max(1e-6))
+                .map(|speed| sign_width_share * speed.max(1e-6))
                 .collect()
         };
         let sign_widths: Vec<f64> = declared.sign_width.clone().unwrap_or_else(by_speed);
@@ -120,17 +129,17 @@ impl<'a> Study<'a> {
         let shooting = shooting.near(declared);
         Self {
             declared,
+            library,
             space,
             settings,
             logs,
-            audits: audits.into(),
+            audits: Arc::new(audits.into()),
             sign_widths,
             sample: Sample::of(&shooting, sample_windows),
             shooting,
             top_speed,
             top_torque,
             top_driving,
-            deadline: None,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
@@ -156,14 +165,13 @@ impl<'a> Study<'a> {
         share / self.parts() as f64
     }
 
-    /// Whether the search may go on.
-    pub(super) fn has_time(&self) -> bool {
-        self.deadline
-            .is_none_or(|deadline| Instant::now() < deadline)
+    /// The effects that the model may lack.
+    pub(super) fn effects(&self) -> &'a [Effect] {
+        self.library.effects()
     }
 
     /// The same model on other logs of the same rig: noise, speeds and the width of friction's reversal stay.
-    pub fn on<'b>(&self, logs: &'b [Log]) -> Study<'b>
+    pub fn on<'b>(&self, logs: &'b [Log]) -> Problem<'b>
     where
         'a: 'b,
     {
@@ -172,51 +180,54 @@ impl<'a> Study<'a> {
             .space
             .shooting(logs, windows, &self.shooting.noise, &self.sign_widths)
             .near(self.declared);
-        Study {
+        Problem {
             declared: self.declared,
+            library: self.library,
             space: self.space,
             settings: self.settings,
             logs,
-            audits: OnceLock::new(),
+            audits: Arc::default(),
             sign_widths: self.sign_widths.clone(),
             top_speed: self.top_speed.clone(),
             top_torque: self.top_torque.clone(),
             top_driving: self.top_driving.clone(),
             sample: Sample::of(&shooting, self.settings.fit.sample_windows),
             shooting,
-            deadline: self.deadline,
             moved_to: Vec::new(),
             identifiability: Identifiability::default(),
             held: Vec::new(),
         }
     }
 
-    /// Take this as the noise of the joints.
-    pub(super) fn weigh_by(&mut self, noise: &[f64]) {
-        let FitSettings {
-            window_s,
-            sample_windows,
-            ..
-        } = self.settings.fit;
-        let windows = cut(self.logs, window_s);
-        let shooting = (self.space).shooting(self.logs, windows, noise, &self.sign_widths);
-        self.shooting = shooting.near(self.declared);
-        self.sample = Sample::of(&self.shooting, sample_windows);
+    /// The same problem over other windows of its logs, or with another noise of its joints.
+    pub(super) fn over(&self, shooting: Shooting<'a>) -> Self {
+        Self {
+            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
+            shooting,
+            ..self.clone()
+        }
+    }
+
+    /// The same problem, of which this is known.
+    pub(super) fn knowing(&self, identifiability: Identifiability) -> Self {
+        Self {
+            identifiability,
+            ..self.clone()
+        }
+    }
+
+    /// The same problem where dry friction reverses over these speeds. Of torques the logs are smoothed with it: they need other
+    /// windows as well.
+    pub(super) fn with_sign_widths(&self, sign_widths: Vec<f64>) -> Self {
+        Self {
+            sign_widths,
+            ..self.clone()
+        }
     }
 
     /// Its logs, cut into windows of this length in s.
     pub(super) fn windows_of(&self, length_s: f64) -> Shooting<'a> {
-        self.shooting.over(cut(self.logs, length_s))
-    }
-
-    /// The same study over windows in which even a poor start does not diverge.
-    pub(super) fn over_short_windows(&self) -> Self {
-        let shooting = self.windows_of(self.settings.fit.short_window_s);
-        Self {
-            sample: Sample::of(&shooting, self.settings.fit.sample_windows),
-            shooting,
-            ..self.again()
-        }
+        self.shooting.cut_into(length_s)
     }
 
     /// The declared model at the values that its fit began with.
@@ -232,16 +243,6 @@ impl<'a> Study<'a> {
         model
     }
 
-    /// This study once more.
-    pub(super) fn again(&self) -> Self {
-        Self {
-            moved_to: self.moved_to.clone(),
-            identifiability: self.identifiability.clone(),
-            held: self.held.clone(),
-            ..self.on(self.logs)
-        }
-    }
-
     /// The audits of the logs, in their order.
     pub fn audits(&self) -> &[Audit] {
         let of_log = |log| audit(log, &self.declared.columns);
@@ -255,10 +256,10 @@ impl<'a> Study<'a> {
         self.audits().iter().any(moves)
     }
 
-    /// Fit a model, starting from its values, with the study's smoothing of friction.
+    /// Fit a model, starting from its values, with the problem's smoothing of friction.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub fn refit(
         &self,
         model: &Model,
@@ -275,7 +276,7 @@ impl<'a> Study<'a> {
     /// Fit a model anew, starting from its values; the scale of its residuals is estimated again.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub fn estimate(&self, fitted: &Fitted) -> Result<Fitted, FitError> {
         self.refit(&fitted.model, fitted.fit.locals.clone(), None)
     }
@@ -284,7 +285,7 @@ impl<'a> Study<'a> {
     /// losses of the two can be compared.
     ///
     /// # Errors
-    /// As [`Study::fit_declared`].
+    /// As [`Problem::fit_declared`].
     pub(super) fn with_effects(
         &self,
         fitted: &Fitted,
@@ -294,7 +295,7 @@ impl<'a> Study<'a> {
         self.refit(&fitted.model.with_effects(effects), locals, Some(scale))
     }
 
-    /// As [`Study::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
+    /// As [`Problem::with_effects`], where only a loss below `below` is of use: `None` if the model cannot be fitted or does
     /// not come down to it.
     pub(super) fn with_better_effects(
         &self,
@@ -322,18 +323,18 @@ impl<'a> Study<'a> {
         self.declared.effects.len()..model.effects.len()
     }
 
-    /// A model with the study's smoothing of friction.
+    /// A model with the problem's smoothing of friction.
     pub(super) fn smoothed(&self, model: &Model) -> Model {
         model.with_sign_widths(self.sign_widths.clone())
     }
 
-    /// A fitted model with more effects, compiled with the study's smoothing of friction.
+    /// A fitted model with more effects, compiled with the problem's smoothing of friction.
     pub(super) fn extended(&self, fitted: &Fitted, more: &[FittedEffect]) -> Dynamics {
         let model = fitted.model.with_effects(fitted.effects_and(more));
         self.compiled(&model)
     }
 
-    /// A model compiled for the errors that the study compares, with its smoothing of friction.
+    /// A model compiled for the errors that the problem compares, with its smoothing of friction.
     pub(super) fn compiled(&self, model: &Model) -> Dynamics {
         self.space.compile(&self.smoothed(model))
     }

@@ -1,0 +1,142 @@
+//! Stage 5: what the remainder, the single logs and gravity say of the effects that were established.
+
+use rand::Rng;
+use rayon::prelude::*;
+
+use super::establish::{Chosen, Standing};
+use super::every_log::EveryLog;
+use super::fit::Declared;
+use super::fitted::Fitted;
+use super::gravity::{against_gravity, shares_of_gravity};
+use super::loss::Loss;
+use super::problem::Problem;
+use super::remainder::{Unexplained, diagnose};
+use super::space::Space;
+use crate::data::Log;
+use crate::model::{FittedEffect, Status};
+
+/// What the declared model lacks, as far as the logs tell.
+pub struct Found<'a> {
+    /// With what the logs determine of the declared parameters beside the effects.
+    pub problem: Problem<'a>,
+    /// The declared model, fitted.
+    pub before: Fitted,
+    pub chosen: Chosen,
+    pub unexplained: Unexplained,
+    /// The share of the declared gravity in the torques of each log, where they are compared and it tells.
+    pub gravity: Vec<Option<f64>>,
+}
+
+/// Doubt the effects that were established where the remainder that is `left`, single logs or gravity give a reason to, and look for
+/// a load at the tip.
+pub(super) fn judge<'a>(
+    declared: Declared<'a>,
+    mut chosen: Chosen,
+    mut left: Unexplained,
+    apart: &[Log],
+    rng: &mut impl Rng,
+) -> Found<'a> {
+    let Declared {
+        problem,
+        fitted: before,
+    } = declared;
+    if left.is_significant() {
+        chosen.doubt(&problem, &before, &left);
+    }
+    if problem.space == Space::Torque {
+        chosen.ask_every_log(problem.logs.iter().chain(apart));
+        if let Some((after, standing)) = problem.with_payload(&chosen.after) {
+            chosen.after = after;
+            chosen.standings.push(standing);
+        }
+    }
+    let gravity = shares_of_gravity(&problem);
+    if against_gravity(&gravity, &problem.settings.notes).is_some() {
+        demote(&mut chosen.standings, |_| Some(ANOTHER_GRAVITY.into()));
+    }
+    chosen.mark(&problem);
+    if chosen.established() == 0 && !chosen.standings.is_empty() {
+        // What is not established explains nothing.
+        left = diagnose(&problem, &before, &before, rng);
+    }
+    Found {
+        problem: problem.knowing(problem.identifiability_of(&chosen.after)),
+        before,
+        chosen,
+        unexplained: left,
+        gravity,
+    }
+}
+
+/// Why effects are not established that leave most of the loss and an unexplained remainder.
+const MASKING: &str = "an unexplained remainder stays, and all effects together cut the loss by less than half: it would \
+                       mask the real cause";
+
+/// Why effects are not established that are fitted to a part of the torques.
+const ANOTHER_GRAVITY: &str = "the torques hold another gravity than the declared bodies need, and it may imitate what they lack";
+
+/// Why an effect is not established beside a remainder that is larger.
+const OUTWEIGHED: &str =
+    "over twice what it explains stays unexplained: it may be a part of the real cause's shape";
+
+impl Chosen {
+    /// Effects are not established beside a remainder that leaves most of what their joint lacks, or more than they explain.
+    fn doubt(&mut self, problem: &Problem<'_>, before: &Fitted, remainder: &Unexplained) {
+        let settings = &problem.settings.establish;
+        let [declared, with] = [before, &self.after].map(|model| Loss::of(problem, model));
+        let left = |of: &Loss, effect: &FittedEffect| {
+            of.on(effect) / declared.on(effect).max(f64::MIN_POSITIVE)
+        };
+        let masks = |effect: &FittedEffect| {
+            remainder.matters_on(problem, effect.joint)
+                && left(&with, effect) > settings.masking_share
+        };
+        let is_outweighed = |standing: &Standing| {
+            let effect = &standing.effect;
+            let least = settings.outweighed_share * remainder.fraction_on(problem, effect.joint);
+            let without = standing.without.as_ref();
+            let without = without.map(|without| Loss::of(problem, without));
+            without.is_ok_and(|without| left(&without, effect) - left(&with, effect) < least)
+        };
+        demote(&mut self.standings, |standing| {
+            let masks = masks(&standing.effect).then_some(MASKING);
+            let reason = masks.or_else(|| is_outweighed(standing).then_some(OUTWEIGHED))?;
+            Some(reason.into())
+        });
+    }
+
+    /// Effects are not established without which the torques of some log fit as well.
+    fn ask_every_log<'l>(&mut self, logs: impl Iterator<Item = &'l Log>) {
+        let logs = EveryLog::of(logs, &self.after);
+        demote(&mut self.standings, |standing| {
+            let log = logs.fits_as_well_without(standing)?;
+            Some(format!(
+                "the torques of {} fit as well without it",
+                log.name()
+            ))
+        });
+    }
+
+    /// Note in the model how each of the effects stands.
+    fn mark(&mut self, problem: &Problem<'_>) {
+        let model = &mut self.after.model;
+        let added = problem.added(model);
+        for (effect, standing) in model.effects[added].iter_mut().zip(&self.standings) {
+            effect.status = Some(standing.status);
+        }
+    }
+}
+
+/// Established effects are no more than supported where there is a reason why not.
+fn demote(standings: &mut [Standing], reason: impl Fn(&Standing) -> Option<String> + Sync) {
+    let established = |standing: &&mut Standing| standing.status == Status::Established;
+    standings
+        .par_iter_mut()
+        .filter(established)
+        .for_each(|standing| {
+            if let Some(reason) = reason(standing) {
+                standing.status = Status::Supported;
+                standing.reason = Some(reason);
+            }
+        });
+}

@@ -1,0 +1,151 @@
+//! Closing the loop, stage by stage, as `docs/method.md` tells it.
+
+use rand::Rng;
+
+use super::discriminate::discriminate;
+use super::error::StudyError;
+use super::establish::{Chosen, establish};
+use super::fit::{Declared, fit};
+use super::judge::{Found, judge};
+use super::learn::learn;
+use super::loss::Loss;
+use super::notes::noted;
+use super::outcome::{Effects, Given, Models, Outcome, Remainder};
+use super::prepare::{Prepared, prepare};
+use super::refine::refine;
+use super::remainder::diagnose;
+use super::request::Request;
+use super::score::score;
+use super::select::{select, select_from};
+use super::space::Space;
+use super::stage::{Stage, Watch};
+use crate::data::Log;
+
+/// Fit the declared model, add effects while they lower the loss on stretches left out of the fit, train the residual
+/// network on the remainder, and score the models before and after on the test logs.
+///
+/// # Errors
+/// Logs without a usable window, or a declared model that diverges from its starting values.
+pub fn close_loop(
+    request: Request<'_>,
+    rng: &mut impl Rng,
+    watch: &dyn Watch,
+) -> Result<Outcome, StudyError> {
+    solve(&prepare(request, watch), rng, watch)
+}
+
+/// The same with logs that are ready.
+///
+/// # Errors
+/// As [`close_loop`].
+pub fn solve(
+    prepared: &Prepared<'_>,
+    rng: &mut impl Rng,
+    watch: &dyn Watch,
+) -> Result<Outcome, StudyError> {
+    let declared = fit(prepared, watch)?;
+    let found = find(declared, &prepared.test.for_fits, rng, watch)?;
+    let alternatives = discriminate(&found, watch);
+    let refined = refine(&found, watch);
+    let remainder = Remainder::of(&found, &refined);
+    let with_friction = found.problem.with_usual_friction();
+    let audits = noted(prepared, &found, with_friction.as_ref(), &remainder);
+    let learned = learn(&refined, prepared.learner, rng, watch);
+    let rivals = (with_friction.as_ref(), learned.as_ref());
+    let scores = score(prepared, &found, &refined, rivals, rng, watch);
+    Ok(Outcome {
+        space: found.problem.space,
+        verdict: scores.verdict,
+        reason: scores.reason,
+        given: Given::of(prepared, audits),
+        models: Models::of(&found.problem, refined),
+        effects: Effects::of(scores.findings, alternatives, found.chosen),
+        remainder,
+        errors: scores.errors,
+        predictions: scores.predictions,
+        learned,
+        by_log: scores.by_log,
+        calibration: None,
+        seconds: Vec::new(),
+    })
+}
+
+/// Search the logs for what the declared model lacks: select the set of effects that explains them best, judge each of it, and
+/// test the residuals. Where torques are compared, those of the logs that are set `apart` have to be fitted better by an effect
+/// as well, though nothing is fitted to them.
+///
+/// # Errors
+/// As [`Problem::fit_declared`](super::Problem::fit_declared).
+pub fn find<'a>(
+    declared: Declared<'a>,
+    apart: &[Log],
+    rng: &mut impl Rng,
+    watch: &dyn Watch,
+) -> Result<Found<'a>, StudyError> {
+    let mut best = Searched::of(declared, watch);
+    if let Some(slower) = best.with_slower_reversals(watch)? {
+        best = slower;
+    }
+    watch.see(Stage::Remainder.into());
+    let mut left = best.diagnose(rng);
+    if (left.is_significant() || best.chosen.failure.is_some())
+        && let Some(other) = best.searched_again(watch)
+    {
+        best = other;
+        left = best.diagnose(rng);
+    }
+    Ok(judge(best.declared, best.chosen, left, apart, rng))
+}
+
+/// A search for effects, and what it began with.
+struct Searched<'a> {
+    declared: Declared<'a>,
+    chosen: Chosen,
+}
+
+impl<'a> Searched<'a> {
+    fn of(declared: Declared<'a>, watch: &dyn Watch) -> Self {
+        let Declared { problem, fitted } = &declared;
+        let selected = select(problem, fitted, watch);
+        let chosen = establish(problem, fitted, selected, watch);
+        Self { declared, chosen }
+    }
+
+    /// The search with dry friction that reverses over wider speeds, if that leaves less.
+    fn with_slower_reversals(&self, watch: &dyn Watch) -> Result<Option<Self>, StudyError> {
+        let problem = &self.declared.problem;
+        let Some((widths, narrowest)) = problem.wider_reversal(&self.chosen.after, watch) else {
+            return Ok(None);
+        };
+        let declared = problem.with_sign_widths(widths).fit_declared()?;
+        let other = Self::of(declared, watch);
+        Ok((other.loss() < narrowest).then_some(other))
+    }
+
+    /// A search that begins over short windows and from the declared values, if it leaves less: with most of the force missing,
+    /// fits over longer ones end in minima from which no set of effects looks right, and where other parameters seem
+    /// undetermined.
+    fn searched_again(&self, watch: &dyn Watch) -> Option<Self> {
+        let Declared { problem, fitted } = &self.declared;
+        if problem.space == Space::Torque || watch.has_to_end() {
+            return None;
+        }
+        let short = problem.fitted_over_short_windows().ok()?;
+        let problem = problem.knowing(short.problem.identifiability.clone());
+        let selected = select_from(&problem, &short, watch);
+        let chosen = establish(&problem, fitted, selected, watch);
+        let fitted = fitted.clone();
+        let declared = Declared { problem, fitted };
+        let other = Self { declared, chosen };
+        (!other.chosen.standings.is_empty() && other.loss() < self.loss()).then_some(other)
+    }
+
+    fn loss(&self) -> f64 {
+        Loss::of(&self.declared.problem, &self.chosen.after).total()
+    }
+
+    fn diagnose(&self, rng: &mut impl Rng) -> super::remainder::Unexplained {
+        let Declared { problem, fitted } = &self.declared;
+        diagnose(problem, fitted, &self.chosen.after, rng)
+    }
+}

@@ -1,0 +1,149 @@
+//! Stages 1 and 2: the logs in their order, audited, and as fits read them.
+
+use std::sync::Arc;
+
+use super::error::StudyError;
+use super::learn::ResidualLearner;
+use super::problem::Problem;
+use super::request::{Reference, Request};
+use super::settings::Settings;
+use super::space::Space;
+use super::split::SplitMethod;
+use super::stage::{Stage, Watch};
+use crate::data::{Audit, Finding, Log, Severity, audit_together};
+use crate::limits::FITTED_PARAMETERS;
+use crate::model::{Library, Model};
+use crate::sim::metric::window_count;
+
+/// What is asked, with the logs made ready.
+pub struct Prepared<'a> {
+    /// The declared model.
+    pub model: &'a Model,
+    /// The effects that it may lack.
+    pub library: &'a Library,
+    /// Models to score as they are.
+    pub against: Vec<Reference>,
+    /// Of the horizons those that a test log is long enough for.
+    pub settings: Settings,
+    /// Horizons in s of which the test logs hold no window.
+    pub unscored_s: Vec<f64>,
+    /// Which errors to compare; without it, those that say more about these logs.
+    pub space: Option<Space>,
+    /// Trains the residual network; without it there is none.
+    pub learner: Option<&'a dyn ResidualLearner>,
+    pub split: SplitMethod,
+    pub train: ReadyLogs,
+    pub test: ReadyLogs,
+}
+
+/// Some logs, in the order of their names.
+pub struct ReadyLogs {
+    /// As they were read; of long ones a part.
+    pub logs: Arc<[Log]>,
+    /// With readings that jump masked and dropped rows put in or left out.
+    pub for_fits: Arc<[Log]>,
+    /// One a log.
+    pub audits: Vec<Audit>,
+}
+
+/// Put the logs in order, audit each of them, once, and make them ready for fits.
+pub fn prepare<'a>(mut request: Request<'a>, watch: &dyn Watch) -> Prepared<'a> {
+    watch.see(Stage::Audit.into());
+    let split = request.divided();
+    let Request {
+        model,
+        library,
+        against,
+        mut settings,
+        space,
+        learner,
+        ..
+    } = request;
+    let horizons_s = settings.score.horizons_s.drain(..);
+    let (scored_s, unscored_s) =
+        horizons_s.partition(|horizon_s| window_count(&split.test, *horizon_s) > 0);
+    settings.score.horizons_s = scored_s;
+    let split = split.in_order();
+    let ready = |logs: Vec<Log>| {
+        let mut audits = audit_together(&logs, &model.columns);
+        let logs = shortened(logs, &mut audits);
+        let for_fits = logs.iter().map(|log| log.for_fits(settings.fit.window_s));
+        ReadyLogs {
+            for_fits: for_fits.collect(),
+            logs: logs.into(),
+            audits,
+        }
+    };
+    Prepared {
+        train: ready(split.train),
+        test: ready(split.test),
+        split: split.method,
+        model,
+        library,
+        against,
+        unscored_s,
+        space,
+        learner,
+        settings,
+    }
+}
+
+impl Prepared<'_> {
+    /// # Errors
+    /// Test logs without a window of any horizon, torques that are to be compared and cannot be, or more free parameters than
+    /// can be fitted.
+    pub(super) fn check(&self) -> Result<(), StudyError> {
+        let free = self.model.free_parameters();
+        if free > FITTED_PARAMETERS {
+            let model = self.model.name.clone();
+            return Err(StudyError::TooManyParameters { model, free });
+        }
+        if self.settings.score.horizons_s.is_empty() {
+            return Err(StudyError::NoTest {
+                shortest_s: self
+                    .unscored_s
+                    .iter()
+                    .copied()
+                    .fold(f64::INFINITY, f64::min),
+                found: self.serious_in_test(),
+            });
+        }
+        if self.space == Some(Space::Torque) && self.model.torque_balance().is_none() {
+            return Err(StudyError::without_torques(self.model));
+        }
+        Ok(())
+    }
+
+    /// The first serious finding about a test log, as the end of a sentence; empty without one.
+    fn serious_in_test(&self) -> String {
+        let mut found = self.test.audits.iter().flat_map(|audit| {
+            let told = |finding: &Finding| format!("; {}: {finding}", audit.log);
+            audit.serious().map(told).next()
+        });
+        found.next().unwrap_or_default()
+    }
+
+    /// The problem, in terms of these errors.
+    pub(super) fn problem(&self, space: Space) -> Problem<'_> {
+        let logs = (&*self.train.for_fits, self.train.audits.clone());
+        Problem::audited(self.model, self.library, space, logs, &self.settings)
+    }
+
+    /// The audits of all logs, those of the test last.
+    pub fn audits(&self) -> impl Iterator<Item = &Audit> {
+        self.train.audits.iter().chain(&self.test.audits)
+    }
+}
+
+/// What fits read of logs; of long ones their audits say so.
+fn shortened(logs: Vec<Log>, audits: &mut [Audit]) -> Vec<Log> {
+    let shorten = |(log, audit): (Log, &mut Audit)| {
+        let is_long = log.is_long();
+        let log = log.shortened();
+        if let Some(note) = log.notes.last().filter(|_| is_long) {
+            audit.add(Finding::new(Severity::Warning, note.clone()));
+        }
+        log
+    };
+    logs.into_iter().zip(audits).map(shorten).collect()
+}
