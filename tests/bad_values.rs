@@ -1,8 +1,8 @@
 //! Nothing that is given breaks the program: what is too deep, too large or without an end is refused at once, with the limit
 //! and the place, and what leaves the finite numbers is told.
 
-use std::fs;
 use std::fmt::Write as _;
+use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};

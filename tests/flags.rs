@@ -61,10 +61,7 @@ fn the_command_line_says_which_flag_mends_an_error() {
     let short = scratch.log_at("short.csv", (0..9).map(|row| 0.01 * f64::from(row)), |_| {
         [0.0; 3]
     });
-    let (long, out) = (
-        scratch.log("long.csv", swinging),
-        scratch.out(),
-    );
+    let (long, out) = (scratch.log("long.csv", swinging), scratch.out());
     let model = [
         "closeloop",
         "--model",

@@ -46,26 +46,37 @@ fn the_answer_fits_a_terminal_for_a_pendulum_and_for_an_arm() {
     let report: Value =
         serde_json::from_str(&fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
     for compared in ["motion", "torque"] {
-        let report: Report = serde_json::from_value(arm(report.clone(), compared)).unwrap();
+        let value = arm(report.clone(), compared);
         let drawn = vec![String::from("  a curve"); 3];
-        let said = summary(&report, &[], Path::new("report"), &drawn, &Words::default());
-        is_narrow(&said);
-        // What is said in sentences is never cut.
-        let whole = said.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(!whole.contains(".."), "{said}");
-        for sentence in [
-            format!("report.md): pendulum.csv: {}", LONG.repeat(12)),
-            format!("to rule out stribeck_friction: {}", LONG.repeat(12)),
-            format!(
-                "held, since the logs do not tell them: {}",
-                held().join(", ")
-            ),
-        ] {
+        let of = |value: Value| {
+            let report: Report = serde_json::from_value(value).unwrap();
+            let said = summary(&report, &[], Path::new("report"), &drawn, &Words::default());
+            is_narrow(&said);
+            // What is said in sentences is never cut.
+            assert!(!said.contains(".."), "{said}");
+            said
+        };
+        let is_whole = |said: &str, sentence: String| {
+            let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(
-                whole.contains(sentence.trim()),
+                words.contains(sentence.trim()),
                 "{sentence} is missing in\n{said}"
             );
-        }
+        };
+        let mut mended = value.clone();
+        mended["audit"][0]["findings"] = json!([]);
+        let long = LONG.repeat(12);
+        is_whole(
+            &of(mended),
+            format!("to rule out stribeck_friction: {long}"),
+        );
+        let said = of(value);
+        is_whole(&said, format!("report.md): pendulum.csv: {long}"));
+        let held = held().join(", ");
+        is_whole(
+            &said,
+            format!("held, since the logs do not tell them: {held}"),
+        );
         assert!(
             said.starts_with("Serious, to be mended first (and 1 more"),
             "{said}"

@@ -105,7 +105,13 @@ fn an_effect_that_saves_little_is_not_established() {
     let statuses: Vec<Status> = standings.iter().map(|s| s.status).collect();
     assert_eq!(statuses, [Status::Established, Status::Supported]);
     assert!(standings[0].reason.is_none());
-    assert!(standings[1].reason.as_ref().unwrap().contains("the loss on left-out stretches by"));
+    assert!(
+        standings[1]
+            .reason
+            .as_ref()
+            .unwrap()
+            .contains("the loss on left-out stretches by")
+    );
 }
 
 #[test]

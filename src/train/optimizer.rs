@@ -20,7 +20,7 @@ use super::{FitSettings, HybridModel, TrainError, optimizer_record};
 // short of it.
 const EPSILON: f32 = 1e-8;
 
-/// An optimiser of Burn's, with Burn's defaults but for [`EPSILON`].
+/// An optimiser of Burn's, with Burn's defaults but for the epsilon of Adam, 1e-8.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OptimizerKind {
