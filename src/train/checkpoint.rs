@@ -10,7 +10,9 @@ use crate::files::{
     FreshFolder, OutputError, content_id, end_of_links, folder_of, hidden_beside, read_saved,
     remove_folder, write_whole,
 };
-use crate::model::{Dynamics, Library, Model, ModelWeights, Origin, SavedModelError, weights};
+use crate::model::{
+    Dynamics, Library, Model, ModelShape, ModelWeights, Origin, SavedModelError, weights,
+};
 
 const MANIFEST: &str = "checkpoint.json";
 const MODEL: &str = "model.toml";
@@ -46,8 +48,10 @@ pub fn save(dir: &Path, training: &Training, origin: &Origin) -> Result<(), Chec
     let dir = &end_of_links(dir);
     refuse_other_contents(dir)?;
     let optimizer = training.optimizer.to_bytes();
-    let manifest = Manifest::of(training, origin, &optimizer);
-    let last = training.model().weights();
+    let model = training.model();
+    let last = model.weights();
+    let shape = ModelShape::of(model.system(), model.joints(), &model.declared(), &last);
+    let manifest = Manifest::of(training, shape, origin, &optimizer);
     let used = training.best.as_ref().map_or(&last, |best| &best.weights);
     let json = serde_json::to_vec_pretty(&manifest)
         .map_err(|error| io("encode the description of", dir)(std::io::Error::other(error)))?;

@@ -111,9 +111,8 @@ impl Objective {
         match batch {
             Batch::Columns(columns) => composed::loss(model, columns, self.integrator, &self.scale),
             Batch::Blocks(blocks) => {
-                let [flat, none] = [model.flat(), Tensor::empty([0], &model.device())];
                 let each = [[1.0, 0.0], [0.0, 1.0]];
-                self.fused_loss(model, [flat, none], blocks, &each).0
+                self.fused_loss(model, model.flat(), blocks, &each).0
             }
         }
     }
@@ -135,13 +134,8 @@ impl Objective {
                 ((loss * weights).sum(), parts)
             }
             Batch::Blocks(blocks) => {
-                let first = packed.first.val();
-                let residual = match &packed.residual {
-                    Some(residual) => residual.val(),
-                    None => Tensor::empty([0], &first.device()),
-                };
                 let weights = weights.map(|weight| weight as f32);
-                self.fused_loss(model, [first, residual], blocks, &[weights])
+                self.fused_loss(model, packed.flat(), blocks, &[weights])
             }
         }
     }
@@ -149,7 +143,7 @@ impl Objective {
     fn fused_loss(
         &self,
         model: &HybridModel,
-        numbers: [Tensor<1>; 2],
+        numbers: Tensor<1>,
         blocks: &Arc<Blocks>,
         sums: &[[f32; 2]],
     ) -> (Tensor<1>, [f64; 2]) {

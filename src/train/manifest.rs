@@ -40,13 +40,16 @@ pub struct SavedBest {
 }
 
 impl Manifest {
-    pub(super) fn of(training: &Training, origin: &Origin, optimizer: &[u8]) -> Self {
-        let model = training.model();
-        let weights = model.weights();
+    pub(super) fn of(
+        training: &Training,
+        shape: ModelShape,
+        origin: &Origin,
+        optimizer: &[u8],
+    ) -> Self {
         Self {
             format: FORMAT,
             residyn: env!("CARGO_PKG_VERSION").to_owned(),
-            shape: ModelShape::of(model.system(), model.joints(), &model.declared(), &weights),
+            shape,
             config: origin.config.clone(),
             seed: origin.seed,
             settings: training.settings.clone(),

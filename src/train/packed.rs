@@ -29,12 +29,17 @@ impl Packed {
         }
     }
 
+    /// All numbers in the order of [`HybridModel::flat`]: gradients run through them.
+    pub(super) fn flat(&self) -> Tensor<1> {
+        match &self.residual {
+            Some(residual) => join(&[self.first.val(), residual.val()]),
+            None => self.first.val(),
+        }
+    }
+
     /// `like` with these numbers, views of them: gradients run through it.
     pub(super) fn viewed(&self, like: &HybridModel) -> HybridModel {
-        match &self.residual {
-            Some(residual) => like.with_flat(&join(&[self.first.val(), residual.val()])),
-            None => like.with_flat(&self.first.val()),
-        }
+        like.with_flat(&self.flat())
     }
 
     /// `like` with these numbers, a model of its own.

@@ -18,22 +18,21 @@ use super::problem::Problem;
 use crate::train::hybrid::{numbers_of, primitive};
 
 /// Sums of E and ||F_r||, each with these weights, as a tensor `[sums]`; and the two alone. `numbers` are the learnable ones in
-/// the order of [`HybridModel::flat`](crate::train::HybridModel::flat), those of the second tensor after those of the first.
+/// the order of [`HybridModel::flat`](crate::train::HybridModel::flat).
 pub(in crate::train) fn loss(
-    numbers: [Tensor<1>; 2],
+    numbers: Tensor<1>,
     problem: Problem,
     workers: Arc<Workers>,
     sums: &[[f32; 2]],
 ) -> (Tensor<1>, [f64; 2]) {
     let parts = Arc::new(Mutex::new([0.0; 2]));
-    let [first, second] = numbers.map(Tensor::into_dispatch);
     let task = LossTask {
         problem: Arc::new(problem),
         workers,
         sums: sums.to_vec(),
         parts: parts.clone(),
     };
-    let loss = <Dispatch as LossOperation>::fused_loss(first, second, task);
+    let loss = <Dispatch as LossOperation>::fused_loss(numbers.into_dispatch(), task);
     let parts = *parts.lock().expect("no other thread uses it");
     (Tensor::from_dispatch(loss), parts)
 }
@@ -49,12 +48,8 @@ struct LossTask {
 }
 
 impl LossTask {
-    fn evaluate(self, numbers: [&NdArrayTensor; 2]) -> (Evaluated, NdArrayTensor) {
-        let numbers = numbers.map(numbers_of);
-        let evaluation = match &numbers[1][..] {
-            [] => Evaluation::new(self.problem, self.workers, &numbers[0]),
-            _ => Evaluation::new(self.problem, self.workers, &numbers.concat()),
-        };
+    fn evaluate(self, numbers: &NdArrayTensor) -> (Evaluated, NdArrayTensor) {
+        let evaluation = Evaluation::new(self.problem, self.workers, &numbers_of(numbers));
         let loss = evaluation.loss;
         *self.parts.lock().expect("no other thread uses it") = loss.map(f64::from);
         // What has no weight does not count, be it infinite.
@@ -67,7 +62,6 @@ impl LossTask {
         let evaluated = Evaluated {
             evaluation: Arc::new(Mutex::new(evaluation)),
             sums: self.sums,
-            counts: numbers.map(|numbers| numbers.len()),
         };
         (evaluated, loss)
     }
@@ -79,34 +73,24 @@ impl LossTask {
 struct Evaluated {
     evaluation: Arc<Mutex<Evaluation>>,
     sums: Vec<[f32; 2]>,
-    /// Numbers in each of the two tensors.
-    counts: [usize; 2],
 }
 
 /// The operation as backends know it.
 #[backend_extension(NdArray, Autodiff)]
 trait LossOperation: Backend {
-    fn fused_loss(
-        first: FloatTensor<Self>,
-        second: FloatTensor<Self>,
-        task: LossTask,
-    ) -> FloatTensor<Self>;
+    fn fused_loss(numbers: FloatTensor<Self>, task: LossTask) -> FloatTensor<Self>;
 }
 
 impl LossOperation for NdArray {
-    fn fused_loss(first: NdArrayTensor, second: NdArrayTensor, task: LossTask) -> NdArrayTensor {
-        task.evaluate([&first, &second]).1
+    fn fused_loss(numbers: NdArrayTensor, task: LossTask) -> NdArrayTensor {
+        task.evaluate(&numbers).1
     }
 }
 
 impl<C: CheckpointStrategy> LossOperation for Autodiff<NdArray, C> {
-    fn fused_loss(
-        first: FloatTensor<Self>,
-        second: FloatTensor<Self>,
-        task: LossTask,
-    ) -> FloatTensor<Self> {
-        let (evaluated, loss) = task.evaluate([first.primitive(), second.primitive()]);
-        let operation = LossBackward.prepare::<C>([first.node(), second.node()]);
+    fn fused_loss(numbers: FloatTensor<Self>, task: LossTask) -> FloatTensor<Self> {
+        let (evaluated, loss) = task.evaluate(numbers.primitive());
+        let operation = LossBackward.prepare::<C>([numbers.node()]);
         match operation.compute_bound().stateful() {
             OpsKind::Tracked(operation) => operation.finish(evaluated, loss),
             OpsKind::UnTracked(operation) => operation.finish(loss),
@@ -117,12 +101,12 @@ impl<C: CheckpointStrategy> LossOperation for Autodiff<NdArray, C> {
 #[derive(Debug)]
 struct LossBackward;
 
-impl Backward<NdArray, 2> for LossBackward {
+impl Backward<NdArray, 1> for LossBackward {
     type State = Evaluated;
 
     fn backward(
         self,
-        ops: Ops<Self::State, 2>,
+        ops: Ops<Self::State, 1>,
         gradients: &mut Gradients,
         _checkpointer: &mut Checkpointer,
     ) {
@@ -138,15 +122,8 @@ impl Backward<NdArray, 2> for LossBackward {
             .evaluation
             .lock()
             .expect("no other thread uses it");
-        let mut slopes = evaluation.derivative(by_loss);
-        let [first, second] = ops.parents;
-        if let Some(parent) = second {
-            let of_second = slopes.split_off(ops.state.counts[0]);
-            gradients.register::<NdArray>(parent.id, vector(of_second));
-        }
-        if let Some(parent) = first {
-            slopes.truncate(ops.state.counts[0]);
-            gradients.register::<NdArray>(parent.id, vector(slopes));
+        if let [Some(numbers)] = ops.parents {
+            gradients.register::<NdArray>(numbers.id, vector(evaluation.derivative(by_loss)));
         }
     }
 }

@@ -5,7 +5,7 @@ use burn::module::{Module, Param, ParamId};
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData, activation::relu};
 
-use super::tensor::{tensor, to_f32, vector};
+use super::tensor::{Views, tensor, to_f32, vector};
 use crate::model::{Angles, LayerWeights, MlpWeights, ResidualOn, to_f32 as rounded};
 
 /// A multilayer perceptron of positions, velocities and inputs, with ReLU on every layer but the last.
@@ -41,19 +41,14 @@ impl Mlp {
         weights
     }
 
-    /// The network with other numbers, views of `flat`: layer after layer, the weights `[input][output]` before the biases.
-    pub(super) fn with_numbers(&self, flat: &Tensor<1>) -> Self {
-        let mut first = 0;
-        let mut next = |count: usize| {
-            first += count;
-            flat.clone().narrow(0, first - count, count)
-        };
+    /// The network with the next of these numbers: layer after layer, the weights `[input][output]` before the biases.
+    pub(super) fn with_numbers(&self, views: &mut Views<'_>) -> Self {
         let layers = self.layers.iter().map(|layer| {
             let [inputs, outputs] = layer.weight.dims();
-            let weight = next(inputs * outputs).reshape([inputs, outputs]);
+            let weight = views.next(inputs * outputs).reshape([inputs, outputs]);
             Linear {
                 weight: Param::initialized(layer.weight.id, weight),
-                bias: Some(Param::initialized(bias(layer).id, next(outputs))),
+                bias: Some(Param::initialized(bias(layer).id, views.next(outputs))),
             }
         });
         Self {

@@ -5,6 +5,7 @@ use burn::module::{Module, ParamId};
 use burn::tensor::{Device, Tensor};
 
 use super::flat::flattened;
+use super::tensor::Views;
 use super::{HybridError, Mlp, Physics, Structure, Unpacked};
 use crate::control::Predictor;
 use crate::model::{
@@ -265,15 +266,11 @@ impl HybridModel {
 
     /// The same model with other numbers, views of `flat`.
     pub(in crate::train) fn with_flat(&self, flat: &Tensor<1>) -> Self {
-        let mut first = 0;
-        let mut next = |count: usize| {
-            first += count;
-            flat.clone().narrow(0, first - count, count)
-        };
+        let mut views = Views::new(flat);
         let parameters = self.structure.parameters().len();
         let physics = self.physics.as_ref();
-        let physics = physics.map(|physics| physics.with_scaled(next(parameters)));
-        let mut network = |mlp: &Mlp| mlp.with_numbers(&next(mlp.num_params()));
+        let physics = physics.map(|physics| physics.with_scaled(views.next(parameters)));
+        let mut network = |mlp: &Mlp| mlp.with_numbers(&mut views);
         Self {
             physics,
             prior: self.prior.as_ref().map(&mut network),

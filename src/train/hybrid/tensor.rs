@@ -28,6 +28,28 @@ pub(in crate::train) fn to_f64<const D: usize>(tensor: Tensor<D>) -> Vec<f64> {
     to_f32(tensor).into_iter().map(f64::from).collect()
 }
 
+/// The entries of a vector in turn, as views of it.
+pub(super) struct Views<'a> {
+    of: &'a Tensor<1>,
+    taken: usize,
+}
+
+impl<'a> Views<'a> {
+    pub(super) fn new(of: &'a Tensor<1>) -> Self {
+        Self { of, taken: 0 }
+    }
+
+    /// The next `count` entries.
+    ///
+    /// # Panics
+    /// Where fewer are left.
+    pub(super) fn next(&mut self, count: usize) -> Tensor<1> {
+        let view = self.of.clone().narrow(0, self.taken, count);
+        self.taken += count;
+        view
+    }
+}
+
 /// The columns of a matrix `[batch, width]`.
 pub(super) fn columns(matrix: Tensor<2>) -> Vec<Tensor<1>> {
     let [batch, width] = matrix.dims();
